@@ -1,0 +1,5 @@
+// The monotonic clock.
+#pragma once
+
+// Seconds since an arbitrary moment; never goes back.
+double clock_seconds(void);

@@ -1,0 +1,21 @@
+// JSON out, through libfyaml, so that strings are escaped by a library.
+// A zeroed Json is not valid: use json_open. Calls nest: json_begin_object .. json_end.
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+typedef struct Json Json;
+
+Json *json_open(void); // the root is an object
+void json_begin_object(Json *json, const char *key); // key NULL: inside an array
+void json_begin_array(Json *json, const char *key);
+void json_end(Json *json); // of the innermost object or array
+void json_text(Json *json, const char *key, const char *value); // NULL value: null
+void json_number(Json *json, const char *key, double value);    // shortest that reads back; NaN, inf: null
+void json_integer(Json *json, const char *key, int64_t value);
+void json_boolean(Json *json, const char *key, bool value);
+void json_null(Json *json, const char *key);
+// Prints the document and one newline, and frees it.
+void json_print(Json *json, FILE *stream);

@@ -1,0 +1,18 @@
+// A file written beside its target and renamed when whole, so that a failure leaves the old file untouched.
+#pragma once
+
+#include "host/base/message.h"
+#include <stdbool.h>
+#include <stdio.h>
+
+typedef struct {
+    FILE *file;
+    char *target, *temporary;
+} OutputFile;
+
+// Opens a file beside `target`. On failure adds a message and returns false. `-` is standard output.
+// The temporary is removed by output_abandon, also from an atexit handler if the process faults.
+bool output_open(OutputFile *output, const char *target, MessageList *messages);
+// Flushes, checks for write errors (disk full), renames. On failure adds a message, removes the temporary.
+bool output_commit(OutputFile *output, MessageList *messages);
+void output_abandon(OutputFile *output);

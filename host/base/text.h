@@ -1,0 +1,22 @@
+// Growing text, always ended by a NUL that `length` does not count; a zeroed Text is the empty text.
+#pragma once
+
+#include "host/base/message.h"
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct {
+    char *items;
+    size_t count, capacity; // `count` bytes without the NUL
+} Text;
+
+void text_append(Text *text, const char *bytes, size_t length);
+void text_appendf(Text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
+const char *text_c(const Text *text); // never NULL
+void text_free(Text *text);           // and zeroes
+
+// Reads a whole file (`-`: standard input). On failure adds a message that names the file and returns false.
+bool text_read_file(Text *text, const char *path, MessageList *messages);
+
+// The known word nearest to `word` by edit distance, or NULL where none is near (distance > 1 + length / 4).
+const char *text_nearest(const char *word, const char *const *known, size_t known_count);

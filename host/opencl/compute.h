@@ -1,0 +1,76 @@
+// A device opened for work: context, queue, programs, buffers, launches and their times. Knows no scenes.
+// Every OpenCL status that is not success is a fault (exit 2) that names the call and the symbolic status.
+#pragma once
+
+#include "host/opencl/device.h"
+
+// `cl_must(clFinish(queue))`: faults with the call's text and the status' name.
+#define cl_must(call) cl_check((call), #call)
+void cl_check(cl_int status, const char *call);
+const char *cl_status_name(cl_int status);
+
+typedef struct {
+    const Device *device; // outlives the Compute
+    cl_context context;
+    cl_command_queue queue; // in order, profiling on
+} Compute;
+
+void compute_open(Compute *compute, const Device *device);
+void compute_close(Compute *compute); // and zeroes; accepts a zeroed one
+
+// The kernel texts embedded in the program, by name ("render.cl", "sphere.h", …); ended by a NULL name.
+typedef struct {
+    const char *name;
+    const char *text;
+} KernelFile;
+extern const KernelFile kernel_files[];
+
+typedef struct {
+    const char *root;    // the embedded file to compile, such as "render.cl"
+    const char *prelude; // definitions placed before the text (features, LANES, precision)
+    const char *options; // compiler flags only
+    bool no_cache;
+} ProgramRequest;
+
+typedef struct {
+    cl_program program;
+    uint64_t text_hash;  // of the composed text, prelude included
+    double build_seconds;
+    bool from_cache;
+} Program;
+
+// Composes the text (each quoted include expanded once, with #line), then takes the program from the cache in
+// $XDG_CACHE_HOME/glint (or $HOME/.cache/glint; neither set: no cache) or builds and stores it. The key: text,
+// options, device name, driver, platform version and the cache's own format version. Entries carry a checksum
+// and their whole key; a damaged one is rebuilt. Written beside and renamed: safe with many processes. A cache
+// that cannot be written is not an error. A text that does not compile is a fault: prints the build log and
+// saves the composed text, named in the message.
+void program_build(Compute *compute, const ProgramRequest *request, Program *program);
+// Call after the program's first launch has ended: stores the binary again where the device compiles on first
+// use (PoCL), so that the cache holds finished machine code. Does nothing for a program from the cache.
+void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
+void program_close(Program *program);
+
+// Composes only; for tests and hashes. NULL if `root` or an include is not embedded. Caller frees.
+char *program_text(const char *root, const char *prelude);
+
+// A buffer of at least one byte. `bytes` NULL: not initialised. A device that cannot allocate it is a fault
+// that says what was asked for and what the device has.
+cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags);
+
+// One command's time as its event says it, beside the host's clock around it.
+typedef struct {
+    double queued_seconds, start_seconds, end_seconds; // device clock, from an arbitrary moment
+    double event_seconds; // end - start; 0 where the runtime reports zeros
+    double host_seconds;  // from enqueue to completion seen by the host
+    bool trusted;         // false: zeros, end before start, or event longer than the host saw
+} LaunchTime;
+
+// Enqueues over global (rounded up by the caller) and waits. `local` NULL: the runtime's choice.
+LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *global,
+                         const size_t *local);
+// Waits for the event and reads it; host_start from clock_seconds() before the enqueue. Releases the event.
+LaunchTime event_time(cl_event event, double host_start);
+
+// Sets argument `index` or faults.
+void kernel_argument(cl_kernel kernel, cl_uint index, size_t size, const void *value);

@@ -1,0 +1,45 @@
+// Every OpenCL device of every platform, and the choice of one.
+#pragma once
+
+#define CL_TARGET_OPENCL_VERSION 120
+#include "host/base/message.h"
+#include <CL/cl.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    cl_platform_id platform;
+    cl_device_id id;
+    unsigned index;         // as `glint devices` numbers it, from 0 over all platforms
+    unsigned twin;          // 0 for the first device of this platform and name, 1 for the next …
+    cl_device_type type;
+    char *name, *vendor, *version, *driver, *platform_name, *platform_version;
+    char *extensions;
+    unsigned compute_units, clock_mhz;
+    unsigned native_float_width, native_double_width; // 1 at least; double 0 without fp64
+    uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes;
+    size_t largest_work_group;
+    double timer_resolution_seconds;
+    bool fp64, denormals, fma_in_hardware;
+    bool correctly_rounded; // -cl-fp32-correctly-rounded-divide-sqrt may be used
+    bool compiler, available, little_endian;
+} Device;
+
+typedef struct {
+    Device *items;
+    size_t count, capacity;
+    unsigned platform_count, empty_platform_count; // platforms without a device are counted, not an error
+} DeviceList;
+
+// Looks at all platforms. None at all is an empty list, not a failure.
+void device_list_open(DeviceList *list);
+void device_list_close(DeviceList *list);
+
+// `wish`: an index, a part of the name or platform's name (any case), "cpu", "gpu", or NULL for the default: a
+// GPU if there is one, else a CPU, else any. Only devices that are available, little-endian and have a
+// compiler are taken. Identical twins: the first. NULL with an error message where nothing fits; the message
+// lists the devices there are, and says how to install PoCL if there are none.
+const Device *device_choose(const DeviceList *list, const char *wish, MessageList *messages);
+
+const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"

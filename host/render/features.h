@@ -1,0 +1,21 @@
+// Which parts of the kernel a scene needs; the list itself is kernels/features.h.
+#pragma once
+
+#include "host/base/text.h"
+#include "host/scene/scene.h"
+#include "kernels/features.h"
+#include <stdint.h>
+
+typedef uint32_t FeatureSet;
+
+#define FEATURE_BIT_INDEX(name) FEATURE_INDEX_##name,
+enum { FEATURE_LIST(FEATURE_BIT_INDEX) FEATURE_COUNT };
+#undef FEATURE_BIT_INDEX
+#define FEATURE_BIT(name) FEATURE_##name = 1u << FEATURE_INDEX_##name,
+enum { FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (1u << FEATURE_COUNT) - 1 };
+#undef FEATURE_BIT
+
+extern const char *const feature_names[FEATURE_COUNT]; // "spheres", …
+
+FeatureSet features_of(const Scene *scene);
+void features_write_prelude(Text *text, FeatureSet set); // `#define HAS_SPHERES 1` … one for each feature

@@ -1,0 +1,74 @@
+// A scene on a device: flattened, uploaded, rendered in bands, or probed with explicit rays.
+// The only room that joins scene and opencl.
+#pragma once
+
+#include "host/opencl/compute.h"
+#include "host/render/features.h"
+#include "host/scene/scene.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef enum { PRECISION_FAST, PRECISION_SINGLE, PRECISION_STRICT, PRECISION_DOUBLE, PRECISION_COUNT } Precision;
+extern const char *const precision_names[PRECISION_COUNT];
+
+typedef enum { AOV_T = 1, AOV_NORMAL = 2, AOV_POSITION = 4, AOV_OBJECT = 8, AOV_SHADOW = 16, AOV_COLOR = 32 } AovSet;
+
+typedef struct {
+    uint32_t width, height;                          // of the whole picture
+    uint32_t region_x, region_y, region_width, region_height; // what is rendered of it
+    uint32_t sample_count;                           // per pixel, >= 1
+    Precision precision;
+    uint32_t lanes;          // 1, 4, 8, 16; 0: the device's own choice
+    FeatureSet extra_features; // built in though the scene does not need them (tests)
+    bool shift_to_eye;       // true for pictures; false for probes: rays and scene as they are
+    bool no_cache;
+    double band_seconds;     // aim for a launch's length; 0: 0.1
+    uint32_t band_rows;      // fixed number of rows in a band (tests); 0: by time
+} RenderSettings;
+
+typedef struct {
+    const char *what; // "parse", "flatten", "bvh", "build", "upload", "launch", "read-back", "encode"
+    double seconds;
+} StageTime;
+
+typedef struct Renderer Renderer;
+
+// Flattens, builds and uploads. NULL with a message where the settings do not fit the device (double without
+// fp64, strict where divide cannot be made correct, lanes not 1, 4, 8 or 16).
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings, MessageList *messages);
+void renderer_close(Renderer *renderer);
+
+typedef struct {
+    uint32_t first_row, row_count; // in the region
+    const float *colors;           // row_count x region_width x 3, linear
+    // with AOVs, in the kernel's own width (float, or double at `double`):
+    const void *t, *normal, *position; // x1, x3, x3
+    const uint32_t *object, *shadow;   // object: UINT32_MAX where nothing was hit; shadow: a bit per light, 1 = blocked
+} Band;
+
+// Called for each band from the top; returns false to stop (a user's interrupt).
+typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
+
+// Renders the region in bands of about band_seconds each. False if the sink stopped it.
+bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
+
+typedef struct {
+    double origin[3], direction[3], tmin, tmax;
+} ProbeRay;
+typedef struct {
+    uint32_t object; // UINT32_MAX: a miss
+    double t, normal[3];
+} ProbeHit;
+// Closest hits of explicit rays, by the same intersection code that renders.
+void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, ProbeHit *hits);
+
+typedef struct {
+    FeatureSet features;
+    uint32_t lanes;
+    bool wide;                 // structs in double
+    uint64_t kernel_hash;
+    double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
+    bool build_from_cache;
+    struct { LaunchTime *items; size_t count, capacity; } launches, reads;
+} RenderReport;
+const RenderReport *renderer_report(const Renderer *renderer);

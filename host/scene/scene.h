@@ -1,0 +1,112 @@
+// A scene as its file says it: plain arrays in double, world coordinates, no OpenCL.
+// Readers fill it; `flatten` (host/render) turns it into the device's arrays.
+#pragma once
+
+#include "host/base/message.h"
+#include "host/scene/vector.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef Vector3 Color; // linear RGB in x, y, z; 1 = full
+
+// What of the picture the field of view spans; pixels are square, the other side follows.
+typedef enum { FIELD_VERTICAL, FIELD_HORIZONTAL } FieldAxis;
+
+typedef struct {
+    Vector3 position, look_at, up; // look_at differs from position; up may be zero or parallel to the view
+    FieldAxis field_axis;
+    double half_tangent; // tan(field / 2) along field_axis, > 0; half the frame over the focal length
+    double frame_aspect; // width over height of the frame, or 0 where the file gives none
+} Camera;
+
+typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
+
+typedef struct {
+    LightKind kind;
+    Color color;             // times intensity
+    Vector3 position;        // point, spot
+    Vector3 direction;       // directional: the way the light travels; spot: look_at - position; not unit
+    double angle, penumbra;  // spot, degrees: no light beyond the half-angle; full within angle - penumbra
+} Light;
+
+typedef struct {
+    Color color;
+    double ambient;       // ka
+    Color diffuse;        // kd, per channel
+    double specular;      // ks; the highlight has the light's colour
+    double shininess;     // Phong's power, >= 0
+    double reflection, transmission, ior;
+    bool checker;
+    Color checker_colors[2]; // in place of color
+    double checker_size;     // side of a square, > 0, in scene units
+} Material;
+
+typedef enum {
+    SHAPE_SPHERE,
+    SHAPE_PLANE,
+    SHAPE_DISC,
+    SHAPE_BOX,
+    SHAPE_CYLINDER,
+    SHAPE_CONE,
+    SHAPE_TRIANGLE,
+    SHAPE_COUNT
+} ShapeKind;
+
+extern const char *const shape_names[SHAPE_COUNT]; // "sphere", "plane", …
+
+// Axes and normals are as the file has them, not made unit, never zero.
+typedef struct {
+    ShapeKind kind;
+    uint32_t material; // index into the scene's materials
+    union {
+        struct { Vector3 center; double radius; } sphere;
+        struct { Vector3 point, normal; } plane;
+        struct { Vector3 center, normal; double radius; } disc;
+        struct { Vector3 min, max; } box; // min <= max in each component
+        // finite: from .. from + axis; infinite: through `from` along axis
+        struct { Vector3 from, axis; double radius; bool finite, caps; } cylinder;
+        // finite: radius[0] at from, radius[1] at from + axis, not both zero
+        // infinite: both nappes, apex at `from`, radius grows by `slope` for each unit of length along the axis
+        struct { Vector3 from, axis; double radius[2], slope; bool finite, caps; } cone;
+        struct { Vector3 vertices[3], normals[3]; bool smooth; } triangle;
+    } as;
+} Object;
+
+// How a format means its colours: linear light, or values a display takes as they are.
+typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
+
+typedef struct {
+    Camera camera;
+    Color background, ambient;
+    struct { Light *items; size_t count, capacity; } lights;
+    struct { Material *items; size_t count, capacity; } materials;
+    struct { char **items; size_t count, capacity; } material_names; // one for each material; may be ""
+    struct { Object *items; size_t count, capacity; } objects; // an object's id is its index here
+    ColorMeaning color_meaning;
+    unsigned width, height; // the file's own picture size, or 0
+} Scene;
+
+typedef struct {
+    bool lenient; // skip unknown elements of .rt with a warning
+} SceneOptions;
+
+// Reads a scene; the format follows from the name's ending (.yaml .yml .rt .cfg). On a user's fault returns
+// false with the errors in `messages` and an empty scene; warnings may be there either way.
+bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
+void scene_free(Scene *scene); // and zeroes
+
+// The readers, from memory. `source->file` is used in messages only.
+bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
+bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
+bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
+
+// Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32, ior 1.5.
+Material material_default(void);
+
+typedef struct {
+    Vector3 min, max; // min > max: empty
+} Bounds;
+
+// Of all bounded objects; *unbounded_count counts the rest (planes, infinite cylinders and cones).
+Bounds scene_bounds(const Scene *scene, size_t *unbounded_count);

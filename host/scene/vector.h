@@ -1,0 +1,55 @@
+// Double vectors of the host.
+#pragma once
+
+#include <math.h>
+#include <stdbool.h>
+
+typedef struct {
+    double x, y, z;
+} Vector3;
+
+static inline Vector3 vector_add(Vector3 a, Vector3 b)
+{
+    return (Vector3){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+static inline Vector3 vector_subtract(Vector3 a, Vector3 b)
+{
+    return (Vector3){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+static inline Vector3 vector_scale(Vector3 a, double factor)
+{
+    return (Vector3){a.x * factor, a.y * factor, a.z * factor};
+}
+
+static inline double vector_dot(Vector3 a, Vector3 b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+static inline Vector3 vector_cross(Vector3 a, Vector3 b)
+{
+    return (Vector3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+static inline double vector_length(Vector3 a)
+{
+    return hypot(hypot(a.x, a.y), a.z);
+}
+
+// Unit vector, without overflow or underflow; the zero vector stays zero.
+static inline Vector3 vector_normalize(Vector3 a)
+{
+    double largest = fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
+    if (largest == 0) return a;
+    int exponent;
+    frexp(largest, &exponent);
+    Vector3 scaled = {ldexp(a.x, -exponent), ldexp(a.y, -exponent), ldexp(a.z, -exponent)};
+    return vector_scale(scaled, 1 / sqrt(vector_dot(scaled, scaled)));
+}
+
+static inline bool vector_is_zero(Vector3 a)
+{
+    return a.x == 0 && a.y == 0 && a.z == 0;
+}

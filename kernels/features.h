@@ -1,0 +1,21 @@
+// The parts a scene may do without, read by the host and by the kernels. Each NAME is HAS_NAME, 0 or 1, in
+// the kernels. docs/performance.md has the gain that let each one in.
+#ifndef FEATURES_H
+#define FEATURES_H
+
+// clang-format off
+#define FEATURE_LIST(FEATURE) \
+    FEATURE(SPHERES)          \
+    FEATURE(PLANES)           \
+    FEATURE(DISCS)            \
+    FEATURE(BOXES)            \
+    FEATURE(CYLINDERS)        \
+    FEATURE(CONES)            \
+    FEATURE(TRIANGLES)        \
+    FEATURE(POINT_LIGHTS)     \
+    FEATURE(DIRECTIONAL_LIGHTS) \
+    FEATURE(SPOT_LIGHTS)      \
+    FEATURE(CHECKERS)
+// clang-format on
+
+#endif
