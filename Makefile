@@ -1,43 +1,123 @@
+# make [BUILD=folder] [CFLAGS=…]: the user owns CFLAGS, and a variant is another BUILD folder. One whose name ends in
+# -sanitize is built with ASan and UBSan. A newer compiler's warnings: CFLAGS='-O2 -Wno-error'.
+VERSION := 0.1.0
+
 CFLAGS ?= -O2 -g
 BUILD  ?= build
 PREFIX ?= /usr/local
 
-packages := libfyaml libpng OpenEXR cmocka
+packages := libfyaml libpng OpenEXR OpenCL
+ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
+ifneq ($(shell pkg-config --exists $(packages) && echo found),found)
+$(error Libraries are missing; tools/setup installs or lists them)
+endif
+endif
+
+ifneq ($(filter %-sanitize,$(BUILD)),)
+sanitize := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+endif
 OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Werror \
-            $(shell pkg-config --cflags libfyaml libpng OpenEXR)
-LIBS     := $(shell pkg-config --libs libfyaml libpng) -lOpenEXRCore-3_1 -lOpenCL -lm -lpthread
+            $(patsubst -I%,-isystem %,$(shell pkg-config --cflags $(packages))) $(sanitize)
+# Of OpenEXR only the library with the C interface.
+LIBS     := $(shell pkg-config --libs libfyaml libpng OpenCL) $(shell pkg-config --libs-only-L OpenEXR) \
+            $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) -lm -lpthread
+# In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
+GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
+                 2>/dev/null))),$(VERSION))
 
 kernels := $(sort $(wildcard kernels/*.h kernels/*.cl))
 sources := $(sort $(wildcard host/*.c host/*/*.c))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
-tests   := $(patsubst tests/%.c,$(BUILD)/tests/%,$(sort $(wildcard tests/test_*.c)))
+
+# Each tests/test_*.c and fuzz_*.c is a program; the other files are linked with all of them.
+test_programs := $(sort $(wildcard tests/test_*.c tests/fuzz_*.c))
+test_helpers  := $(filter-out $(test_programs),$(sort $(wildcard tests/*.c tests/oracle/*.c)))
+test_objects  := $(test_helpers:%.c=$(BUILD)/%.o)
+tests         := $(test_programs:%.c=$(BUILD)/%)
 
 all: $(BUILD)/glint
 
 $(BUILD)/glint: $(objects)
-	$(CC) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
-$(BUILD)/kernel_files.c: $(kernels) tools/embed
+$(BUILD)/kernel_files.c: $(kernels) kernels tools/embed
 	@mkdir -p $(@D)
 	tools/embed $(kernels) > $@
 
-$(BUILD)/kernel_files.o: $(BUILD)/kernel_files.c
+$(BUILD)/kernel_files.o: $(BUILD)/kernel_files.c $(BUILD)/flags
 	$(CC) $(OURS) -Wno-overlength-strings $(CFLAGS) -c $< -o $@
 
-$(BUILD)/%.o: %.c Makefile
+$(BUILD)/host/cli/version.o: OURS += -DGLINT_VERSION='"$(GLINT_VERSION)"'
+$(BUILD)/host/cli/version.o: $(BUILD)/version
+
+$(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(CC) $(OURS) $(CFLAGS) -MMD -MP -c $< -o $@
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(library)
-	$(CC) $(CFLAGS) $(LDFLAGS) $^ -lcmocka $(LIBS) -o $@
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ -lcmocka $(LIBS) -o $@
 
-test: all $(tests)
-	@for test in $(tests); do echo "== $$test"; $$test || exit 1; done
+# These two change only when what they hold does, and what depends on it is then built anew.
+$(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS)
+$(BUILD)/version: text := $(GLINT_VERSION)
+$(BUILD)/flags $(BUILD)/version: FORCE
+	@mkdir -p $(@D)
+	@printf '%s\n' '$(text)' | cmp -s - $@ || printf '%s\n' '$(text)' > $@
+
+tests: $(tests)
+
+test:
+	+@tools/run_tests $(BUILD)
+
+# Pinned to one release of clang's tools: what they ask for changes with each.
+CLANG_FORMAT ?= clang-format-14
+CLANG_TIDY   ?= clang-tidy-14
+CPPCHECK     ?= cppcheck
+LINT_JOBS    ?= $(shell nproc)
+linted := $(sources) $(test_programs) $(test_helpers)
+
+formatted := $(linted) $(kernels) $(wildcard host/*/*.h tests/*.h tests/oracle/*.h)
+
+format:
+	$(CLANG_FORMAT) -i $(formatted)
+
+lint: lint-format lint-tidy lint-cppcheck lint-man
+
+lint-format:
+	@$(CLANG_FORMAT) --dry-run -Werror $(formatted)
+
+lint-tidy:
+	@printf '%s\n' $(linted) | xargs -P $(LINT_JOBS) -I FILE \
+	    $(CLANG_TIDY) --quiet FILE -- $(OURS) '-DGLINT_VERSION="lint"' 2>/dev/null
+
+lint-cppcheck:
+	@$(CPPCHECK) --quiet --std=c11 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
+	    -j $(LINT_JOBS) -I. -D_GNU_SOURCE '-DGLINT_VERSION="lint"' $(linted)
+
+lint-man:
+	@! groff -man -ww -z -Tutf8 docs/glint.1 2>&1 | grep .
+
+data := $(DESTDIR)$(PREFIX)/share
+
+install: all
+	install -D $(BUILD)/glint $(DESTDIR)$(PREFIX)/bin/glint
+	install -D -m 644 docs/glint.1 $(data)/man/man1/glint.1
+	install -D -m 644 tools/completions/glint.bash $(data)/bash-completion/completions/glint
+	install -D -m 644 tools/completions/glint.zsh $(data)/zsh/site-functions/_glint
+	install -D -m 644 tools/completions/glint.fish $(data)/fish/vendor_completions.d/glint.fish
+	install -d $(data)/glint/scenes
+	install -m 644 scenes/*.* $(data)/glint/scenes
+
+uninstall:
+	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
+	    $(data)/zsh/site-functions/_glint $(data)/fish/vendor_completions.d/glint.fish
+	rm -rf $(data)/glint
 
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all test clean
+.PHONY: all tests test format lint lint-format lint-tidy lint-cppcheck lint-man install uninstall clean FORCE
 .SECONDARY:
--include $(objects:.o=.d) $(tests:=.d)
+.DELETE_ON_ERROR:
+-include $(objects:.o=.d) $(tests:=.d) $(test_objects:.o=.d)

@@ -1,5 +1,7 @@
 // JSON out, through libfyaml, so that strings are escaped by a library.
 // A zeroed Json is not valid: use json_open. Calls nest: json_begin_object .. json_end.
+// A key is the program's own word, without control characters; a text may be anything (what is not UTF-8 in
+// it becomes U+FFFD).
 #pragma once
 
 #include <stdbool.h>
@@ -8,10 +10,10 @@
 
 typedef struct Json Json;
 
-Json *json_open(void); // the root is an object
+Json *json_open(void);                               // the root is an object
 void json_begin_object(Json *json, const char *key); // key NULL: inside an array
 void json_begin_array(Json *json, const char *key);
-void json_end(Json *json); // of the innermost object or array
+void json_end(Json *json);                                      // of the innermost object or array
 void json_text(Json *json, const char *key, const char *value); // NULL value: null
 void json_number(Json *json, const char *key, double value);    // shortest that reads back; NaN, inf: null
 void json_integer(Json *json, const char *key, int64_t value);

@@ -13,6 +13,8 @@ typedef struct {
 // Opens a file beside `target`. On failure adds a message and returns false. `-` is standard output.
 // The temporary is removed by output_abandon, also from an atexit handler if the process faults.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);
+// On failure adds a message and returns false; the file stays open, to be abandoned.
+bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);
 // Flushes, checks for write errors (disk full), renames. On failure adds a message, removes the temporary.
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);

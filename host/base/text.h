@@ -1,4 +1,4 @@
-// Growing text, always ended by a NUL that `length` does not count; a zeroed Text is the empty text.
+// Growing text, always ended by a NUL that `count` does not count; a zeroed Text is the empty text.
 #pragma once
 
 #include "host/base/message.h"
@@ -15,8 +15,12 @@ void text_appendf(Text *text, const char *format, ...) __attribute__((format(pri
 const char *text_c(const Text *text); // never NULL
 void text_free(Text *text);           // and zeroes
 
+// Bytes of the well-formed UTF-8 character that `text` starts with, or 0 where it starts with none.
+size_t text_character_size(const char *text, size_t length);
+
 // Reads a whole file (`-`: standard input). On failure adds a message that names the file and returns false.
 bool text_read_file(Text *text, const char *path, MessageList *messages);
 
-// The known word nearest to `word` by edit distance, or NULL where none is near (distance > 1 + length / 4).
+// The known word nearest to `word` by edit distance, or NULL where none is near
+// (distance > 1 + length / 4, or as large as the word). A swap of neighbors counts one.
 const char *text_nearest(const char *word, const char *const *known, size_t known_count);

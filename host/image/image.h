@@ -37,8 +37,9 @@ void image_writer_abandon(ImageWriter *writer);
 // NaN gives 0. sRGB: IEC 61966-2-1:1999.
 uint32_t image_quantize(float value, Transfer transfer, unsigned bits);
 
-// A whole picture in memory; what `image_read` gives is linear unless the file holds display values, which are
-// then value / maximum with `transfer` telling the curve they were written with (PNG: from its sRGB chunk).
+// A whole picture in memory; what `image_read` gives is linear unless the file holds display values, which
+// are then value / maximum with `transfer` telling the curve they were written with (PNG: from its sRGB
+// chunk).
 typedef struct {
     uint32_t width, height, channels;
     float *values;

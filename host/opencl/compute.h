@@ -29,25 +29,29 @@ typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"
     const char *prelude; // definitions placed before the text (features, LANES, precision)
     const char *options; // compiler flags only
+    const char *launch; // which kernel at which work-group size, such as "render 8x1"; may be NULL; see below
     bool no_cache;
 } ProgramRequest;
 
 typedef struct {
     cl_program program;
-    uint64_t text_hash;  // of the composed text, prelude included
+    uint64_t text_hash; // of the composed text, prelude included
     double build_seconds;
     bool from_cache;
 } Program;
 
 // Composes the text (each quoted include expanded once, with #line), then takes the program from the cache in
-// $XDG_CACHE_HOME/glint (or $HOME/.cache/glint; neither set: no cache) or builds and stores it. The key: text,
-// options, device name, driver, platform version and the cache's own format version. Entries carry a checksum
-// and their whole key; a damaged one is rebuilt. Written beside and renamed: safe with many processes. A cache
-// that cannot be written is not an error. A text that does not compile is a fault: prints the build log and
-// saves the composed text, named in the message.
+// $XDG_CACHE_HOME/glint (or $HOME/.cache/glint; neither set: no cache) or builds it. The key: text, options,
+// launch, device name, driver, platform version and the cache's own format version. Entries carry a checksum
+// and their whole key; a damaged one is rebuilt. Written beside and renamed: safe with many processes. A
+// cache that cannot be written is not an error. `no_cache` keeps PoCL's own cache out of it, too. A text that
+// does not compile is a fault: prints the build log and saves the composed text, named in the message.
 void program_build(Compute *compute, const ProgramRequest *request, Program *program);
-// Call after the program's first launch has ended: stores the binary again where the device compiles on first
-// use (PoCL), so that the cache holds finished machine code. Does nothing for a program from the cache.
+// Call after the program's first launch has ended: puts the program into the cache, unless it came from
+// there. Not earlier: PoCL compiles a kernel for a work-group size at its first launch, its binaries hold
+// what was launched by then, and one loaded from a binary hands out that binary for ever (3.1; hence `launch`
+// in the key). Asking for PoCL's binary also costs one more compilation of each kernel, so do it when the
+// picture is out.
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
 void program_close(Program *program);
 
@@ -61,10 +65,15 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
 // One command's time as its event says it, beside the host's clock around it.
 typedef struct {
     double queued_seconds, start_seconds, end_seconds; // device clock, from an arbitrary moment
-    double event_seconds; // end - start; 0 where the runtime reports zeros
-    double host_seconds;  // from enqueue to completion seen by the host
-    bool trusted;         // false: zeros, end before start, or event longer than the host saw
+    double event_seconds;                              // end - start; 0 where the runtime reports zeros
+    double host_seconds;                               // from enqueue to completion seen by the host
+    bool trusted; // false: zeros, end before start, or event longer than the host saw
 } LaunchTime;
+
+// What an event's moments (nanoseconds of the device clock) are worth beside the host's seconds. An event may
+// be longer than the host saw by the timer's resolution and 1 %, no more.
+LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, double host_seconds,
+                             double resolution_seconds);
 
 // Enqueues over global (rounded up by the caller) and waits. `local` NULL: the runtime's choice.
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *global,

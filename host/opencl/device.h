@@ -11,8 +11,8 @@
 typedef struct {
     cl_platform_id platform;
     cl_device_id id;
-    unsigned index;         // as `glint devices` numbers it, from 0 over all platforms
-    unsigned twin;          // 0 for the first device of this platform and name, 1 for the next …
+    unsigned index; // as `glint devices` numbers it, from 0 over all platforms
+    unsigned twin;  // 0 for the first device of this platform and name, 1 for the next …
     cl_device_type type;
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
@@ -36,10 +36,21 @@ typedef struct {
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
 
-// `wish`: an index, a part of the name or platform's name (any case), "cpu", "gpu", or NULL for the default: a
-// GPU if there is one, else a CPU, else any. Only devices that are available, little-endian and have a
+// `wish`: an index, a part of the name or platform's name (any case), "cpu", "gpu", or NULL for the default:
+// a GPU if there is one, else a CPU, else any. Only devices that are available, little-endian and have a
 // compiler are taken. Identical twins: the first. NULL with an error message where nothing fits; the message
 // lists the devices there are, and says how to install PoCL if there are none.
 const Device *device_choose(const DeviceList *list, const char *wish, MessageList *messages);
+
+// What the user asked for: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
+// NULL.
+const char *device_wish(const char *option);
+
+// Whether kernels can be built and run there; if not, *why (may be NULL) says what is missing.
+bool device_usable(const Device *device, const char **why);
+
+// Pixels that one work-item carries unless the user says otherwise: on a CPU the native vector width of
+// float, or of double where `wide`, cut to 1, 4, 8 or 16; elsewhere 1.
+unsigned device_lanes(const Device *device, bool wide);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"

@@ -11,7 +11,8 @@
 typedef enum { PRECISION_FAST, PRECISION_SINGLE, PRECISION_STRICT, PRECISION_DOUBLE, PRECISION_COUNT } Precision;
 extern const char *const precision_names[PRECISION_COUNT];
 
-typedef enum { AOV_T = 1, AOV_NORMAL = 2, AOV_POSITION = 4, AOV_OBJECT = 8, AOV_SHADOW = 16, AOV_COLOR = 32 } AovSet;
+// What a picture can hold beside its color; a set of bits.
+enum { AOV_T = 1, AOV_NORMAL = 2, AOV_POSITION = 4, AOV_OBJECT = 8, AOV_SHADOW = 16 };
 
 typedef struct {
     uint32_t width, height;                          // of the whole picture
@@ -19,31 +20,29 @@ typedef struct {
     uint32_t sample_count;                           // per pixel, >= 1
     Precision precision;
     uint32_t lanes;          // 1, 4, 8, 16; 0: the device's own choice
-    FeatureSet extra_features; // built in though the scene does not need them (tests)
+    FeatureSet extra_features; // built in though the scene does not need them, for tests
     bool shift_to_eye;       // true for pictures; false for probes: rays and scene as they are
     bool no_cache;
     double band_seconds;     // aim for a launch's length; 0: 0.1
     uint32_t band_rows;      // fixed number of rows in a band (tests); 0: by time
 } RenderSettings;
 
-typedef struct {
-    const char *what; // "parse", "flatten", "bvh", "build", "upload", "launch", "read-back", "encode"
-    double seconds;
-} StageTime;
-
 typedef struct Renderer Renderer;
 
-// Flattens, builds and uploads. NULL with a message where the settings do not fit the device (double without
-// fp64, strict where divide cannot be made correct, lanes not 1, 4, 8 or 16).
+// Flattens, builds and uploads. NULL with a message where the settings do not fit the device (double without fp64,
+// lanes not 1, 4, 8 or 16) or a number of the scene does not fit the precision. The compute outlives it.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings, MessageList *messages);
 void renderer_close(Renderer *renderer);
 
+// Rows of the region, from the top. Values are float, or double at `double` (RenderReport.wide).
 typedef struct {
-    uint32_t first_row, row_count; // in the region
-    const float *colors;           // row_count x region_width x 3, linear
-    // with AOVs, in the kernel's own width (float, or double at `double`):
-    const void *t, *normal, *position; // x1, x3, x3
-    const uint32_t *object, *shadow;   // object: UINT32_MAX where nothing was hit; shadow: a bit per light, 1 = blocked
+    uint32_t first_row, row_count;
+    const void *colors; // 3 per pixel, linear
+    // NULL where not asked for; at the pixel's center
+    const void *t;                   // 1 per pixel; infinity where nothing was hit
+    const void *normal, *position;   // 3 per pixel, 0 where nothing was hit; relative to the eye
+    const uint32_t *object;          // 1 per pixel; UINT32_MAX where nothing was hit
+    const uint32_t *shadow;          // 1 per light and pixel: 1 where the light does not reach what was hit
 } Band;
 
 // Called for each band from the top; returns false to stop (a user's interrupt).
@@ -62,13 +61,22 @@ typedef struct {
 // Closest hits of explicit rays, by the same intersection code that renders.
 void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, ProbeHit *hits);
 
+// A kernel's launch, or a transfer.
+typedef struct {
+    const char *name; // "render", "aov", "trace", "read-back"
+    LaunchTime time;
+} NamedLaunch;
+
 typedef struct {
     FeatureSet features;
     uint32_t lanes;
     bool wide;                 // structs in double
     uint64_t kernel_hash;
-    double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
-    bool build_from_cache;
-    struct { LaunchTime *items; size_t count, capacity; } launches, reads;
+    double flatten_seconds, build_seconds, upload_seconds;
+    bool build_from_cache; // every program was
+    struct {
+        NamedLaunch *items;
+        size_t count, capacity;
+    } launches, reads;
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);

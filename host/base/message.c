@@ -1,0 +1,141 @@
+#include "host/base/message.h"
+#include "host/base/array.h"
+#include "host/base/text.h"
+
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+// A line longer than this is cut where it is shown, and not shown where the caret would lie beyond the cut.
+enum { CHARACTERS_SHOWN = 240 };
+
+// C0 and C1 controls could drive the reader's terminal.
+static bool character_is_control(const unsigned char *bytes, size_t size)
+{
+    return (size == 1 && (bytes[0] < 0x20 || bytes[0] == 0x7F)) ||
+           (size == 2 && bytes[0] == 0xC2 && bytes[1] < 0xA0);
+}
+
+// The text as it can be shown: as many characters as it has, at most `character_limit`, with `?` for each
+// control character and each byte that is not UTF-8. Tabs stay where they are wanted.
+static char *printable_copy(const char *bytes, size_t length, size_t character_limit, bool keep_tabs)
+{
+    Text shown = {0};
+    text_append(&shown, "", 0);
+    for (size_t i = 0, characters = 0; i < length && characters < character_limit; characters++) {
+        const unsigned char *here = (const unsigned char *)bytes + i;
+        size_t size = text_character_size(bytes + i, length - i);
+        bool as_it_is = size && (!character_is_control(here, size) || (keep_tabs && *here == '\t'));
+        text_append(&shown, as_it_is ? bytes + i : "?", as_it_is ? size : 1);
+        i += size ? size : 1;
+    }
+    return shown.items;
+}
+
+static size_t character_count(const char *bytes, size_t length)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < length; count++) {
+        size_t size = text_character_size(bytes + i, length - i);
+        i += size ? size : 1;
+    }
+    return count;
+}
+
+static char *message_format(const char *format, va_list arguments)
+{
+    char *formatted;
+    int length = vasprintf(&formatted, format, arguments);
+    if (length < 0) fault("out of memory: message");
+    char *text = printable_copy(formatted, (size_t)length, SIZE_MAX, false);
+    free(formatted);
+    return text;
+}
+
+void message_add(MessageList *list, MessageSeverity severity, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    Message message = {.severity = severity, .text = message_format(format, arguments)};
+    va_end(arguments);
+    array_push(*list, message);
+}
+
+void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
+                    const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    Message message = {.severity = severity, .text = message_format(format, arguments)};
+    va_end(arguments);
+
+    if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
+    if (offset > source->length) offset = source->length;
+    // A byte order mark is no character of the first line.
+    size_t start = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
+    if (offset < start) offset = start;
+    message.line = 1;
+    for (size_t i = start; i < offset; i++) {
+        if (source->bytes[i] == '\n') {
+            message.line++;
+            start = i + 1;
+        }
+    }
+    size_t end = offset;
+    while (end < source->length && source->bytes[end] != '\n')
+        end++;
+    if (end > start && source->bytes[end - 1] == '\r') end--;
+    message.column = 1 + (unsigned)character_count(source->bytes + start, offset - start);
+    if (message.column <= CHARACTERS_SHOWN)
+        message.source_line = printable_copy(source->bytes + start, end - start, CHARACTERS_SHOWN, true);
+    array_push(*list, message);
+}
+
+size_t message_count(const MessageList *list, MessageSeverity severity)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < list->count; i++)
+        count += list->items[i].severity == severity;
+    return count;
+}
+
+// The caret stands under the character: the line's own tabs before it keep it there at any tab width.
+static void caret_print(const char *line, unsigned column, FILE *stream)
+{
+    const char *at = line;
+    for (unsigned before = 1; before < column; before++) {
+        fputc(*at == '\t' ? '\t' : ' ', stream);
+        if (*at) at += text_character_size(at, strlen(at));
+    }
+    fputs("^\n", stream);
+}
+
+static void message_print(const Message *message, FILE *stream)
+{
+    fputs(message->file ? message->file : "glint", stream);
+    if (message->line) fprintf(stream, ":%u", message->line);
+    if (message->column) fprintf(stream, ":%u", message->column);
+    fprintf(stream, ": %s: %s\n", message->severity == MESSAGE_ERROR ? "error" : "warning", message->text);
+    if (message->source_line && message->column) {
+        fprintf(stream, "%s\n", message->source_line);
+        caret_print(message->source_line, message->column, stream);
+    }
+}
+
+void message_list_print(const MessageList *list, FILE *stream)
+{
+    for (size_t i = 0; i < list->count; i++)
+        message_print(&list->items[i], stream);
+}
+
+void message_list_free(MessageList *list)
+{
+    for (size_t i = 0; i < list->count; i++) {
+        free(list->items[i].file);
+        free(list->items[i].text);
+        free(list->items[i].source_line);
+    }
+    free(list->items);
+    *list = (MessageList){0};
+}

@@ -1,0 +1,143 @@
+#include "host/base/text.h"
+#include "host/base/array.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+void text_append(Text *text, const char *bytes, size_t length)
+{
+    array_reserve(*text, length + 1);
+    if (length) memcpy(text->items + text->count, bytes, length);
+    text->count += length;
+    text->items[text->count] = '\0';
+}
+
+void text_appendf(Text *text, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    char *formatted;
+    int length = vasprintf(&formatted, format, arguments);
+    va_end(arguments);
+    if (length < 0) fault("out of memory: text");
+    text_append(text, formatted, (size_t)length);
+    free(formatted);
+}
+
+const char *text_c(const Text *text)
+{
+    return text->items ? text->items : "";
+}
+
+void text_free(Text *text)
+{
+    free(text->items);
+    *text = (Text){0};
+}
+
+// The Unicode Standard 15.0, table 3-7.
+size_t text_character_size(const char *text, size_t length)
+{
+    const unsigned char *bytes = (const unsigned char *)text;
+    if (length == 0) return 0;
+    unsigned char first = bytes[0];
+    size_t size = first < 0x80   ? 1
+                  : first < 0xC2 ? 0
+                  : first < 0xE0 ? 2
+                  : first < 0xF0 ? 3
+                  : first < 0xF5 ? 4
+                                 : 0;
+    if (size <= 1 || size > length) return size == 1;
+    unsigned char low = first == 0xE0 ? 0xA0 : first == 0xF0 ? 0x90 : 0x80;
+    unsigned char high = first == 0xED ? 0x9F : first == 0xF4 ? 0x8F : 0xBF;
+    if (bytes[1] < low || bytes[1] > high) return 0;
+    for (size_t i = 2; i < size; i++) {
+        if ((bytes[i] & 0xC0) != 0x80) return 0;
+    }
+    return size;
+}
+
+bool text_read_file(Text *text, const char *path, MessageList *messages)
+{
+    bool is_standard_input = strcmp(path, "-") == 0;
+    FILE *file = is_standard_input ? stdin : fopen(path, "rbe");
+    if (!file) {
+        message_add(messages, MESSAGE_ERROR, "cannot read '%s': %s", path, strerror(errno));
+        return false;
+    }
+    // A device or a pipe may be endless.
+    struct stat status;
+    bool is_regular = fstat(fileno(file), &status) == 0 && S_ISREG(status.st_mode);
+    const size_t largest = is_regular ? SIZE_MAX : (size_t)2 << 30;
+    const size_t chunk = 65536;
+    size_t start = text->count, got;
+    do {
+        array_reserve(*text, chunk + 1);
+        got = fread(text->items + text->count, 1, chunk, file);
+        text->count += got;
+        text->items[text->count] = '\0';
+    } while (got == chunk && text->count - start <= largest);
+
+    bool whole = true;
+    if (ferror(file)) {
+        message_add(messages, MESSAGE_ERROR, "cannot read '%s': %s", path, strerror(errno));
+        whole = false;
+    } else if (text->count - start > largest) {
+        message_add(messages, MESSAGE_ERROR, "cannot read '%s': larger than 2 GiB", path);
+        whole = false;
+    }
+    if (!is_standard_input) fclose(file);
+    return whole;
+}
+
+static size_t least(size_t a, size_t b)
+{
+    return a < b ? a : b;
+}
+
+// Insertions, deletions, replacements and swaps of neighbors that turn `a` into `b`, each part edited once
+// (optimal string alignment; Boytsov, Indexing methods for approximate dictionary searching, 2011,
+// section 2.1).
+static size_t edit_distance(const char *a, size_t a_length, const char *b, size_t b_length)
+{
+    size_t *rows = memory_allocate(3 * (b_length + 1), sizeof *rows);
+    size_t *before = rows, *last = before + b_length + 1, *row = last + b_length + 1;
+    for (size_t j = 0; j <= b_length; j++)
+        row[j] = j;
+    for (size_t i = 1; i <= a_length; i++) {
+        size_t *freed = before;
+        before = last;
+        last = row;
+        row = freed;
+        row[0] = i;
+        for (size_t j = 1; j <= b_length; j++) {
+            row[j] = least(last[j - 1] + (a[i - 1] != b[j - 1]), least(last[j], row[j - 1]) + 1);
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                row[j] = least(row[j], before[j - 2] + 1);
+        }
+    }
+    size_t distance = row[b_length];
+    free(rows);
+    return distance;
+}
+
+const char *text_nearest(const char *word, const char *const *known, size_t known_count)
+{
+    const char *nearest = NULL;
+    size_t length = strlen(word), bound = least(1 + length / 4, length ? length - 1 : 0);
+    for (size_t i = 0; i < known_count; i++) {
+        size_t known_length = strlen(known[i]);
+        if (known_length > length + bound || length > known_length + bound) continue;
+        size_t distance = edit_distance(word, length, known[i], known_length);
+        if (distance <= bound && (!nearest || distance < bound + 1)) {
+            nearest = known[i];
+            if (distance == 0) break;
+            bound = distance - 1;
+        }
+    }
+    return nearest;
+}

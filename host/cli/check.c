@@ -1,0 +1,183 @@
+// glint check: reads a scene and says what is in it; no device is needed.
+#include "host/base/fault.h"
+#include "host/base/json.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include "host/render/features.h"
+#include <ctype.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { OPTION_JSON = OPTION_OWN };
+
+static const struct option long_options[] = {
+    {"json", no_argument, NULL, OPTION_JSON},
+    {"lenient", no_argument, NULL, OPTION_LENIENT},
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint check SCENE [OPTIONS]\n\n"
+    "Says how many objects, lights and materials a scene has, where it lies, which parts of the kernel it needs,\n"
+    "and what was tolerated in it.\n\n"
+    "      --json            for programs\n"
+    "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
+
+typedef struct {
+    size_t shapes[SHAPE_COUNT], unbounded_count;
+    Bounds bounds;
+    FeatureSet features;
+} SceneFacts;
+
+static SceneFacts facts_of(const Scene *scene)
+{
+    SceneFacts facts = {0};
+    for (size_t i = 0; i < scene->objects.count; i++)
+        facts.shapes[scene->objects.items[i].kind]++;
+    facts.bounds = scene_bounds(scene, &facts.unbounded_count);
+    facts.features = features_of(scene);
+    return facts;
+}
+
+static bool bounds_are_empty(const Bounds *bounds)
+{
+    return bounds->min.x > bounds->max.x;
+}
+
+// SPOT_LIGHTS -> "spot lights"
+static void feature_name_write(char *target, size_t size, const char *name)
+{
+    size_t i = 0;
+    for (; name[i] != '\0' && i + 1 < size; i++)
+        target[i] = name[i] == '_' ? ' ' : (char)tolower((unsigned char)name[i]);
+    target[i] = '\0';
+}
+
+static void text_print(const char *path, const Scene *scene, const SceneFacts *facts)
+{
+    printf("%s\n  objects    %zu", path, scene->objects.count);
+    const char *separator = ": ";
+    for (size_t kind = 0; kind < SHAPE_COUNT; kind++) {
+        if (facts->shapes[kind] == 0) continue;
+        printf("%s%zu %s", separator, facts->shapes[kind], shape_names[kind]);
+        separator = ", ";
+    }
+    printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count, scene->materials.count);
+    Vector3 low = facts->bounds.min, high = facts->bounds.max;
+    if (bounds_are_empty(&facts->bounds))
+        printf("none");
+    else
+        printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
+    if (facts->unbounded_count > 0) printf(", and %zu without end", facts->unbounded_count);
+    printf("\n  features  ");
+    for (unsigned i = 0; i < FEATURE_COUNT; i++) {
+        if (!(facts->features >> i & 1)) continue;
+        char name[64];
+        feature_name_write(name, sizeof name, feature_names[i]);
+        printf(" %s%s", name, facts->features >> i >> 1 ? "," : "");
+    }
+    printf("\n");
+}
+
+static void vector_json(Json *json, const char *key, Vector3 v)
+{
+    json_begin_array(json, key);
+    json_number(json, NULL, v.x);
+    json_number(json, NULL, v.y);
+    json_number(json, NULL, v.z);
+    json_end(json);
+}
+
+static void messages_json(Json *json, const MessageList *messages)
+{
+    static const char *const keys[] = {[MESSAGE_WARNING] = "warnings", [MESSAGE_ERROR] = "errors"};
+    for (MessageSeverity severity = MESSAGE_WARNING; severity <= MESSAGE_ERROR; severity++) {
+        json_begin_array(json, keys[severity]);
+        for (size_t i = 0; i < messages->count; i++) {
+            const Message *message = &messages->items[i];
+            if (message->severity != severity) continue;
+            json_begin_object(json, NULL);
+            json_text(json, "file", message->file);
+            json_integer(json, "line", message->line);
+            json_integer(json, "column", message->column);
+            json_text(json, "text", message->text);
+            json_end(json);
+        }
+        json_end(json);
+    }
+}
+
+static void json_report(const char *path, const Scene *scene, bool loaded, const MessageList *messages)
+{
+    Json *json = json_open();
+    json_integer(json, "schema", 1);
+    json_text(json, "scene", path);
+    json_boolean(json, "valid", loaded);
+    if (loaded) {
+        SceneFacts facts = facts_of(scene);
+        json_integer(json, "objects", (int64_t)scene->objects.count);
+        json_begin_object(json, "shapes");
+        for (size_t kind = 0; kind < SHAPE_COUNT; kind++)
+            json_integer(json, shape_names[kind], (int64_t)facts.shapes[kind]);
+        json_end(json);
+        json_integer(json, "unbounded", (int64_t)facts.unbounded_count);
+        json_integer(json, "lights", (int64_t)scene->lights.count);
+        json_integer(json, "materials", (int64_t)scene->materials.count);
+        if (bounds_are_empty(&facts.bounds)) {
+            json_null(json, "bounds");
+        } else {
+            json_begin_object(json, "bounds");
+            vector_json(json, "min", facts.bounds.min);
+            vector_json(json, "max", facts.bounds.max);
+            json_end(json);
+        }
+        json_begin_array(json, "features");
+        for (unsigned i = 0; i < FEATURE_COUNT; i++)
+            if (facts.features >> i & 1) json_text(json, NULL, feature_names[i]);
+        json_end(json);
+    }
+    messages_json(json, messages);
+    json_print(json, stdout);
+}
+
+int command_check(int argument_count, char **arguments)
+{
+    SceneOptions scene_options = {0};
+    bool as_json = false;
+    int option;
+    while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
+        switch (option) {
+        case OPTION_JSON:
+            as_json = true;
+            break;
+        case OPTION_LENIENT:
+            scene_options.lenient = true;
+            break;
+        case 'h':
+            fputs(help_text, stdout);
+            return EXIT_DONE;
+        default:
+            return EXIT_USER;
+        }
+    }
+    if (optind + 1 != argument_count)
+        return option_usage_fault("check", optind == argument_count ? "which scene?" : "one scene at a time");
+    const char *path = arguments[optind];
+    Scene scene = {0};
+    MessageList messages = {0};
+    bool loaded = scene_load(&scene, path, &scene_options, &messages);
+    if (as_json) {
+        json_report(path, &scene, loaded, &messages);
+        message_list_free(&messages);
+    } else {
+        messages_tell(&messages, path);
+        if (loaded) {
+            SceneFacts facts = facts_of(&scene);
+            text_print(path, &scene, &facts);
+        }
+    }
+    scene_free(&scene);
+    return loaded ? EXIT_DONE : EXIT_USER;
+}

@@ -1,0 +1,7 @@
+// The subcommands: each gets its own name as the first argument, and returns the exit status.
+#pragma once
+
+int command_render(int argument_count, char **arguments);
+int command_trace(int argument_count, char **arguments);
+int command_check(int argument_count, char **arguments);
+int command_devices(int argument_count, char **arguments);

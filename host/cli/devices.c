@@ -1,0 +1,174 @@
+// glint devices: every device of every platform, with what matters for tracing.
+#include "host/base/fault.h"
+#include "host/base/json.h"
+#include "host/base/text.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include "host/opencl/device.h"
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { OPTION_JSON = OPTION_OWN };
+
+static const struct option long_options[] = {
+    {"json", no_argument, NULL, OPTION_JSON},
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
+                                "Lists every OpenCL device of every platform; * marks the one that is used "
+                                "unless --device says otherwise.\n\n"
+                                "      --json            for programs\n"
+                                "  -h, --help            this text\n";
+
+static void devices_print_json(const DeviceList *list, const Device *chosen)
+{
+    Json *json = json_open();
+    json_integer(json, "schema", 1);
+    json_integer(json, "platforms", list->platform_count);
+    json_integer(json, "platforms_without_device", list->empty_platform_count);
+    json_begin_array(json, "devices");
+    for (size_t i = 0; i < list->count; i++) {
+        const Device *device = &list->items[i];
+        const char *why;
+        json_begin_object(json, NULL);
+        json_integer(json, "index", device->index);
+        json_integer(json, "twin", device->twin);
+        json_boolean(json, "default", device == chosen);
+        json_boolean(json, "usable", device_usable(device, &why));
+        json_text(json, "unusable_because", why);
+        json_text(json, "name", device->name);
+        json_text(json, "type", device_type_name(device->type));
+        json_text(json, "vendor", device->vendor);
+        json_text(json, "platform", device->platform_name);
+        json_text(json, "platform_version", device->platform_version);
+        json_text(json, "version", device->version);
+        json_text(json, "driver", device->driver);
+        json_integer(json, "units", device->compute_units);
+        json_integer(json, "clock_mhz", device->clock_mhz);
+        json_integer(json, "lanes", device_lanes(device, false));
+        json_integer(json, "native_float_width", device->native_float_width);
+        json_integer(json, "native_double_width", device->native_double_width);
+        json_boolean(json, "fp64", device->fp64);
+        json_boolean(json, "denormals", device->denormals);
+        json_boolean(json, "fma", device->fma_in_hardware);
+        json_boolean(json, "correctly_rounded_divide_sqrt", device->correctly_rounded);
+        json_boolean(json, "compiler", device->compiler);
+        json_integer(json, "memory_bytes", (int64_t)device->memory_bytes);
+        json_integer(json, "largest_buffer_bytes", (int64_t)device->largest_buffer_bytes);
+        json_integer(json, "local_memory_bytes", (int64_t)device->local_memory_bytes);
+        json_integer(json, "largest_work_group", (int64_t)device->largest_work_group);
+        json_number(json, "timer_resolution_seconds", device->timer_resolution_seconds);
+        json_end(json);
+    }
+    json_print(json, stdout);
+}
+
+enum { COLUMN_COUNT = 12 };
+
+static const struct {
+    const char *head;
+    bool to_the_right;
+} columns[COLUMN_COUNT] = {
+    {"", false},       {"name", false},  {"type", false},  {"units", true},
+    {"MHz", true},     {"lanes", true},  {"fp64", false},  {"fma", false},
+    {"divide", false}, {"memory", true}, {"buffer", true}, {"platform, driver", false},
+};
+
+typedef struct {
+    Text cells[COLUMN_COUNT];
+} Row;
+
+static void size_append(Text *text, uint64_t bytes)
+{
+    double mebi = (double)bytes / (1024.0 * 1024.0);
+    if (mebi < 1024)
+        text_appendf(text, "%.0f MiB", mebi);
+    else
+        text_appendf(text, "%.1f GiB", mebi / 1024);
+}
+
+static void row_fill(Row *row, const Device *device, bool is_chosen)
+{
+    Text *cell = row->cells;
+    const char *why;
+    text_appendf(cell++, "%u%s", device->index, is_chosen ? "*" : "");
+    text_appendf(cell++, "%s", device->name);
+    text_appendf(cell++, "%s", device_type_name(device->type));
+    text_appendf(cell++, "%u", device->compute_units);
+    text_appendf(cell++, "%u", device->clock_mhz);
+    text_appendf(cell++, "%u", device_lanes(device, false));
+    text_appendf(cell++, "%s", device->fp64 ? "yes" : "no");
+    text_appendf(cell++, "%s", device->fma_in_hardware ? "yes" : "no");
+    text_appendf(cell++, "%s", device->correctly_rounded ? "exact" : "loose");
+    size_append(cell++, device->memory_bytes);
+    size_append(cell++, device->largest_buffer_bytes);
+    text_appendf(cell, "%s, %s", device->platform_name, device->driver);
+    if (device->twin) text_appendf(cell, "; twin %u", device->twin);
+    if (!device_usable(device, &why)) text_appendf(cell, "; unusable: %s", why);
+}
+
+static void rows_print(const Row *rows, size_t row_count)
+{
+    for (size_t i = 0; i < row_count; i++) {
+        for (size_t j = 0; j < COLUMN_COUNT; j++) {
+            size_t width = 0;
+            for (size_t k = 0; k < row_count; k++)
+                if (rows[k].cells[j].count > width) width = rows[k].cells[j].count;
+            bool is_last = j + 1 == COLUMN_COUNT;
+            printf("%*s%s",
+                   is_last                   ? 0
+                   : columns[j].to_the_right ? (int)width
+                                             : -(int)width,
+                   text_c(&rows[i].cells[j]), is_last ? "\n" : "  ");
+        }
+    }
+}
+
+static void devices_print_table(const DeviceList *list, const Device *chosen)
+{
+    size_t row_count = list->count + 1;
+    Row *rows = memory_allocate_zeroed(row_count, sizeof *rows);
+    for (size_t j = 0; j < COLUMN_COUNT; j++)
+        text_appendf(&rows[0].cells[j], "%s", columns[j].head);
+    for (size_t i = 0; i < list->count; i++)
+        row_fill(&rows[i + 1], &list->items[i], &list->items[i] == chosen);
+    rows_print(rows, row_count);
+    for (size_t i = 0; i < row_count; i++)
+        for (size_t j = 0; j < COLUMN_COUNT; j++)
+            text_free(&rows[i].cells[j]);
+    free(rows);
+    if (list->empty_platform_count)
+        printf("%u of %u platforms: no device\n", list->empty_platform_count, list->platform_count);
+}
+
+int command_devices(int argument_count, char **arguments)
+{
+    bool as_json = false;
+    optind = 1;
+    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
+        if (option == 'h') {
+            fputs(help_text, stdout);
+            return EXIT_DONE;
+        }
+        if (option != OPTION_JSON) return EXIT_USER;
+        as_json = true;
+    }
+    if (optind < argument_count) return option_usage_fault("devices", "it takes no arguments");
+
+    DeviceList list;
+    device_list_open(&list);
+    MessageList messages = {0};
+    const Device *chosen = device_choose(&list, device_wish(NULL), &messages);
+    if (as_json)
+        devices_print_json(&list, chosen);
+    else if (list.count > 0)
+        devices_print_table(&list, chosen);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    int status = list.count > 0 ? EXIT_DONE : EXIT_USER;
+    device_list_close(&list);
+    return status;
+}

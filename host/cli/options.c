@@ -1,0 +1,172 @@
+#include "host/cli/options.h"
+
+#include "host/base/fault.h"
+#include "host/base/text.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+const char common_options_help[] =
+    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
+    "      --precision P     fast, single, strict or double (default: single)\n"
+    "      --lanes N         rays a work-item carries: 1, 4, 8 or 16 (default: the device's own)\n"
+    "      --no-cache        build the kernels anew and keep nothing\n"
+    "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
+
+// Decimal digits only; *end is left behind them.
+static bool digits_read(const char *value, const char **end, uint64_t *result)
+{
+    *result = 0;
+    const char *at = value;
+    for (; *at >= '0' && *at <= '9' && *result < 1u << 31; at++)
+        *result = *result * 10 + (uint64_t)(*at - '0');
+    *end = at;
+    return at > value;
+}
+
+bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest, uint32_t *result)
+{
+    const char *end;
+    uint64_t number;
+    if (!digits_read(value, &end, &number) || *end != '\0' || number < smallest || number > largest) {
+        fprintf(stderr, "glint: --%s: expected a whole number from %u to %u, not \"%s\"\n", option, smallest, largest,
+                value);
+        return false;
+    }
+    *result = (uint32_t)number;
+    return true;
+}
+
+bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
+{
+    const uint64_t largest = 1u << 20;
+    const char *at;
+    uint64_t w, h;
+    if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) || *at != '\0' ||
+        w < 1 || h < 1 || w > largest || h > largest) {
+        fprintf(stderr, "glint: --%s: expected WIDTHxHEIGHT, such as 1280x720, each from 1 to %u, not \"%s\"\n", option,
+                (unsigned)largest, value);
+        return false;
+    }
+    *width = (uint32_t)w;
+    *height = (uint32_t)h;
+    return true;
+}
+
+static void choices_tell(const char *const *names, size_t count, const char *value)
+{
+    for (size_t i = 0; i < count; i++)
+        fprintf(stderr, "%s%s", i == 0 ? "" : i + 1 == count ? " or " : ", ", names[i]);
+    const char *near = text_nearest(value, names, count);
+    fprintf(stderr, ", not \"%s\"", value);
+    if (near) fprintf(stderr, "; did you mean %s?", near);
+    fputc('\n', stderr);
+}
+
+bool option_choice(const char *option, const char *value, const char *const *names, size_t count, unsigned *result)
+{
+    for (size_t i = 0; i < count; i++)
+        if (strcmp(value, names[i]) == 0) {
+            *result = (unsigned)i;
+            return true;
+        }
+    fprintf(stderr, "glint: --%s: expected ", option);
+    choices_tell(names, count, value);
+    return false;
+}
+
+bool option_set(const char *option, const char *value, const char *const *names, size_t count, unsigned *result)
+{
+    *result = 0;
+    for (const char *at = value;; at++) {
+        size_t length = strcspn(at, ",");
+        size_t i = 0;
+        while (i < count && (strlen(names[i]) != length || strncmp(at, names[i], length) != 0))
+            i++;
+        if (i == count) {
+            char *word = strndup(at, length);
+            fprintf(stderr, "glint: --%s: expected names separated by commas, of ", option);
+            choices_tell(names, count, word ? word : value);
+            free(word);
+            return false;
+        }
+        *result |= 1u << i;
+        at += length;
+        if (*at == '\0') return true;
+    }
+}
+
+bool option_common(CommonOptions *common, int option, const char *value, bool *valid)
+{
+    unsigned choice = 0;
+    *valid = true;
+    switch (option) {
+    case OPTION_DEVICE:
+        common->device = value;
+        return true;
+    case OPTION_PRECISION:
+        *valid = option_choice("precision", value, precision_names, PRECISION_COUNT, &choice);
+        common->precision = (Precision)choice;
+        return true;
+    case OPTION_LANES: {
+        static const char *const names[] = {"1", "4", "8", "16"};
+        static const uint32_t lanes[] = {1, 4, 8, 16};
+        *valid = option_choice("lanes", value, names, 4, &choice);
+        common->lanes = lanes[choice];
+        return true;
+    }
+    case OPTION_NO_CACHE:
+        common->no_cache = true;
+        return true;
+    case OPTION_LENIENT:
+        common->lenient = true;
+        return true;
+    default:
+        return false;
+    }
+}
+
+int option_usage_fault(const char *command, const char *what)
+{
+    fprintf(stderr, "glint %s: %s; glint %s --help tells more\n", command, what, command);
+    return EXIT_USER;
+}
+
+void messages_tell(MessageList *messages, const char *path)
+{
+    const char *ending = path ? strrchr(path, '.') : NULL;
+    if (ending && strcasecmp(ending, ".rt") == 0 && message_count(messages, MESSAGE_ERROR) > 0)
+        fputs("Error\n", stderr);
+    message_list_print(messages, stderr);
+    message_list_free(messages);
+}
+
+bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
+{
+    MessageList messages = {0};
+    bool loaded = scene_load(scene, path, &(SceneOptions){.lenient = common->lenient}, &messages);
+    messages_tell(&messages, path);
+    return loaded;
+}
+
+bool device_open(OpenDevice *open, const char *wish)
+{
+    *open = (OpenDevice){0};
+    device_list_open(&open->devices);
+    MessageList messages = {0};
+    const Device *device = device_choose(&open->devices, device_wish(wish), &messages);
+    messages_tell(&messages, NULL);
+    if (!device) {
+        device_list_close(&open->devices);
+        return false;
+    }
+    compute_open(&open->compute, device);
+    return true;
+}
+
+void device_close(OpenDevice *open)
+{
+    compute_close(&open->compute);
+    device_list_close(&open->devices);
+}

@@ -1,0 +1,231 @@
+#include "host/cli/picture.h"
+
+#include "host/base/fault.h"
+#include "host/base/text.h"
+#include "host/cli/version.h"
+#include <stdlib.h>
+#include <string.h>
+
+const char *const picture_aov_names[PICTURE_AOV_COUNT] = {"t", "normal", "position", "object", "shadow", "color"};
+
+enum { AOV_COLOR = 1 << 5, NOTE_COUNT_LARGEST = 16 };
+
+struct Picture {
+    const PictureOptions *options;
+    const char *scene_path;
+    const Scene *scene;
+    const RenderSettings *settings;
+    const Renderer *renderer;
+    const Device *device;
+    bool opened;
+    ImageWriter *color, *aovs[PICTURE_AOV_COUNT];
+    struct {
+        void *items;
+        size_t capacity;
+    } scratch; // a band in another type
+};
+
+char *picture_default_path(const char *scene_path)
+{
+    const char *slash = strrchr(scene_path, '/');
+    const char *name = slash ? slash + 1 : scene_path;
+    const char *dot = strrchr(name, '.');
+    Text path = {0};
+    text_append(&path, name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
+    text_appendf(&path, ".png");
+    return path.items;
+}
+
+bool picture_path_known(const char *path)
+{
+    if (image_format_of(path) != IMAGE_UNKNOWN) return true;
+    fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
+    return false;
+}
+
+unsigned picture_renderer_aovs(const PictureOptions *options)
+{
+    return options->aovs & ~(unsigned)AOV_COLOR;
+}
+
+Picture *picture_open(const PictureOptions *options, const char *scene_path, const Scene *scene,
+                      const RenderSettings *settings, const Renderer *renderer, const Device *device)
+{
+    Picture *picture = memory_allocate_zeroed(1, sizeof *picture);
+    *picture = (Picture){.options = options,
+                         .scene_path = scene_path,
+                         .scene = scene,
+                         .settings = settings,
+                         .renderer = renderer,
+                         .device = device};
+    return picture;
+}
+
+typedef struct {
+    Text text;
+    size_t starts[NOTE_COUNT_LARGEST][2];
+    size_t count;
+} Notes;
+
+static void notes_add(Notes *notes, const char *key, const char *value)
+{
+    notes->starts[notes->count][0] = notes->text.count;
+    text_append(&notes->text, key, strlen(key) + 1);
+    notes->starts[notes->count++][1] = notes->text.count;
+    text_append(&notes->text, value, strlen(value) + 1);
+}
+
+// The settings that made the picture: enough to make it again.
+static void notes_write(Notes *notes, const Picture *picture)
+{
+    const RenderSettings *settings = picture->settings;
+    const RenderReport *report = renderer_report(picture->renderer);
+    const char *slash = strrchr(picture->scene_path, '/');
+    Text value = {0};
+#define NOTE(key, ...) (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
+    NOTE("Software", "glint %s", glint_version());
+    NOTE("Scene", "%s", slash ? slash + 1 : picture->scene_path);
+    NOTE("Device", "%s", picture->device->name);
+    NOTE("Driver", "%s, %s", picture->device->platform_name, picture->device->driver);
+    NOTE("Precision", "%s", precision_names[settings->precision]);
+    NOTE("Lanes", "%u", report->lanes);
+    NOTE("Samples", "%u", settings->sample_count);
+    NOTE("Size", "%ux%u", settings->width, settings->height);
+    NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
+         settings->region_height);
+    NOTE("Transfer", "%s", picture->options->transfer == TRANSFER_SRGB ? "srgb" : "none");
+    NOTE("Kernel", "%016llx", (unsigned long long)report->kernel_hash);
+#undef NOTE
+    text_free(&value);
+}
+
+static ImageHeader header_of(const Picture *picture, uint32_t channels, char npy_type, const ImageNote *notes)
+{
+    return (ImageHeader){
+        .format = IMAGE_NPY,
+        .width = picture->settings->region_width,
+        .height = picture->settings->region_height,
+        .channels = channels,
+        .transfer = picture->options->transfer,
+        .bits = picture->options->bits,
+        .npy_type = npy_type,
+        .notes = notes,
+    };
+}
+
+// picture.png -> picture.NAME.npy
+static char *aov_path(const Picture *picture, const char *name)
+{
+    Text path = {0};
+    const char *dot = strrchr(picture->options->path, '.');
+    text_append(&path, picture->options->path, (size_t)(dot - picture->options->path));
+    text_appendf(&path, ".%s.npy", name);
+    return path.items;
+}
+
+static bool files_open(Picture *picture, MessageList *messages)
+{
+    Notes notes = {0};
+    notes_write(&notes, picture);
+    ImageNote list[NOTE_COUNT_LARGEST + 1] = {0};
+    for (size_t i = 0; i < notes.count; i++)
+        list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
+
+    char real_type = renderer_report(picture->renderer)->wide ? 'd' : 'f';
+    ImageHeader header = header_of(picture, 3, real_type, list);
+    header.format = image_format_of(picture->options->path);
+    if (header.format != IMAGE_NPY) header.npy_type = 'f';
+    picture->color = image_writer_open(picture->options->path, &header, messages);
+    bool opened = picture->color != NULL;
+
+    const ImageHeader aov_headers[PICTURE_AOV_COUNT] = {
+        header_of(picture, 1, real_type, NULL), header_of(picture, 3, real_type, NULL),
+        header_of(picture, 3, 'd', NULL),       header_of(picture, 1, 'u', NULL),
+        header_of(picture, (uint32_t)picture->scene->lights.count, 'u', NULL),
+        header_of(picture, 3, real_type, NULL),
+    };
+    for (size_t i = 0; i < PICTURE_AOV_COUNT && opened; i++) {
+        if (!(picture->options->aovs >> i & 1)) continue;
+        if (aov_headers[i].channels == 0) {
+            message_add(messages, MESSAGE_WARNING, "no shadow masks are written: the scene has no lights");
+            continue;
+        }
+        char *path = aov_path(picture, picture_aov_names[i]);
+        picture->aovs[i] = image_writer_open(path, &aov_headers[i], messages);
+        opened = picture->aovs[i] != NULL;
+        free(path);
+    }
+    text_free(&notes.text);
+    return opened;
+}
+
+static void *scratch_of(Picture *picture, size_t size)
+{
+    if (picture->scratch.capacity < size) {
+        picture->scratch.items = memory_resize(picture->scratch.items, size, 1);
+        picture->scratch.capacity = size;
+    }
+    return picture->scratch.items;
+}
+
+static const float *narrowed(Picture *picture, const double *values, size_t count)
+{
+    float *narrow = scratch_of(picture, count * sizeof *narrow);
+    for (size_t i = 0; i < count; i++)
+        narrow[i] = (float)values[i];
+    return narrow;
+}
+
+// Positions come relative to the eye; the file has them in the world, in double so that no bit is lost.
+static const double *positions_in_world(Picture *picture, const Band *band, size_t pixels)
+{
+    bool wide = renderer_report(picture->renderer)->wide;
+    double *world = scratch_of(picture, 3 * pixels * sizeof *world);
+    Vector3 eye = picture->scene->camera.position;
+    const double axes[3] = {eye.x, eye.y, eye.z};
+    for (size_t i = 0; i < 3 * pixels; i++)
+        world[i] = (wide ? ((const double *)band->position)[i] : (double)((const float *)band->position)[i]) + axes[i % 3];
+    return world;
+}
+
+bool picture_write(Picture *picture, const Band *band, MessageList *messages)
+{
+    if (!picture->opened && !files_open(picture, messages)) return false;
+    picture->opened = true;
+    size_t pixels = (size_t)picture->settings->region_width * band->row_count;
+    const void *colors = band->colors;
+    if (renderer_report(picture->renderer)->wide && image_format_of(picture->options->path) != IMAGE_NPY)
+        colors = narrowed(picture, colors, 3 * pixels);
+    if (!image_writer_rows(picture->color, colors, band->row_count, messages)) return false;
+
+    const void *values[PICTURE_AOV_COUNT] = {band->t, band->normal, NULL, band->object, band->shadow, band->colors};
+    if (band->position) values[2] = positions_in_world(picture, band, pixels);
+    for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
+        if (picture->aovs[i] && !image_writer_rows(picture->aovs[i], values[i], band->row_count, messages))
+            return false;
+    return true;
+}
+
+static void picture_free(Picture *picture)
+{
+    free(picture->scratch.items);
+    free(picture);
+}
+
+bool picture_commit(Picture *picture, MessageList *messages)
+{
+    bool whole = true;
+    for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
+        if (picture->aovs[i]) whole &= image_writer_commit(picture->aovs[i], messages);
+    whole &= image_writer_commit(picture->color, messages);
+    picture_free(picture);
+    return whole;
+}
+
+void picture_abandon(Picture *picture)
+{
+    for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
+        if (picture->aovs[i]) image_writer_abandon(picture->aovs[i]);
+    if (picture->color) image_writer_abandon(picture->color);
+    picture_free(picture);
+}

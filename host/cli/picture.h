@@ -1,0 +1,30 @@
+// The files one render writes: the picture, and a .npy for each kind of AOV beside it.
+#pragma once
+
+#include "host/image/image.h"
+#include "host/opencl/device.h"
+#include "host/render/renderer.h"
+
+enum { PICTURE_AOV_COUNT = 6 };
+extern const char *const picture_aov_names[PICTURE_AOV_COUNT]; // the first ones are the bits AOV_…, then "color"
+
+typedef struct {
+    const char *path;
+    unsigned aovs; // a bit for each of picture_aov_names
+    Transfer transfer;
+    unsigned bits;
+} PictureOptions;
+
+typedef struct Picture Picture;
+
+char *picture_default_path(const char *scene_path); // the scene's name with .png, in this folder; caller frees
+bool picture_path_known(const char *path);          // false: told the user which endings there are
+unsigned picture_renderer_aovs(const PictureOptions *options);
+
+// Files are opened with the first band, when the kernels' hash is known.
+Picture *picture_open(const PictureOptions *options, const char *scene_path, const Scene *scene,
+                      const RenderSettings *settings, const Renderer *renderer, const Device *device);
+bool picture_write(Picture *picture, const Band *band, MessageList *messages);
+// Puts all files in place; frees the picture. False with a message if one could not be.
+bool picture_commit(Picture *picture, MessageList *messages);
+void picture_abandon(Picture *picture);

@@ -1,0 +1,45 @@
+#include "host/cli/progress.h"
+
+#include "host/base/clock.h"
+#include <signal.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <unistd.h>
+
+static volatile sig_atomic_t interrupted;
+
+static void interrupt_note(int signal_number)
+{
+    (void)signal_number;
+    interrupted = 1;
+}
+
+void progress_open(Progress *progress, bool quiet)
+{
+    double now = clock_seconds();
+    *progress = (Progress){.visible = !quiet && isatty(STDERR_FILENO), .start_seconds = now, .shown_seconds = now};
+    struct sigaction action = {.sa_handler = interrupt_note, .sa_flags = (int)SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+void progress_show(Progress *progress, double fraction_done)
+{
+    double now = clock_seconds();
+    // short renders show nothing, long ones a few times a second
+    if (!progress->visible || now - progress->shown_seconds < 0.25) return;
+    progress->shown_seconds = now;
+    double spent = now - progress->start_seconds;
+    fprintf(stderr, "\r%3.0f %%  %.0f s left \033[K", 100 * fraction_done, spent / fraction_done - spent);
+    fflush(stderr);
+}
+
+void progress_close(Progress *progress)
+{
+    if (progress->visible) fputs("\r\033[K", stderr);
+}
+
+bool progress_interrupted(void)
+{
+    return interrupted != 0;
+}

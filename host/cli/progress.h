@@ -1,0 +1,15 @@
+// How far a long render is, on a terminal only, and whether the user wants it to end.
+#pragma once
+
+#include <stdbool.h>
+
+typedef struct {
+    bool visible;
+    double start_seconds, shown_seconds;
+} Progress;
+
+// From here on an interrupt or a request to end is noted, not obeyed at once; a second one ends the process.
+void progress_open(Progress *progress, bool quiet);
+void progress_show(Progress *progress, double fraction_done);
+void progress_close(Progress *progress); // wipes the line
+bool progress_interrupted(void);

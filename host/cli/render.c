@@ -1,0 +1,248 @@
+// glint render: a scene file becomes a picture.
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include "host/cli/picture.h"
+#include "host/cli/progress.h"
+#include "host/cli/timing.h"
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    OPTION_SIZE = OPTION_OWN,
+    OPTION_SAMPLES,
+    OPTION_REGION,
+    OPTION_AOV,
+    OPTION_TIMING,
+    OPTION_TRANSFER,
+    OPTION_BITS,
+    OPTION_QUIET
+};
+
+static const struct option long_options[] = {
+    {"output", required_argument, NULL, 'o'},
+    {"size", required_argument, NULL, OPTION_SIZE},
+    {"samples", required_argument, NULL, OPTION_SAMPLES},
+    {"region", required_argument, NULL, OPTION_REGION},
+    {"aov", required_argument, NULL, OPTION_AOV},
+    {"timing", optional_argument, NULL, OPTION_TIMING},
+    {"transfer", required_argument, NULL, OPTION_TRANSFER},
+    {"bits", required_argument, NULL, OPTION_BITS},
+    {"quiet", no_argument, NULL, OPTION_QUIET},
+    COMMON_LONG_OPTIONS,
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint render SCENE [OPTIONS]\n\n"
+    "  -o, --output FILE     .png, .ppm, .exr or .npy (default: the scene's name with .png)\n"
+    "      --size WxH        of the picture (default: the scene's own, else 1280 wide)\n"
+    "      --samples N       per pixel (default: 1, at the center)\n"
+    "      --region X,Y,W,H  render these pixels of the picture only\n"
+    "      --aov LIST        more files beside the picture: t, normal, position, object, shadow, color\n"
+    "      --timing[=json]   tell the time of every stage and launch\n"
+    "      --transfer T      srgb or none (default: srgb; none for .rt and .cfg)\n"
+    "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
+    "      --quiet           no progress\n";
+
+typedef struct {
+    CommonOptions common;
+    const char *scene;
+    PictureOptions picture;
+    uint32_t width, height; // 0: not given
+    uint32_t sample_count;
+    uint32_t region[4]; // x, y, width, height
+    bool has_region, has_transfer, quiet;
+    TimingStyle timing;
+} RenderOptions;
+
+static bool region_read(const char *value, uint32_t region[4])
+{
+    int end = 0;
+    if (strspn(value, "0123456789,") == strlen(value) &&
+        sscanf(value, "%9u,%9u,%9u,%9u%n", &region[0], &region[1], &region[2], &region[3], &end) == 4 &&
+        value[end] == '\0' && region[2] > 0 && region[3] > 0)
+        return true;
+    fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n", value);
+    return false;
+}
+
+static bool option_take(RenderOptions *options, int option, const char *value)
+{
+    static const char *const transfers[] = {"srgb", "none"};
+    unsigned choice;
+    bool valid = true;
+    if (option_common(&options->common, option, value, &valid)) return valid;
+    switch (option) {
+    case 'o':
+        options->picture.path = value;
+        return true;
+    case OPTION_SIZE:
+        return option_size("size", value, &options->width, &options->height);
+    case OPTION_SAMPLES:
+        return option_count("samples", value, 1, 1u << 20, &options->sample_count);
+    case OPTION_REGION:
+        options->has_region = true;
+        return region_read(value, options->region);
+    case OPTION_AOV:
+        return option_set("aov", value, picture_aov_names, PICTURE_AOV_COUNT, &options->picture.aovs);
+    case OPTION_TIMING:
+        return timing_style_read(value, &options->timing);
+    case OPTION_TRANSFER:
+        if (!option_choice("transfer", value, transfers, 2, &choice)) return false;
+        options->picture.transfer = choice == 0 ? TRANSFER_SRGB : TRANSFER_NONE;
+        options->has_transfer = true;
+        return true;
+    case OPTION_BITS:
+        if (!option_choice("bits", value, (const char *const[]){"8", "16"}, 2, &choice)) return false;
+        options->picture.bits = choice == 0 ? 8 : 16;
+        return true;
+    case OPTION_QUIET:
+        options->quiet = true;
+        return true;
+    default:
+        return false;
+    }
+}
+
+// EXIT_DONE: go on. *helped: the help was printed, stop.
+static int options_read(RenderOptions *options, int argument_count, char **arguments, bool *helped)
+{
+    *options = (RenderOptions){.common.precision = PRECISION_SINGLE, .sample_count = 1, .picture.bits = 8};
+    int option;
+    while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
+        if (option == 'h') {
+            printf("%s%s", help_text, common_options_help);
+            *helped = true;
+            return EXIT_DONE;
+        }
+        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
+    }
+    if (optind + 1 != argument_count)
+        return option_usage_fault("render", optind == argument_count ? "which scene?" : "one scene at a time");
+    options->scene = arguments[optind];
+    return EXIT_DONE;
+}
+
+// The picture's size: as asked for, else the scene's own, else 1280 wide at the frame's shape or 16:9.
+static void size_choose(RenderOptions *options, const Scene *scene)
+{
+    if (options->width > 0) return;
+    options->width = scene->width > 0 ? scene->width : 1280;
+    double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
+    double height = fmax(1, fmin(round(options->width / aspect), 1 << 20));
+    options->height = scene->height > 0 ? scene->height : (uint32_t)height;
+}
+
+static bool settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
+{
+    size_choose(options, scene);
+    if (!options->has_region) {
+        options->region[2] = options->width;
+        options->region[3] = options->height;
+    }
+    const uint32_t *region = options->region;
+    if (region[0] + region[2] > options->width || region[1] + region[3] > options->height) {
+        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the picture of %ux%u pixels\n", region[0],
+                region[1], region[2], region[3], options->width, options->height);
+        return false;
+    }
+    *settings = (RenderSettings){
+        .width = options->width,
+        .height = options->height,
+        .region_x = region[0],
+        .region_y = region[1],
+        .region_width = region[2],
+        .region_height = region[3],
+        .sample_count = options->sample_count,
+        .precision = options->common.precision,
+        .lanes = options->common.lanes,
+        .shift_to_eye = true,
+        .no_cache = options->common.no_cache,
+    };
+    return true;
+}
+
+typedef struct {
+    Picture *picture;
+    Progress *progress;
+    MessageList *messages;
+    double encode_seconds;
+} BandContext;
+
+static bool band_take(void *context, const Band *band, double fraction_done)
+{
+    BandContext *take = context;
+    if (progress_interrupted()) return false;
+    double start = clock_seconds();
+    bool written = picture_write(take->picture, band, take->messages);
+    take->encode_seconds += clock_seconds() - start;
+    progress_show(take->progress, fraction_done);
+    return written;
+}
+
+static int scene_render(RenderOptions *options, const Scene *scene, Compute *compute, double parse_seconds)
+{
+    RenderSettings settings;
+    if (!settings_make(&settings, options, scene)) return EXIT_USER;
+    if (!options->has_transfer)
+        options->picture.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
+    if (!renderer) {
+        messages_tell(&messages, NULL);
+        return EXIT_USER;
+    }
+    Progress progress;
+    progress_open(&progress, options->quiet);
+    Picture *picture = picture_open(&options->picture, options->scene, scene, &settings, renderer, compute->device);
+    BandContext context = {picture, &progress, &messages, 0};
+    bool whole = renderer_render(renderer, picture_renderer_aovs(&options->picture), band_take, &context);
+    double start = clock_seconds();
+    if (whole)
+        whole = picture_commit(picture, &messages);
+    else
+        picture_abandon(picture);
+    context.encode_seconds += clock_seconds() - start;
+    progress_close(&progress);
+    bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
+    messages_tell(&messages, NULL);
+    int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
+    if (status == EXIT_INTERRUPTED)
+        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n", options->picture.path);
+    if (whole && options->timing != TIMING_NONE)
+        timing_print(options->timing, renderer_report(renderer), compute->device, &settings,
+                     &(HostTimes){parse_seconds, context.encode_seconds});
+    renderer_close(renderer);
+    return status;
+}
+
+int command_render(int argument_count, char **arguments)
+{
+    RenderOptions options;
+    bool helped = false;
+    int status = options_read(&options, argument_count, arguments, &helped);
+    if (status != EXIT_DONE || helped) return status;
+    char *default_path = picture_default_path(options.scene);
+    if (!options.picture.path) options.picture.path = default_path;
+
+    Scene scene = {0};
+    OpenDevice open;
+    double start = clock_seconds();
+    status = EXIT_USER;
+    if (picture_path_known(options.picture.path) && scene_open(&scene, options.scene, &options.common)) {
+        double parse_seconds = clock_seconds() - start;
+        if (device_open(&open, options.common.device)) {
+            status = scene_render(&options, &scene, &open.compute, parse_seconds);
+            device_close(&open);
+        }
+    }
+    scene_free(&scene);
+    free(default_path);
+    return status;
+}

@@ -1,0 +1,144 @@
+#include "host/cli/timing.h"
+
+#include "host/base/json.h"
+#include "host/cli/options.h"
+#include "host/cli/version.h"
+#include <stdio.h>
+#include <string.h>
+
+bool timing_style_read(const char *value, TimingStyle *style)
+{
+    static const char *const names[] = {"text", "json"};
+    unsigned choice = 0;
+    if (value && !option_choice("timing", value, names, 2, &choice)) return false;
+    *style = choice == 0 ? TIMING_TEXT : TIMING_JSON;
+    return true;
+}
+
+// Sums over launches: events where they can be trusted, and the host's clock.
+typedef struct {
+    double event_seconds, host_seconds;
+    size_t count, untrusted_count;
+} LaunchSum;
+
+static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
+{
+    LaunchSum sum = {.count = count};
+    for (size_t i = 0; i < count; i++) {
+        sum.host_seconds += launches[i].time.host_seconds;
+        if (launches[i].time.trusted)
+            sum.event_seconds += launches[i].time.event_seconds;
+        else
+            sum.untrusted_count++;
+    }
+    return sum;
+}
+
+// Why event times are not to be believed, or NULL.
+static const char *launch_doubt(const LaunchTime *time)
+{
+    if (time->trusted) return NULL;
+    if (time->start_seconds == 0 && time->end_seconds == 0) return "the runtime reports no times for events";
+    if (time->end_seconds <= time->start_seconds) return "the event ends no later than it starts";
+    return "the event is longer than the host waited for it";
+}
+
+static void line_print(const char *what, double seconds, const char *remark)
+{
+    fprintf(stderr, "  %-10s %10.3f ms  %s\n", what, 1e3 * seconds, remark);
+}
+
+static void launches_print(const char *what, const NamedLaunch *launches, size_t count)
+{
+    enum { SHOWN_LARGEST = 12 };
+    LaunchSum sum = launches_sum(launches, count);
+    char remark[160];
+    snprintf(remark, sizeof remark, "%zu %s; %.3f ms by the host's clock", count, count == 1 ? "command" : "commands",
+             1e3 * sum.host_seconds);
+    line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
+    for (size_t i = 0; i < count && i < SHOWN_LARGEST; i++) {
+        const LaunchTime *time = &launches[i].time;
+        const char *doubt = launch_doubt(time);
+        fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms%s%s\n", launches[i].name, 1e3 * time->event_seconds,
+                1e3 * time->host_seconds, doubt ? "; not trusted: " : "", doubt ? doubt : "");
+    }
+    if (count > SHOWN_LARGEST) fprintf(stderr, "    … and %zu more\n", count - SHOWN_LARGEST);
+    if (sum.untrusted_count)
+        fprintf(stderr, "    the events' own times disagree with the host's clock in %zu of %zu; the host's are used\n",
+                sum.untrusted_count, count);
+}
+
+static void text_print(const RenderReport *report, const Device *device, const RenderSettings *settings,
+                       const HostTimes *host)
+{
+    fprintf(stderr, "%ux%u, %u %s per pixel, precision %s, %u %s, on %s (kernel %016llx)\n", settings->region_width,
+            settings->region_height, settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
+            precision_names[settings->precision], report->lanes, report->lanes == 1 ? "lane" : "lanes", device->name,
+            (unsigned long long)report->kernel_hash);
+    line_print("parse", host->parse_seconds, "");
+    line_print("flatten", report->flatten_seconds, "");
+    line_print("build", report->build_seconds, report->build_from_cache ? "from the cache" : "compiled");
+    line_print("upload", report->upload_seconds, "");
+    launches_print("launches", report->launches.items, report->launches.count);
+    launches_print("read-back", report->reads.items, report->reads.count);
+    line_print("encode", host->encode_seconds, "");
+}
+
+static void launches_json(Json *json, const char *key, const NamedLaunch *launches, size_t count)
+{
+    json_begin_array(json, key);
+    for (size_t i = 0; i < count; i++) {
+        const LaunchTime *time = &launches[i].time;
+        json_begin_object(json, NULL);
+        json_text(json, "name", launches[i].name);
+        if (time->trusted)
+            json_number(json, "event_ms", 1e3 * time->event_seconds);
+        else
+            json_null(json, "event_ms");
+        json_number(json, "host_ms", 1e3 * time->host_seconds);
+        if (!time->trusted) json_text(json, "doubt", launch_doubt(time));
+        json_end(json);
+    }
+    json_end(json);
+}
+
+static void json_report(const RenderReport *report, const Device *device, const RenderSettings *settings,
+                        const HostTimes *host)
+{
+    Json *json = json_open();
+    json_integer(json, "schema", 1);
+    json_text(json, "glint", glint_version());
+    json_begin_object(json, "device");
+    json_text(json, "name", device->name);
+    json_text(json, "platform", device->platform_name);
+    json_text(json, "driver", device->driver);
+    json_end(json);
+    json_begin_array(json, "size");
+    json_integer(json, NULL, settings->region_width);
+    json_integer(json, NULL, settings->region_height);
+    json_end(json);
+    json_integer(json, "samples", settings->sample_count);
+    json_text(json, "precision", precision_names[settings->precision]);
+    json_integer(json, "lanes", report->lanes);
+    char hash[17];
+    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)report->kernel_hash);
+    json_text(json, "kernel", hash);
+    json_number(json, "parse_ms", 1e3 * host->parse_seconds);
+    json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
+    json_number(json, "build_ms", 1e3 * report->build_seconds);
+    json_boolean(json, "build_from_cache", report->build_from_cache);
+    json_number(json, "upload_ms", 1e3 * report->upload_seconds);
+    launches_json(json, "launches", report->launches.items, report->launches.count);
+    launches_json(json, "read_backs", report->reads.items, report->reads.count);
+    json_number(json, "encode_ms", 1e3 * host->encode_seconds);
+    json_print(json, stdout);
+}
+
+void timing_print(TimingStyle style, const RenderReport *report, const Device *device, const RenderSettings *settings,
+                  const HostTimes *host)
+{
+    if (style == TIMING_JSON)
+        json_report(report, device, settings, host);
+    else
+        text_print(report, device, settings, host);
+}

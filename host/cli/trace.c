@@ -1,0 +1,199 @@
+// glint trace: explicit rays, their hits as CSV.
+#include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/base/output.h"
+#include "host/base/text.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include <float.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { OPTION_RAYS = OPTION_OWN };
+
+static const struct option long_options[] = {
+    {"rays", required_argument, NULL, OPTION_RAYS},
+    {"output", required_argument, NULL, 'o'},
+    COMMON_LONG_OPTIONS,
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+    "Writes object,t,nx,ny,nz for each ray; an empty object is a miss. Scene and rays are taken as they are,\n"
+    "each number rounded once to the precision.\n\n"
+    "      --rays FILE       one ray a line: ox oy oz dx dy dz [tmin tmax], decimal or C's hexadecimal; - is the\n"
+    "                        standard input; # begins a comment\n"
+    "  -o, --output FILE     the CSV (default: the standard output)\n";
+
+typedef struct {
+    CommonOptions common;
+    const char *scene, *rays, *output;
+} TraceOptions;
+
+typedef struct {
+    ProbeRay *items;
+    size_t count, capacity;
+} RayList;
+
+// The numbers of one line, at most eight; the count, or -1 where something is no finite number.
+static int line_numbers(const Source *source, size_t start, size_t end, double numbers[8], MessageList *messages)
+{
+    int count = 0;
+    const char *at = source->bytes + start, *stop = source->bytes + end;
+    for (;;) {
+        while (at < stop && (*at == ' ' || *at == '\t' || *at == ',' || *at == '\r'))
+            at++;
+        if (at >= stop || *at == '#') return count;
+        char *after;
+        double number = strtod(at, &after);
+        size_t offset = (size_t)(at - source->bytes);
+        if (after == at || after > stop || isnan(number)) {
+            message_add_at(messages, MESSAGE_ERROR, source, offset, "expected a number");
+            return -1;
+        }
+        if (count == 8) {
+            message_add_at(messages, MESSAGE_ERROR, source, offset, "expected 6 numbers or 8, found more");
+            return -1;
+        }
+        numbers[count++] = number;
+        at = after;
+    }
+}
+
+static bool rays_read(RayList *rays, const Source *source, const CommonOptions *common, MessageList *messages)
+{
+    double farthest = common->precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
+    for (size_t start = 0; start < source->length;) {
+        const char *newline = memchr(source->bytes + start, '\n', source->length - start);
+        size_t end = newline ? (size_t)(newline - source->bytes) : source->length;
+        double n[8] = {0};
+        int count = line_numbers(source, start, end, n, messages);
+        if (count > 0) {
+            if (count != 6 && count != 8) {
+                message_add_at(messages, MESSAGE_ERROR, source, start,
+                               "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
+                count = -1;
+            } else if (n[3] == 0 && n[4] == 0 && n[5] == 0) {
+                message_add_at(messages, MESSAGE_ERROR, source, start, "a ray's direction cannot be 0 0 0");
+                count = -1;
+            }
+        }
+        if (count > 0) {
+            ProbeRay ray = {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
+            array_push(*rays, ray);
+        }
+        start = end + 1;
+    }
+    return message_count(messages, MESSAGE_ERROR) == 0;
+}
+
+static bool rays_load(RayList *rays, const TraceOptions *options)
+{
+    MessageList messages = {0};
+    Text text = {0};
+    bool read = text_read_file(&text, options->rays, &messages);
+    if (read) {
+        Source source = {options->rays, text_c(&text), text.count};
+        read = rays_read(rays, &source, &options->common, &messages);
+    }
+    messages_tell(&messages, NULL);
+    text_free(&text);
+    return read;
+}
+
+static bool hits_write(const char *path, const ProbeHit *hits, size_t count, bool wide)
+{
+    MessageList messages = {0};
+    OutputFile output;
+    bool written = output_open(&output, path, &messages);
+    if (written) {
+        int digits = wide ? 17 : 9;
+        fputs("object,t,nx,ny,nz\n", output.file);
+        for (size_t i = 0; i < count; i++) {
+            const ProbeHit *hit = &hits[i];
+            if (hit->object == UINT32_MAX)
+                fputs(",,,,\n", output.file);
+            else
+                fprintf(output.file, "%u,%.*g,%.*g,%.*g,%.*g\n", hit->object, digits, hit->t, digits, hit->normal[0],
+                        digits, hit->normal[1], digits, hit->normal[2]);
+        }
+        written = output_commit(&output, &messages);
+    }
+    messages_tell(&messages, NULL);
+    return written;
+}
+
+static int rays_trace(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
+{
+    RenderSettings settings = {
+        .width = 1,
+        .height = 1,
+        .region_width = 1,
+        .region_height = 1,
+        .sample_count = 1,
+        .precision = options->common.precision,
+        .lanes = options->common.lanes,
+        .no_cache = options->common.no_cache,
+    };
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
+    messages_tell(&messages, NULL);
+    if (!renderer) return EXIT_USER;
+    ProbeHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
+    renderer_trace(renderer, rays->items, rays->count, hits);
+    bool written = hits_write(options->output, hits, rays->count, renderer_report(renderer)->wide);
+    free(hits);
+    renderer_close(renderer);
+    return written ? EXIT_DONE : EXIT_USER;
+}
+
+static int options_read(TraceOptions *options, int argument_count, char **arguments, bool *helped)
+{
+    *options = (TraceOptions){.common.precision = PRECISION_SINGLE, .output = "-"};
+    int option;
+    bool valid;
+    while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
+        if (option == 'h') {
+            printf("%s%s", help_text, common_options_help);
+            *helped = true;
+            return EXIT_DONE;
+        }
+        if (option == '?') return EXIT_USER;
+        if (option == OPTION_RAYS)
+            options->rays = optarg;
+        else if (option == 'o')
+            options->output = optarg;
+        else if (option_common(&options->common, option, optarg, &valid) && !valid)
+            return EXIT_USER;
+    }
+    if (optind + 1 != argument_count)
+        return option_usage_fault("trace", optind == argument_count ? "which scene?" : "one scene at a time");
+    if (!options->rays) return option_usage_fault("trace", "which rays? name a file with --rays");
+    options->scene = arguments[optind];
+    return EXIT_DONE;
+}
+
+int command_trace(int argument_count, char **arguments)
+{
+    TraceOptions options;
+    bool helped = false;
+    int status = options_read(&options, argument_count, arguments, &helped);
+    if (status != EXIT_DONE || helped) return status;
+    Scene scene = {0};
+    RayList rays = {0};
+    OpenDevice open;
+    status = EXIT_USER;
+    if (scene_open(&scene, options.scene, &options.common) && rays_load(&rays, &options) &&
+        device_open(&open, options.common.device)) {
+        status = rays_trace(&options, &scene, &rays, &open.compute);
+        device_close(&open);
+    }
+    free(rays.items);
+    scene_free(&scene);
+    return status;
+}

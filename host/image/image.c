@@ -1,0 +1,154 @@
+#include "host/image/codec.h"
+
+#include "host/base/fault.h"
+#include "host/base/text.h"
+
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "NPY rows are written as they lie in memory");
+
+ImageFormat image_format_of(const char *path)
+{
+    static const struct {
+        const char *ending;
+        ImageFormat format;
+    } known[] = {{".png", IMAGE_PNG}, {".ppm", IMAGE_PPM}, {".exr", IMAGE_EXR}, {".npy", IMAGE_NPY}};
+    const char *ending = strrchr(path, '.');
+    for (size_t i = 0; ending && i < sizeof known / sizeof *known; i++) {
+        if (strcasecmp(ending, known[i].ending) == 0) return known[i].format;
+    }
+    return IMAGE_UNKNOWN;
+}
+
+static const Encoder *encoder_of(ImageFormat format)
+{
+    switch (format) {
+    case IMAGE_PNG:
+        return &png_encoder;
+    case IMAGE_PPM:
+        return &ppm_encoder;
+    case IMAGE_EXR:
+        return &exr_encoder;
+    case IMAGE_NPY:
+        return &npy_encoder;
+    case IMAGE_UNKNOWN:
+        break;
+    }
+    fault("a picture of no format");
+}
+
+ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages)
+{
+    ImageWriter *writer = memory_allocate_zeroed(1, sizeof *writer);
+    writer->header = *header;
+    writer->encoder = encoder_of(header->format);
+    if (output_open(&writer->output, path, messages) && writer->encoder->begin(writer, messages))
+        return writer;
+    image_writer_abandon(writer);
+    return NULL;
+}
+
+bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+{
+    if (row_count > writer->header.height - writer->rows_written)
+        fault("more rows than the picture has: %s", writer->output.target);
+    if (writer->failed || !writer->encoder->rows(writer, pixels, row_count, messages)) {
+        writer->failed = true;
+        return false;
+    }
+    writer->rows_written += row_count;
+    return true;
+}
+
+static void writer_free(ImageWriter *writer)
+{
+    if (writer->encoder->free) writer->encoder->free(writer);
+    output_abandon(&writer->output);
+    free(writer);
+}
+
+bool image_writer_commit(ImageWriter *writer, MessageList *messages)
+{
+    if (!writer->failed && writer->rows_written < writer->header.height)
+        fault("a picture without all its rows: %s", writer->output.target);
+    bool done = !writer->failed && (!writer->encoder->end || writer->encoder->end(writer, messages)) &&
+                output_commit(&writer->output, messages);
+    writer_free(writer);
+    return done;
+}
+
+void image_writer_abandon(ImageWriter *writer)
+{
+    if (writer) writer_free(writer);
+}
+
+bool image_refuse(const ImageFile *file, const char *format, ...)
+{
+    char reason[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(reason, sizeof reason, format, arguments);
+    va_end(arguments);
+    message_add(file->messages, MESSAGE_ERROR, "cannot read '%s': %s", file->path, reason);
+    return false;
+}
+
+bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_t height, uint64_t channels,
+                    uint64_t expansion)
+{
+    if (width == 0 || height == 0 || channels == 0) return image_refuse(file, "the picture is empty");
+    uint64_t values, bytes, most;
+    if (__builtin_mul_overflow(file->length, expansion, &most)) most = UINT64_MAX;
+    if (width > UINT32_MAX || height > UINT32_MAX || channels > UINT32_MAX ||
+        __builtin_mul_overflow(width * height, channels, &values) ||
+        __builtin_mul_overflow(values, sizeof *image->values, &bytes) || bytes > most)
+        return image_refuse(file, "the file is too short for its picture");
+    image->values = calloc(values, sizeof *image->values);
+    if (!image->values) return image_refuse(file, "the picture does not fit into memory");
+    image->width = (uint32_t)width;
+    image->height = (uint32_t)height;
+    image->channels = (uint32_t)channels;
+    return true;
+}
+
+static bool image_decode(Image *image, const ImageFile *file)
+{
+    static const struct {
+        const char *start;
+        bool (*decode)(Image *image, const ImageFile *file);
+    } known[] = {
+        {"\x89PNG", png_decode},   {"P2", ppm_decode}, {"P3", ppm_decode},
+        {"P5", ppm_decode},        {"P6", ppm_decode}, {"\x76\x2F\x31\x01", exr_decode},
+        {"\x93NUMPY", npy_decode},
+    };
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        size_t length = strlen(known[i].start);
+        if (file->length >= length && memcmp(file->bytes, known[i].start, length) == 0)
+            return known[i].decode(image, file);
+    }
+    return image_refuse(file, "neither PNG, PPM, EXR nor NPY");
+}
+
+bool image_read(Image *image, const char *path, MessageList *messages)
+{
+    *image = (Image){.transfer = TRANSFER_NONE};
+    Text text = {0};
+    if (!text_read_file(&text, path, messages)) {
+        text_free(&text);
+        return false;
+    }
+    ImageFile file = {path, (const uint8_t *)text_c(&text), text.count, messages};
+    bool done = image_decode(image, &file);
+    text_free(&text);
+    if (!done) image_free(image);
+    return done;
+}
+
+void image_free(Image *image)
+{
+    free(image->values);
+    *image = (Image){0};
+}

@@ -1,0 +1,205 @@
+// PNG through libpng (Portable Network Graphics, second edition, 2003).
+#include "host/image/codec.h"
+#include "host/image/transfer.h"
+
+#include "host/base/fault.h"
+
+#include <errno.h>
+#include <png.h>
+#include <setjmp.h>
+#include <stdlib.h>
+#include <string.h>
+
+// What both directions share; libpng hands it back where it fails.
+typedef struct {
+    png_structp png;
+    png_infop info;
+    uint8_t *bytes; // one row to write, all rows read
+    char problem[256];
+} PngState;
+
+static void png_fail(png_structp png, png_const_charp message)
+{
+    PngState *state = png_get_error_ptr(png);
+    snprintf(state->problem, sizeof state->problem, "%s", message);
+    png_longjmp(png, 1);
+}
+
+static void png_ignore(png_structp png, png_const_charp message)
+{
+    (void)png, (void)message;
+}
+
+static void png_write_bytes(png_structp png, png_bytep bytes, size_t size)
+{
+    if (fwrite(bytes, 1, size, png_get_io_ptr(png)) != size) png_error(png, strerror(errno));
+}
+
+static void png_flush_none(png_structp png)
+{
+    (void)png;
+}
+
+static bool png_write_failed(ImageWriter *writer, MessageList *messages)
+{
+    message_add(messages, MESSAGE_ERROR, "cannot write '%s': %s", writer->output.target,
+                ((PngState *)writer->state)->problem);
+    return false;
+}
+
+// tEXt holds Latin-1, iTXt UTF-8; ASCII is in both, and more programs show tEXt.
+static void png_note(PngState *state, const ImageNote *note)
+{
+    bool is_ascii = true;
+    for (const char *at = note->value; *at; at++)
+        is_ascii = is_ascii && (unsigned char)*at < 0x80;
+    char *key = memory_copy_text(note->key), *value = memory_copy_text(note->value);
+    png_text text = {.compression = is_ascii ? PNG_TEXT_COMPRESSION_NONE : PNG_ITXT_COMPRESSION_NONE,
+                     .key = key,
+                     .text = value};
+    png_set_text(state->png, state->info, &text, 1);
+    free(key);
+    free(value);
+}
+
+static bool png_begin(ImageWriter *writer, MessageList *messages)
+{
+    const ImageHeader *header = &writer->header;
+    PngState *state = writer->state = memory_allocate_zeroed(1, sizeof *state);
+    state->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, state, png_fail, png_ignore);
+    state->info = state->png ? png_create_info_struct(state->png) : NULL;
+    if (!state->info) fault("libpng cannot write");
+    state->bytes = memory_allocate((size_t)header->width * header->channels, header->bits / 8);
+    if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
+
+    png_set_write_fn(state->png, writer->output.file, png_write_bytes, png_flush_none);
+    png_set_user_limits(state->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    png_set_IHDR(state->png, state->info, header->width, header->height, (int)header->bits,
+                 header->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    if (header->transfer == TRANSFER_SRGB) png_set_sRGB(state->png, state->info, PNG_sRGB_INTENT_PERCEPTUAL);
+    for (const ImageNote *note = header->notes; note && note->key; note++)
+        png_note(state, note);
+    png_set_filter(state->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+    png_set_compression_level(state->png, 1);
+    png_write_info(state->png, state->info);
+    return true;
+}
+
+static bool png_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+{
+    const ImageHeader *header = &writer->header;
+    PngState *state = writer->state;
+    size_t row_values = (size_t)header->width * header->channels;
+    if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
+    for (uint32_t row = 0; row < row_count; row++) {
+        transfer_quantize(state->bytes, (const float *)pixels + row * row_values, row_values,
+                          header->transfer, header->bits);
+        png_write_row(state->png, state->bytes);
+    }
+    return true;
+}
+
+static bool png_end(ImageWriter *writer, MessageList *messages)
+{
+    PngState *state = writer->state;
+    if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
+    png_write_end(state->png, NULL);
+    return true;
+}
+
+static void png_free_writer(ImageWriter *writer)
+{
+    PngState *state = writer->state;
+    if (!state) return;
+    png_destroy_write_struct(&state->png, &state->info);
+    free(state->bytes);
+    free(state);
+}
+
+const Encoder png_encoder = {png_begin, png_rows, png_end, png_free_writer};
+
+typedef struct {
+    PngState state;
+    const ImageFile *file;
+    size_t at;
+} PngReader;
+
+static void png_read_bytes(png_structp png, png_bytep bytes, size_t size)
+{
+    PngReader *reader = png_get_io_ptr(png);
+    if (size > reader->file->length - reader->at) png_error(png, "the file ends too early");
+    memcpy(bytes, reader->file->bytes + reader->at, size);
+    reader->at += size;
+}
+
+// Sets the reader to give gray or RGB of 8 or 16 bits, and makes room for all rows.
+static bool png_prepare(PngReader *reader, Image *image)
+{
+    png_structp png = reader->state.png;
+    png_infop info = reader->state.info;
+    png_set_read_fn(png, reader, png_read_bytes);
+    png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    png_read_info(png, info);
+    if (png_get_color_type(png, info) == PNG_COLOR_TYPE_PALETTE)
+        png_set_palette_to_rgb(png);
+    else if (png_get_bit_depth(png, info) < 8)
+        png_set_expand_gray_1_2_4_to_8(png);
+    png_set_strip_alpha(png);
+    png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+
+    // Deflate makes at most 1032 bytes of one (zlib, technical details); a byte holds at most 8 pixels of a
+    // palette.
+    if (!image_allocate(image, reader->file, png_get_image_width(png, info), png_get_image_height(png, info),
+                        png_get_channels(png, info), UINT64_C(1032) * 8 * 3 * sizeof *image->values))
+        return false;
+    reader->state.bytes = calloc(image->height, png_get_rowbytes(png, info));
+    return reader->state.bytes || image_refuse(reader->file, "the picture does not fit into memory");
+}
+
+static void png_values(const PngReader *reader, Image *image)
+{
+    size_t count = (size_t)image->width * image->height * image->channels;
+    const uint8_t *bytes = reader->state.bytes;
+    bool is_wide = png_get_bit_depth(reader->state.png, reader->state.info) == 16;
+    for (size_t i = 0; i < count; i++)
+        image->values[i] =
+            is_wide ? (float)(bytes[2 * i] << 8 | bytes[2 * i + 1]) / 65535.0F : (float)bytes[i] / 255.0F;
+}
+
+static bool png_read_all(PngReader *reader, Image *image)
+{
+    png_structp png = reader->state.png;
+    if (setjmp(png_jmpbuf(png))) return image_refuse(reader->file, "PNG: %s", reader->state.problem);
+    if (!png_prepare(reader, image)) return false;
+    size_t row_size = png_get_rowbytes(png, reader->state.info);
+    int passes = png_get_interlace_type(png, reader->state.info) == PNG_INTERLACE_ADAM7
+                     ? PNG_INTERLACE_ADAM7_PASSES
+                     : 1;
+    for (int pass = 0; pass < passes; pass++) {
+        for (uint32_t row = 0; row < image->height; row++)
+            png_read_row(png, reader->state.bytes + row * row_size, NULL);
+    }
+    png_read_end(png, NULL);
+    return true;
+}
+
+bool png_decode(Image *image, const ImageFile *file)
+{
+    PngReader reader = {.file = file};
+    PngState *state = &reader.state;
+    state->png = png_create_read_struct(PNG_LIBPNG_VER_STRING, state, png_fail, png_ignore);
+    state->info = state->png ? png_create_info_struct(state->png) : NULL;
+    if (!state->info) fault("libpng cannot read");
+    bool done = png_read_all(&reader, image);
+    if (done) {
+        png_values(&reader, image);
+        image->display = true;
+        image->transfer =
+            png_get_valid(state->png, state->info, PNG_INFO_sRGB) ? TRANSFER_SRGB : TRANSFER_NONE;
+    }
+    png_destroy_read_struct(&state->png, &state->info, NULL);
+    free(state->bytes);
+    return done;
+}

@@ -1,0 +1,94 @@
+// Portable anymaps (Netpbm, the formats ppm and pgm): P5 and P6 are written; P2, P3, P5 and P6 are read.
+#include "host/image/codec.h"
+#include "host/image/transfer.h"
+
+#include "host/base/fault.h"
+
+#include <ctype.h>
+#include <stdlib.h>
+
+static bool ppm_begin(ImageWriter *writer, MessageList *messages)
+{
+    const ImageHeader *header = &writer->header;
+    writer->state = memory_allocate((size_t)header->width * header->channels, header->bits / 8);
+    char start[64];
+    int length = snprintf(start, sizeof start, "P%c\n%u %u\n%u\n", header->channels == 1 ? '5' : '6',
+                          header->width, header->height, (1U << header->bits) - 1);
+    return output_write(&writer->output, start, (size_t)length, messages);
+}
+
+static bool ppm_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+{
+    const ImageHeader *header = &writer->header;
+    size_t row_values = (size_t)header->width * header->channels;
+    const float *values = pixels;
+    for (uint32_t row = 0; row < row_count; row++, values += row_values) {
+        transfer_quantize(writer->state, values, row_values, header->transfer, header->bits);
+        if (!output_write(&writer->output, writer->state, row_values * (header->bits / 8), messages))
+            return false;
+    }
+    return true;
+}
+
+static void ppm_free(ImageWriter *writer)
+{
+    free(writer->state);
+}
+
+const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, ppm_free};
+
+// Reads the number at `*at` after white space and comments; false where there is none below 2^31.
+static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)
+{
+    while (*at < file->length && (isspace(file->bytes[*at]) || file->bytes[*at] == '#')) {
+        if (file->bytes[*at] == '#') {
+            while (*at < file->length && file->bytes[*at] != '\n')
+                ++*at;
+        } else {
+            ++*at;
+        }
+    }
+    size_t start = *at;
+    uint64_t value = 0;
+    while (*at < file->length && isdigit(file->bytes[*at]) && value <= INT32_MAX)
+        value = 10 * value + (uint64_t)(file->bytes[(*at)++] - '0');
+    *number = (uint32_t)value;
+    return *at > start && value <= INT32_MAX;
+}
+
+bool ppm_decode(Image *image, const ImageFile *file)
+{
+    char kind = (char)file->bytes[1];
+    bool is_text = kind == '2' || kind == '3';
+    size_t at = 2;
+    uint32_t width, height, maximum;
+    if (!number_read(file, &at, &width) || !number_read(file, &at, &height) ||
+        !number_read(file, &at, &maximum))
+        return image_refuse(file, "PPM: the header is damaged");
+    if (maximum == 0 || maximum > 65535)
+        return image_refuse(file, "PPM: the maximum must be 1 to 65535, not %u", maximum);
+    // A value is a digit and a space, or its bytes.
+    size_t value_size = is_text ? 2 : maximum > 255 ? 2 : 1;
+    if (!image_allocate(image, file, width, height, kind == '3' || kind == '6' ? 3 : 1,
+                        sizeof *image->values / value_size))
+        return false;
+    image->display = true;
+    at++; // the one white space after the maximum
+    size_t count = (size_t)image->width * image->height * image->channels;
+    if (!is_text && (at > file->length || count > (file->length - at) / value_size))
+        return image_refuse(file, "PPM: the file ends too early");
+    for (size_t i = 0; i < count; i++) {
+        uint32_t value;
+        if (is_text) {
+            if (!number_read(file, &at, &value))
+                return image_refuse(file, "PPM: value %zu of %zu is missing or no number", i + 1, count);
+        } else {
+            value = file->bytes[at++];
+            if (value_size == 2) value = value << 8 | file->bytes[at++];
+        }
+        if (value > maximum)
+            return image_refuse(file, "PPM: value %zu, %u, is above the maximum, %u", i + 1, value, maximum);
+        image->values[i] = (float)value / (float)maximum;
+    }
+    return true;
+}

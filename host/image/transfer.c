@@ -1,0 +1,114 @@
+// IEC 61966-2-1:1999, the sRGB curve. The curve only rises, so a display value is found by comparing with the
+// thresholds between neighboring display values, which are worked out once; no rounding error is left in it.
+#include "host/image/transfer.h"
+#include "host/base/fault.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <string.h>
+
+typedef struct {
+    uint32_t maximum;
+    unsigned shift;    // bits of a float that are below a bucket
+    uint32_t first;    // the bucket of thresholds[1]
+    float *thresholds; // [k]: the least float that gives k
+    uint16_t *starts;  // [bucket - first]: what the bucket's least float gives
+} Curve;
+
+static Curve curve_8, curve_16;
+
+static uint32_t float_bits(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+static long double srgb_decode(long double display)
+{
+    return display <= 0.04045L ? display / 12.92L : powl((display + 0.055L) / 1.055L, 2.4L);
+}
+
+static float float_at_least(long double value)
+{
+    float near = (float)value;
+    return near < value ? nextafterf(near, INFINITY) : near;
+}
+
+static void curve_prepare(Curve *curve, uint32_t maximum, unsigned bucket_bits)
+{
+    curve->maximum = maximum;
+    curve->thresholds = memory_allocate(maximum + 2, sizeof *curve->thresholds);
+    curve->thresholds[0] = -INFINITY;
+    for (uint32_t k = 1; k <= maximum; k++)
+        curve->thresholds[k] = float_at_least(srgb_decode(((long double)k - 0.5L) / (long double)maximum));
+    curve->thresholds[maximum + 1] = INFINITY;
+
+    // A float's upper bits, which order positive floats, name its bucket: some per power of two.
+    curve->shift = 23 - bucket_bits;
+    curve->first = float_bits(curve->thresholds[1]) >> curve->shift;
+    uint32_t end = float_bits(1.0F) >> curve->shift;
+    curve->starts = memory_allocate(end - curve->first, sizeof *curve->starts);
+    uint32_t display = 0;
+    for (uint32_t bucket = curve->first; bucket < end; bucket++) {
+        while (float_bits(curve->thresholds[display + 1]) <= bucket << curve->shift)
+            display++;
+        curve->starts[bucket - curve->first] = (uint16_t)display;
+    }
+}
+
+static void curve_8_prepare(void)
+{
+    curve_prepare(&curve_8, 255, 10);
+}
+
+static void curve_16_prepare(void)
+{
+    curve_prepare(&curve_16, 65535, 12);
+}
+
+static const Curve *curve_of(unsigned bits)
+{
+    static pthread_once_t once_8 = PTHREAD_ONCE_INIT, once_16 = PTHREAD_ONCE_INIT;
+    if (bits == 8) {
+        pthread_once(&once_8, curve_8_prepare);
+        return &curve_8;
+    }
+    pthread_once(&once_16, curve_16_prepare);
+    return &curve_16;
+}
+
+static inline uint32_t curve_quantize(const Curve *curve, float value)
+{
+    if (!(value >= curve->thresholds[1])) // NaN too
+        return 0;
+    if (value >= 1.0F) return curve->maximum;
+    uint32_t display = curve->starts[(float_bits(value) >> curve->shift) - curve->first];
+    while (value >= curve->thresholds[display + 1])
+        display++;
+    return display;
+}
+
+// 24 bits times 16 bits plus a half is exact in a double.
+static inline uint32_t linear_quantize(float value, uint32_t maximum)
+{
+    if (!(value > 0.0F)) return 0;
+    return value >= 1.0F ? maximum : (uint32_t)((double)value * maximum + 0.5);
+}
+
+uint32_t image_quantize(float value, Transfer transfer, unsigned bits)
+{
+    return transfer == TRANSFER_SRGB ? curve_quantize(curve_of(bits), value)
+                                     : linear_quantize(value, bits == 8 ? 255 : 65535);
+}
+
+void transfer_quantize(uint8_t *bytes, const float *values, size_t count, Transfer transfer, unsigned bits)
+{
+    const Curve *curve = curve_of(bits);
+    for (size_t i = 0; i < count; i++) {
+        uint32_t display = transfer == TRANSFER_SRGB ? curve_quantize(curve, values[i])
+                                                     : linear_quantize(values[i], curve->maximum);
+        if (bits == 16) *bytes++ = (uint8_t)(display >> 8);
+        *bytes++ = (uint8_t)display;
+    }
+}

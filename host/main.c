@@ -1,0 +1,57 @@
+// glint: the subcommands by name.
+#include "host/base/fault.h"
+#include "host/base/text.h"
+#include "host/cli/commands.h"
+#include "host/cli/version.h"
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+    const char *name;
+    int (*run)(int argument_count, char **arguments);
+    const char *purpose;
+} commands[] = {
+    {"render", command_render, "turn a scene into a picture"},
+    {"trace", command_trace, "shoot explicit rays at a scene"},
+    {"check", command_check, "read a scene and say what is in it"},
+    {"devices", command_devices, "list the OpenCL devices"},
+};
+
+enum { COMMAND_COUNT = sizeof commands / sizeof *commands };
+
+static void help(FILE *stream)
+{
+    fputs("glint: an OpenCL ray tracer that says how long it took\n\n"
+          "usage: glint COMMAND [OPTIONS]\n\n",
+          stream);
+    for (size_t i = 0; i < COMMAND_COUNT; i++)
+        fprintf(stream, "  %-9s %s\n", commands[i].name, commands[i].purpose);
+    fputs("\nglint COMMAND --help tells a command's options; glint --version the version.\n", stream);
+}
+
+int main(int argument_count, char **arguments)
+{
+    if (argument_count < 2) {
+        help(stderr);
+        return EXIT_USER;
+    }
+    const char *name = arguments[1];
+    if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0) {
+        help(stdout);
+        return EXIT_DONE;
+    }
+    if (strcmp(name, "--version") == 0) {
+        printf("glint %s\n", glint_version());
+        return EXIT_DONE;
+    }
+    const char *names[COMMAND_COUNT];
+    for (size_t i = 0; i < COMMAND_COUNT; i++) {
+        if (strcmp(name, commands[i].name) == 0) return commands[i].run(argument_count - 1, arguments + 1);
+        names[i] = commands[i].name;
+    }
+    const char *near = text_nearest(name, names, COMMAND_COUNT);
+    fprintf(stderr, "glint: there is no command \"%s\"", name);
+    if (near) fprintf(stderr, "; did you mean %s?", near);
+    fputc('\n', stderr);
+    return EXIT_USER;
+}

@@ -1,0 +1,105 @@
+// Entries: a CacheHeader, the key without its NUL, the binary; numbers as this machine stores them, since
+// the binary is for this machine.
+#include "host/opencl/cache.h"
+
+#include "host/base/fault.h"
+#include "host/base/output.h"
+#include "host/opencl/compose.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const char cache_magic[8] = "glintprg";
+static const uint64_t cache_format = 1;
+
+typedef struct {
+    char magic[8];
+    uint64_t format, key_length, binary_length;
+    uint64_t checksum; // of the fields above, the key and the binary
+} CacheHeader;
+
+static CacheHeader entry_header(const char *key, const void *binary, size_t binary_length)
+{
+    CacheHeader header = {.format = cache_format, .key_length = strlen(key), .binary_length = binary_length};
+    memcpy(header.magic, cache_magic, sizeof header.magic);
+    header.checksum = hash_bytes(HASH_START, &header, offsetof(CacheHeader, checksum));
+    header.checksum = hash_bytes(header.checksum, key, header.key_length);
+    header.checksum = hash_bytes(header.checksum, binary, binary_length);
+    return header;
+}
+
+char *cache_entry_path(const char *key)
+{
+    const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    bool has_cache = cache && cache[0] == '/', has_home = home && home[0] == '/';
+    if (!has_cache && !has_home) return NULL;
+    Text path = {0};
+    text_appendf(&path, "%s%s/glint/%016" PRIx64 ".bin", has_cache ? cache : home, has_cache ? "" : "/.cache",
+                 hash_bytes(HASH_START, key, strlen(key)));
+    char *copy = memory_copy_text(text_c(&path));
+    text_free(&path);
+    return copy;
+}
+
+// Every folder above the entry, for its owner alone (XDG Base Directory Specification 0.8, "Referencing this
+// specification"). One that cannot be made is found out by who writes into it.
+static void make_folders(const char *path)
+{
+    char *folder = memory_copy_text(path);
+    for (char *slash = strchr(folder + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
+        *slash = '\0';
+        mkdir(folder, 0700);
+        *slash = '/';
+    }
+    free(folder);
+}
+
+static bool entry_open(const Text *entry, const char *key, Text *binary)
+{
+    CacheHeader header;
+    size_t key_length = strlen(key), before = sizeof header + key_length;
+    if (entry->count < before) return false;
+    const char *bytes = entry->items + before;
+    size_t length = entry->count - before;
+    header = entry_header(key, bytes, length);
+    if (memcmp(entry->items, &header, sizeof header) != 0) return false;
+    if (memcmp(entry->items + sizeof header, key, key_length) != 0) return false;
+    text_append(binary, bytes, length);
+    return true;
+}
+
+bool cache_load(const char *key, Text *binary)
+{
+    char *path = cache_entry_path(key);
+    if (!path) return false;
+    MessageList ignored = {0};
+    Text entry = {0};
+    bool found = text_read_file(&entry, path, &ignored) && entry_open(&entry, key, binary);
+    text_free(&entry);
+    message_list_free(&ignored);
+    free(path);
+    return found;
+}
+
+void cache_store(const char *key, const Text *binary)
+{
+    char *path = cache_entry_path(key);
+    if (!path) return;
+    make_folders(path);
+    if (access(path, R_OK | W_OK) != 0) unlink(path); // an output would leave it as it is
+    CacheHeader header = entry_header(key, binary->items, binary->count);
+    MessageList ignored = {0};
+    OutputFile output;
+    if (output_open(&output, path, &ignored)) {
+        if (output_write(&output, &header, sizeof header, &ignored) &&
+            output_write(&output, key, header.key_length, &ignored) &&
+            output_write(&output, binary->items, binary->count, &ignored))
+            output_commit(&output, &ignored);
+        else
+            output_abandon(&output);
+    }
+    message_list_free(&ignored);
+    free(path);
+}

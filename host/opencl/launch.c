@@ -1,0 +1,66 @@
+// Launches and the times of their events.
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/opencl/compute.h"
+
+LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, double host_seconds,
+                             double resolution_seconds)
+{
+    LaunchTime time = {
+        .queued_seconds = 1e-9 * (double)queued,
+        .start_seconds = 1e-9 * (double)start,
+        .end_seconds = 1e-9 * (double)end,
+        .host_seconds = host_seconds,
+    };
+    if (start != 0 && end > start) {
+        time.event_seconds = 1e-9 * (double)(end - start);
+        time.trusted = time.event_seconds <= 1.01 * host_seconds + resolution_seconds;
+    }
+    return time;
+}
+
+// Zero where the runtime cannot say.
+static cl_ulong event_moment(cl_event event, cl_profiling_info what)
+{
+    cl_ulong nanoseconds = 0;
+    if (clGetEventProfilingInfo(event, what, sizeof nanoseconds, &nanoseconds, NULL) != CL_SUCCESS) return 0;
+    return nanoseconds;
+}
+
+static double event_resolution(cl_event event)
+{
+    cl_command_queue queue = NULL;
+    cl_device_id device = NULL;
+    size_t nanoseconds = 0;
+    if (clGetEventInfo(event, CL_EVENT_COMMAND_QUEUE, sizeof queue, &queue, NULL) != CL_SUCCESS || !queue ||
+        clGetCommandQueueInfo(queue, CL_QUEUE_DEVICE, sizeof device, &device, NULL) != CL_SUCCESS ||
+        clGetDeviceInfo(device, CL_DEVICE_PROFILING_TIMER_RESOLUTION, sizeof nanoseconds, &nanoseconds,
+                        NULL) != CL_SUCCESS)
+        return 0;
+    return 1e-9 * (double)nanoseconds;
+}
+
+LaunchTime event_time(cl_event event, double host_start)
+{
+    cl_int waited = clWaitForEvents(1, &event);
+    double host_seconds = clock_seconds() - host_start;
+    cl_int state = CL_COMPLETE;
+    cl_must(clGetEventInfo(event, CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof state, &state, NULL));
+    if (state < 0) fault("a command failed on the device: %s (%d)", cl_status_name(state), state);
+    cl_check(waited, "clWaitForEvents");
+
+    LaunchTime time = launch_time_judge(
+        event_moment(event, CL_PROFILING_COMMAND_QUEUED), event_moment(event, CL_PROFILING_COMMAND_START),
+        event_moment(event, CL_PROFILING_COMMAND_END), host_seconds, event_resolution(event));
+    cl_must(clReleaseEvent(event));
+    return time;
+}
+
+LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *global,
+                         const size_t *local)
+{
+    double host_start = clock_seconds();
+    cl_event event;
+    cl_must(clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, NULL, global, local, 0, NULL, &event));
+    return event_time(event, host_start);
+}

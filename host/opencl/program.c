@@ -1,0 +1,145 @@
+// Programs: composed, then built or taken from the cache.
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/opencl/cache.h"
+#include "host/opencl/compose.h"
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static const char *or_empty(const char *text)
+{
+    return text ? text : "";
+}
+
+static char *request_text(const ProgramRequest *request)
+{
+    char *missing = NULL;
+    char *text = kernel_compose(kernel_files, request->root, or_empty(request->prelude), &missing);
+    if (!text) fault("the kernel file %s is not embedded (asked for by %s)", missing, request->root);
+    return text;
+}
+
+// All that the compiled program depends on. The native width is a sign of the processor beside its name.
+static char *request_key(const Compute *compute, const ProgramRequest *request, const char *text)
+{
+    const Device *device = compute->device;
+    Text key = {0};
+    text_appendf(&key, "options %s\nlaunch %s\n", or_empty(request->options), or_empty(request->launch));
+    text_appendf(&key, "device %s, %s, native width %u\n", device->name, device->version,
+                 device->native_float_width);
+    text_appendf(&key, "driver %s, %s\n", device->vendor, device->driver);
+    text_appendf(&key, "platform %s, %s\n", device->platform_name, device->platform_version);
+    text_append(&key, text, strlen(text));
+    char *copy = memory_copy_text(text_c(&key));
+    text_free(&key);
+    return copy;
+}
+
+static char *build_log(const Compute *compute, cl_program program)
+{
+    size_t size = 0;
+    cl_device_id id = compute->device->id;
+    if (clGetProgramBuildInfo(program, id, CL_PROGRAM_BUILD_LOG, 0, NULL, &size) != CL_SUCCESS) size = 0;
+    char *log = memory_allocate_zeroed(size + 1, 1);
+    if (size > 0) clGetProgramBuildInfo(program, id, CL_PROGRAM_BUILD_LOG, size, log, NULL);
+    return log;
+}
+
+// Keeps the text for who reads the build log. Says where; valid until the next call.
+static const char *save_text(const char *text)
+{
+    static char path[4096];
+    const char *folder = getenv("TMPDIR");
+    snprintf(path, sizeof path, "%s/glint-kernel-XXXXXX.cl", folder && folder[0] != '\0' ? folder : "/tmp");
+    int descriptor = mkstemps(path, 3);
+    FILE *file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
+    bool written = file && fputs(text, file) >= 0;
+    if (file && fclose(file) != 0) written = false;
+    return written ? path : "could not be saved";
+}
+
+static cl_program build_from_source(const Compute *compute, const char *text, const char *options)
+{
+    cl_int status;
+    cl_program program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
+    cl_check(status, "clCreateProgramWithSource");
+    status = clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL);
+    if (status != CL_SUCCESS)
+        fault("clBuildProgram: %s on %s with options \"%s\"\n%s\nthe composed text: %s",
+              cl_status_name(status), compute->device->name, options, build_log(compute, program),
+              save_text(text));
+    return program;
+}
+
+// PoCL keeps a cache of its own, with the options in its key: an option never used before makes it build.
+static cl_program build_afresh(const Compute *compute, const char *text, const char *options)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    Text unique = {0};
+    text_appendf(&unique, "%s -D GLINT_BUILD=%jd%09ld%d", options, (intmax_t)now.tv_sec, now.tv_nsec,
+                 (int)getpid());
+    cl_program program = build_from_source(compute, text, text_c(&unique));
+    text_free(&unique);
+    return program;
+}
+
+// NULL if the driver refuses the binary.
+static cl_program build_from_binary(const Compute *compute, const Text *binary, const char *options)
+{
+    const unsigned char *bytes = (const unsigned char *)text_c(binary);
+    cl_int binary_status, status;
+    cl_program program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
+                                                   &bytes, &binary_status, &status);
+    if (status != CL_SUCCESS) return NULL;
+    if (clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL) == CL_SUCCESS) return program;
+    clReleaseProgram(program);
+    return NULL;
+}
+
+void program_build(Compute *compute, const ProgramRequest *request, Program *program)
+{
+    double start = clock_seconds();
+    const char *options = or_empty(request->options);
+    char *text = request_text(request);
+    *program = (Program){.text_hash = hash_bytes(HASH_START, text, strlen(text))};
+    if (request->no_cache) {
+        program->program = build_afresh(compute, text, options);
+    } else {
+        char *key = request_key(compute, request, text);
+        Text binary = {0};
+        if (cache_load(key, &binary)) program->program = build_from_binary(compute, &binary, options);
+        program->from_cache = program->program != NULL;
+        if (!program->from_cache) program->program = build_from_source(compute, text, options);
+        text_free(&binary);
+        free(key);
+    }
+    free(text);
+    program->build_seconds = clock_seconds() - start;
+}
+
+void program_store(Compute *compute, const ProgramRequest *request, const Program *program)
+{
+    if (request->no_cache || program->from_cache) return;
+    size_t size = 0;
+    cl_must(clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL));
+    if (size == 0) return;
+    char *bytes = memory_allocate(size, 1);
+    cl_must(clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL));
+    char *text = request_text(request), *key = request_key(compute, request, text);
+    Text binary = {.items = bytes, .count = size, .capacity = size};
+    cache_store(key, &binary);
+    text_free(&binary);
+    free(key);
+    free(text);
+}
+
+void program_close(Program *program)
+{
+    if (program->program) clReleaseProgram(program->program);
+    *program = (Program){0};
+}

@@ -1,0 +1,230 @@
+// Rendering the region band by band: each launch short enough for a desktop to stay usable and for an interrupt to be
+// heard, memory that of a band.
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/render/renderer_state.h"
+#include "host/render/sample_pattern.h"
+#include <math.h>
+#include <stdlib.h>
+
+// Work-items of a group. Neighboring tiles meet the same objects.
+static const size_t group_size[2] = {8, 8};
+
+enum {
+    FIRST_LAUNCH_SAMPLES = 1 << 17,  // before any time is known
+    BAND_BYTES_LARGEST = 32 << 20,   // of one film
+    SAMPLES_OF_LAUNCH_LARGEST = 1024 // per pixel
+};
+
+typedef struct {
+    uint32_t width, height;
+} TileShape;
+
+static TileShape tile_shape(uint32_t lanes)
+{
+    // as kernels/lanes.h has it
+    switch (lanes) {
+    case 4:
+        return (TileShape){2, 2};
+    case 8:
+        return (TileShape){4, 2};
+    case 16:
+        return (TileShape){4, 4};
+    default:
+        return (TileShape){1, 1};
+    }
+}
+
+// The buffers that a band is rendered into, sized for `rows`.
+typedef struct {
+    uint32_t rows;
+    cl_mem offsets, colors, t, normal, position, object, shadow;
+} Film;
+
+typedef struct {
+    const void *colors, *t, *normal, *position, *object, *shadow;
+} MappedFilm;
+
+static size_t film_pixels(const Renderer *renderer, uint32_t rows)
+{
+    return (size_t)renderer->settings.region_width * rows;
+}
+
+static size_t film_shadow_size(const Renderer *renderer, uint32_t rows)
+{
+    return film_pixels(renderer, rows) * renderer->light_count * sizeof(uint32_t);
+}
+
+static cl_mem film_buffer(Renderer *renderer, size_t size)
+{
+    return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
+}
+
+static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t rows)
+{
+    const RenderSettings *settings = &renderer->settings;
+    size_t scalar = renderer_scalar_size(renderer), pixels = film_pixels(renderer, rows);
+    film->rows = rows;
+    film->colors = film_buffer(renderer, pixels * 3 * scalar);
+    if (aovs != 0) {
+        film->t = film_buffer(renderer, pixels * scalar);
+        film->normal = film_buffer(renderer, pixels * 3 * scalar);
+        film->position = film_buffer(renderer, pixels * 3 * scalar);
+        film->object = film_buffer(renderer, pixels * sizeof(uint32_t));
+        film->shadow = film_buffer(renderer, film_shadow_size(renderer, rows));
+    }
+    void *offsets = sample_pattern(settings->sample_count, renderer->report.wide);
+    film->offsets =
+        buffer_create(renderer->compute, 2 * settings->sample_count * scalar, offsets, CL_MEM_READ_ONLY);
+    free(offsets);
+}
+
+static void film_close(Film *film)
+{
+    cl_mem buffers[] = {film->offsets, film->colors, film->t, film->normal, film->position, film->object, film->shadow};
+    for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
+        if (buffers[i]) cl_must(clReleaseMemObject(buffers[i]));
+    *film = (Film){0};
+}
+
+static size_t rounded_up(size_t value, size_t step)
+{
+    return (value + step - 1) / step * step;
+}
+
+typedef struct {
+    uint32_t first_row, row_count;
+} BandRows;
+
+static void band_launch_size(const Renderer *renderer, BandRows rows, size_t *global)
+{
+    TileShape tile = tile_shape(renderer->report.lanes);
+    global[0] = rounded_up((renderer->settings.region_width + tile.width - 1) / tile.width, group_size[0]);
+    global[1] = rounded_up((rows.row_count + tile.height - 1) / tile.height, group_size[1]);
+}
+
+static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint argument, BandRows rows)
+{
+    const RenderSettings *settings = &renderer->settings;
+    cl_uint4 band = {{settings->region_x, settings->region_y + rows.first_row, settings->region_width, rows.row_count}};
+    kernel_argument(kernel, argument, sizeof band, &band);
+}
+
+// One launch for samples first..last-1; returns its seconds, the event's where it can be trusted.
+static double band_render(Renderer *renderer, const Film *film, BandRows rows, uint32_t first, uint32_t last)
+{
+    cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
+    kernel_argument(kernel, FLAT_COUNT, sizeof(cl_mem), &film->offsets);
+    kernel_argument(kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->colors);
+    band_set_place(renderer, kernel, FLAT_COUNT + 2, rows);
+    kernel_argument(kernel, FLAT_COUNT + 3, sizeof first, &first);
+    kernel_argument(kernel, FLAT_COUNT + 4, sizeof last, &last);
+    size_t global[2];
+    band_launch_size(renderer, rows, global);
+    LaunchTime time = renderer_launch(renderer, KERNEL_RENDER, 2, global, group_size);
+    return time.trusted ? time.event_seconds : time.host_seconds;
+}
+
+static void band_aovs(Renderer *renderer, const Film *film, BandRows rows)
+{
+    cl_kernel kernel = renderer_kernel(renderer, KERNEL_AOV);
+    band_set_place(renderer, kernel, FLAT_COUNT, rows);
+    const cl_mem *buffers[] = {&film->t, &film->normal, &film->position, &film->object, &film->shadow};
+    for (cl_uint i = 0; i < 5; i++)
+        kernel_argument(kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
+    size_t global[2];
+    band_launch_size(renderer, rows, global);
+    renderer_launch(renderer, KERNEL_AOV, 2, global, group_size);
+}
+
+static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows, BandSink sink,
+                         void *context)
+{
+    const RenderSettings *settings = &renderer->settings;
+    size_t scalar = renderer_scalar_size(renderer), pixels = film_pixels(renderer, rows.row_count);
+    const struct {
+        unsigned aov; // 0: the color, always there
+        cl_mem buffer;
+        size_t size;
+    } parts[] = {
+        {0, film->colors, pixels * 3 * scalar},
+        {AOV_T, film->t, pixels * scalar},
+        {AOV_NORMAL, film->normal, pixels * 3 * scalar},
+        {AOV_POSITION, film->position, pixels * 3 * scalar},
+        {AOV_OBJECT, film->object, pixels * sizeof(uint32_t)},
+        {AOV_SHADOW, film->shadow, film_shadow_size(renderer, rows.row_count)},
+    };
+    enum { PART_COUNT = sizeof parts / sizeof *parts };
+    const void *mapped[PART_COUNT] = {NULL};
+    for (size_t i = 0; i < PART_COUNT; i++)
+        if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
+            mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
+    Band band = {rows.first_row, rows.row_count, mapped[0], mapped[1], mapped[2], mapped[3], mapped[4], mapped[5]};
+    double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
+    bool go_on = sink(context, &band, done);
+    for (size_t i = 0; i < PART_COUNT; i++)
+        if (mapped[i]) renderer_unmap(renderer, parts[i].buffer, mapped[i]);
+    return go_on;
+}
+
+// How much of the picture the next launch takes, from the time that each pixel's sample took so far.
+typedef struct {
+    double target_seconds, seconds_per_sample; // 0: not known yet
+} Pace;
+
+static uint64_t pace_samples(const Pace *pace)
+{
+    if (pace->seconds_per_sample <= 0) return FIRST_LAUNCH_SAMPLES;
+    return (uint64_t)fmin(pace->target_seconds / pace->seconds_per_sample, 1e15);
+}
+
+static uint32_t pace_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
+{
+    const RenderSettings *settings = &renderer->settings;
+    if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
+    uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
+    uint64_t rows = pace_samples(pace) / row_samples;
+    uint32_t step = tile_shape(renderer->report.lanes).height * (uint32_t)group_size[1];
+    if (rows < step) rows = step;
+    rows -= rows % step;
+    return rows < most ? (uint32_t)rows : most;
+}
+
+static uint32_t film_rows_largest(const Renderer *renderer)
+{
+    const RenderSettings *settings = &renderer->settings;
+    if (settings->band_rows > 0) return settings->band_rows;
+    size_t row_bytes = film_pixels(renderer, 1) * 3 * renderer_scalar_size(renderer);
+    size_t rows = BAND_BYTES_LARGEST / row_bytes;
+    size_t step = tile_shape(renderer->report.lanes).height * group_size[1];
+    rows = rows < step ? step : rows - rows % step;
+    return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
+}
+
+bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
+{
+    const RenderSettings *settings = &renderer->settings;
+    Film film = {0};
+    film_open(&film, renderer, aovs, film_rows_largest(renderer));
+    Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
+    bool go_on = true;
+    BandRows rows = {0};
+    while (go_on && rows.first_row < settings->region_height) {
+        uint32_t left = settings->region_height - rows.first_row;
+        rows.row_count = pace_rows(renderer, &pace, left < film.rows ? left : film.rows);
+        uint64_t pixels = film_pixels(renderer, rows.row_count);
+        for (uint32_t first = 0; first < settings->sample_count;) {
+            uint64_t samples = pace_samples(&pace) / pixels;
+            samples = samples < 1 ? 1 : samples > SAMPLES_OF_LAUNCH_LARGEST ? SAMPLES_OF_LAUNCH_LARGEST : samples;
+            uint32_t last = settings->sample_count - first < samples ? settings->sample_count : first + (uint32_t)samples;
+            double seconds = band_render(renderer, &film, rows, first, last);
+            pace.seconds_per_sample = seconds / (double)(pixels * (last - first));
+            first = last;
+        }
+        if (aovs != 0) band_aovs(renderer, &film, rows);
+        go_on = band_deliver(renderer, &film, aovs, rows, sink, context);
+        rows.first_row += rows.row_count;
+    }
+    film_close(&film);
+    return go_on;
+}

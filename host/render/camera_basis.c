@@ -1,0 +1,22 @@
+#include "host/render/camera_basis.h"
+
+Vector3 vector_least_aligned_axis(Vector3 direction)
+{
+    double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
+    if (x <= y && x <= z) return (Vector3){1, 0, 0};
+    if (y <= z) return (Vector3){0, 1, 0};
+    return (Vector3){0, 0, 1};
+}
+
+CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
+{
+    Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position));
+    Vector3 right = vector_cross(forward, vector_normalize(camera->up));
+    // below this sine the cross product is rounding noise, not a direction
+    if (vector_length(right) < 1e-12) right = vector_cross(forward, vector_least_aligned_axis(forward));
+    right = vector_normalize(right);
+    Vector3 up = vector_cross(right, forward);
+    double span = camera->field_axis == FIELD_VERTICAL ? height : width;
+    double half_pixel = camera->half_tangent / span;
+    return (CameraBasis){forward, vector_scale(right, half_pixel), vector_scale(up, half_pixel)};
+}

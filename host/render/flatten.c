@@ -1,0 +1,314 @@
+#include "host/render/flatten.h"
+
+#include "host/base/fault.h"
+#include "host/render/camera_basis.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// clang-format off
+static const FlatLayout layouts[FLAT_COUNT] = {
+    [FLAT_HEADER] = {sizeof(SceneHeader), offsetof(SceneHeader, picture) / sizeof(scalar4), 3},
+#define SHAPE_LAYOUT(feature, Type, name) \
+    [FLAT_FIRST_SHAPE + KIND_##feature] = {sizeof(Type), offsetof(Type, id) / sizeof(scalar4), 1},
+    SHAPE_LIST(SHAPE_LAYOUT)
+    [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
+    [FLAT_MATERIALS] = {sizeof(FlatMaterial), sizeof(FlatMaterial) / sizeof(scalar4), 0},
+    [FLAT_LIGHTS] = {sizeof(FlatLight), offsetof(FlatLight, kind) / sizeof(scalar4), 1},
+};
+// clang-format on
+
+static const int kind_of_shape[SHAPE_COUNT] = {
+    [SHAPE_SPHERE] = KIND_SPHERES,     [SHAPE_PLANE] = KIND_PLANES, [SHAPE_DISC] = KIND_DISCS,
+    [SHAPE_BOX] = KIND_BOXES,          [SHAPE_CYLINDER] = KIND_CYLINDERS,
+    [SHAPE_CONE] = KIND_CONES,         [SHAPE_TRIANGLE] = KIND_TRIANGLES,
+};
+
+// What flattening one object needs to know.
+typedef struct {
+    Vector3 eye;
+    bool wide;
+} Rounding;
+
+// The volatile keeps the rounding: gcc 12 at -O2 loses a conversion to float and back where stores are merged.
+static double rounded(const Rounding *rounding, double value)
+{
+    if (rounding->wide) return value;
+    volatile float narrow = (float)value;
+    return narrow;
+}
+
+static Vector3 vector_rounded(const Rounding *rounding, Vector3 v)
+{
+    return (Vector3){rounded(rounding, v.x), rounded(rounding, v.y), rounded(rounding, v.z)};
+}
+
+static Vector3 point_from_eye(const Rounding *rounding, Vector3 point)
+{
+    return vector_rounded(rounding, vector_subtract(point, rounding->eye));
+}
+
+static scalar4 scalar4_of(Vector3 v, double w)
+{
+    return (scalar4){v.x, v.y, v.z, w};
+}
+
+// The same direction, scaled by a power of two so that its largest component lies in 1/2..1: exact.
+static Vector3 axis_scaled(Vector3 axis)
+{
+    int exponent;
+    frexp(fmax(fabs(axis.x), fmax(fabs(axis.y), fabs(axis.z))), &exponent);
+    return (Vector3){ldexp(axis.x, -exponent), ldexp(axis.y, -exponent), ldexp(axis.z, -exponent)};
+}
+
+// The first axis of the squares on a plane: the world axis least aligned with the normal, laid into the plane.
+static Vector3 grid_axis(Vector3 unit_normal)
+{
+    Vector3 axis = vector_least_aligned_axis(unit_normal);
+    Vector3 across = vector_subtract(axis, vector_scale(unit_normal, vector_dot(axis, unit_normal)));
+    return vector_normalize(across);
+}
+
+// Squares along one direction: how many per unit, and where the eye stands among them. A whole number of pairs is
+// left out, which keeps the bits far from the origin.
+static scalar4 grid_of(const Rounding *rounding, Vector3 direction, double size)
+{
+    double phase = fmod(vector_dot(rounding->eye, direction) / size, 2);
+    return scalar4_of(vector_scale(direction, 1 / size), phase);
+}
+
+static void grid_flatten(const Rounding *rounding, Vector3 normal, const Material *material, scalar4 *u, scalar4 *v)
+{
+    if (!material->checker) return;
+    Vector3 unit = vector_normalize(normal);
+    Vector3 across = grid_axis(unit);
+    *u = grid_of(rounding, across, material->checker_size);
+    *v = grid_of(rounding, vector_cross(unit, across), material->checker_size);
+}
+
+static Revolution revolution_flatten(const Rounding *rounding, Vector3 from, Vector3 whole_axis, double radius_from,
+                                     double radius_to, double endless_slope, bool finite, bool caps)
+{
+    Vector3 base = point_from_eye(rounding, from);
+    Vector3 axis = whole_axis;
+    if (finite) axis = vector_subtract(point_from_eye(rounding, vector_add(from, whole_axis)), base);
+    Vector3 scaled = vector_rounded(rounding, axis_scaled(axis));
+    double length = vector_length(scaled);
+    double radius = rounded(rounding, radius_from);
+    double slope = finite ? (rounded(rounding, radius_to) - radius) / vector_length(axis) : endless_slope;
+    return (Revolution){
+        .base_radius = scalar4_of(base, radius * length),
+        .axis_slope = scalar4_of(scaled, slope),
+        .range = {finite ? vector_dot(axis, scaled) : 0, length, vector_dot(scaled, scaled), 0},
+        .id.y = (finite ? REVOLUTION_FINITE : 0u) | (finite && caps ? REVOLUTION_CAPPED : 0u),
+    };
+}
+
+static void object_flatten(const Rounding *rounding, const Object *object, const Material *material, void *target)
+{
+    switch (object->kind) {
+    case SHAPE_SPHERE:
+        *(Sphere *)target = (Sphere){.center_radius = scalar4_of(point_from_eye(rounding, object->as.sphere.center),
+                                                                 object->as.sphere.radius)};
+        break;
+    case SHAPE_PLANE: {
+        Plane *plane = target;
+        *plane = (Plane){.point = scalar4_of(point_from_eye(rounding, object->as.plane.point), 0),
+                         .normal = scalar4_of(axis_scaled(object->as.plane.normal), 0)};
+        grid_flatten(rounding, object->as.plane.normal, material, &plane->grid_u, &plane->grid_v);
+        break;
+    }
+    case SHAPE_DISC: {
+        Disc *disc = target;
+        *disc = (Disc){.center_radius = scalar4_of(point_from_eye(rounding, object->as.disc.center),
+                                                   object->as.disc.radius),
+                       .normal = scalar4_of(axis_scaled(object->as.disc.normal), 0)};
+        grid_flatten(rounding, object->as.disc.normal, material, &disc->grid_u, &disc->grid_v);
+        break;
+    }
+    case SHAPE_BOX:
+        *(Box *)target = (Box){.low = scalar4_of(point_from_eye(rounding, object->as.box.min), 0),
+                               .high = scalar4_of(point_from_eye(rounding, object->as.box.max), 0)};
+        break;
+    case SHAPE_CYLINDER:
+        *(Cylinder *)target = revolution_flatten(
+            rounding, object->as.cylinder.from, object->as.cylinder.axis, object->as.cylinder.radius,
+            object->as.cylinder.radius, 0, object->as.cylinder.finite, object->as.cylinder.caps);
+        break;
+    case SHAPE_CONE:
+        *(Cone *)target =
+            revolution_flatten(rounding, object->as.cone.from, object->as.cone.axis,
+                               object->as.cone.finite ? object->as.cone.radius[0] : 0, object->as.cone.radius[1],
+                               object->as.cone.slope, object->as.cone.finite, object->as.cone.caps);
+        break;
+    case SHAPE_TRIANGLE: {
+        const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
+        *(Triangle *)target = (Triangle){
+            .a = scalar4_of(point_from_eye(rounding, vertices[0]), 0),
+            .b = scalar4_of(point_from_eye(rounding, vertices[1]), 0),
+            .c = scalar4_of(point_from_eye(rounding, vertices[2]), 0),
+            .normal_a = scalar4_of(vector_normalize(normals[0]), 0),
+            .normal_b = scalar4_of(vector_normalize(normals[1]), 0),
+            .normal_c = scalar4_of(vector_normalize(normals[2]), 0),
+            .id.y = object->as.triangle.smooth,
+        };
+        break;
+    }
+    case SHAPE_COUNT:
+        break;
+    }
+}
+
+static void flat_array_open(FlatScene *flat, size_t kind, size_t count)
+{
+    flat->arrays[kind] = (FlatArray){aligned_alloc(64, (count * layouts[kind].size + 63) / 64 * 64 + 64), count,
+                                     layouts[kind]};
+    if (!flat->arrays[kind].items) fault("out of memory for %zu flat structs", count);
+    memset(flat->arrays[kind].items, 0, count * layouts[kind].size);
+}
+
+static void *flat_array_at(const FlatArray *array, size_t index)
+{
+    return (char *)array->items + index * array->layout.size;
+}
+
+// The shape's own struct has its id in its first uint4, right behind its scalar4 members.
+static void flat_set_id(const FlatArray *array, size_t index, uint32_t id)
+{
+    uint4 *ids = (uint4 *)(void *)((char *)flat_array_at(array, index) + array->layout.scalar4_count * sizeof(scalar4));
+    ids->x = id;
+}
+
+static void objects_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
+{
+    size_t counts[KIND_COUNT] = {0};
+    for (size_t i = 0; i < scene->objects.count; i++)
+        counts[kind_of_shape[scene->objects.items[i].kind]]++;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        flat_array_open(flat, FLAT_FIRST_SHAPE + kind, counts[kind]);
+        counts[kind] = 0;
+    }
+    flat_array_open(flat, FLAT_OBJECTS, scene->objects.count);
+    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        int kind = kind_of_shape[object->kind];
+        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        size_t index = counts[kind]++;
+        object_flatten(rounding, object, &scene->materials.items[object->material], flat_array_at(array, index));
+        flat_set_id(array, index, (uint32_t)i);
+        entries[i].kind_index_material = (uint4){(uint32_t)kind, (uint32_t)index, object->material, 0};
+    }
+}
+
+static void materials_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
+{
+    flat_array_open(flat, FLAT_MATERIALS, scene->materials.count);
+    FlatMaterial *materials = flat->arrays[FLAT_MATERIALS].items;
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *material = &scene->materials.items[i];
+        double size = material->checker_size;
+        Vector3 eye = rounding->eye;
+        materials[i] = (FlatMaterial){
+            .color = scalar4_of(material->checker ? material->checker_colors[0] : material->color, material->ambient),
+            .diffuse = scalar4_of(material->diffuse, material->specular),
+            .other_color = scalar4_of(material->checker_colors[1], material->shininess),
+        };
+        if (material->checker)
+            materials[i].grid =
+                (scalar4){fmod(eye.x / size, 2), fmod(eye.y / size, 2), fmod(eye.z / size, 2), 1 / size};
+    }
+}
+
+// 1 - cos of an angle in degrees, without cancellation.
+static double versine(double degrees)
+{
+    double half = sin(degrees * (M_PI / 360));
+    return 2 * half * half;
+}
+
+static void lights_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
+{
+    static const uint32_t kinds[] = {
+        [LIGHT_POINT] = LIGHT_KIND_POINT,
+        [LIGHT_DIRECTIONAL] = LIGHT_KIND_DIRECTIONAL,
+        [LIGHT_SPOT] = LIGHT_KIND_SPOT,
+    };
+    flat_array_open(flat, FLAT_LIGHTS, scene->lights.count);
+    FlatLight *lights = flat->arrays[FLAT_LIGHTS].items;
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        lights[i] = (FlatLight){.color = scalar4_of(light->color, 0), .kind.x = kinds[light->kind]};
+        if (light->kind != LIGHT_DIRECTIONAL)
+            lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
+        if (light->kind != LIGHT_POINT) lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
+        if (light->kind == LIGHT_SPOT) {
+            double outer = versine(light->angle), inner = versine(light->angle - light->penumbra);
+            lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
+        }
+    }
+}
+
+static void header_flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings)
+{
+    flat_array_open(flat, FLAT_HEADER, 1);
+    SceneHeader *header = flat->arrays[FLAT_HEADER].items;
+    CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
+    *header = (SceneHeader){
+        .background = scalar4_of(scene->background, 0),
+        .ambient = scalar4_of(scene->ambient, 0),
+        .forward = scalar4_of(basis.forward, 0),
+        .right = scalar4_of(basis.right, 0),
+        .up = scalar4_of(basis.up, 0),
+        .picture = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
+    };
+    uint32_t counts[8] = {0};
+    _Static_assert(KIND_COUNT <= 8, "SceneHeader has room for eight counts");
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        counts[kind] = (uint32_t)flat->arrays[FLAT_FIRST_SHAPE + kind].count;
+    memcpy(header->counts, counts, sizeof counts);
+}
+
+void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings)
+{
+    *flat = (FlatScene){0};
+    Rounding rounding = {.wide = settings->wide};
+    if (settings->shift_to_eye) rounding.eye = scene->camera.position;
+    objects_flatten(flat, scene, &rounding);
+    materials_flatten(flat, scene, &rounding);
+    lights_flatten(flat, scene, &rounding);
+    header_flatten(flat, scene, settings);
+}
+
+void flat_scene_free(FlatScene *flat)
+{
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        free(flat->arrays[kind].items);
+    *flat = (FlatScene){0};
+}
+
+size_t flat_array_size(const FlatArray *array, bool wide)
+{
+    const FlatLayout *layout = &array->layout;
+    size_t size = wide ? layout->size : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+    return array->count * size;
+}
+
+void flat_array_write(const FlatArray *array, bool wide, void *target)
+{
+    const FlatLayout *layout = &array->layout;
+    if (wide) {
+        memcpy(target, array->items, flat_array_size(array, wide));
+        return;
+    }
+    char *out = target;
+    for (size_t i = 0; i < array->count; i++) {
+        const double *numbers = flat_array_at(array, i);
+        float *narrow = (float *)(void *)out;
+        for (size_t k = 0; k < 4 * layout->scalar4_count; k++)
+            narrow[k] = (float)numbers[k];
+        out += 4 * sizeof(float) * layout->scalar4_count;
+        memcpy(out, numbers + 4 * layout->scalar4_count, sizeof(uint4) * layout->uint4_count);
+        out += sizeof(uint4) * layout->uint4_count;
+    }
+}

@@ -1,0 +1,40 @@
+// From a Scene to the device's flat arrays, one per shape, in double and relative to the eye.
+#pragma once
+
+#include "host/render/flat_types.h"
+#include "host/scene/scene.h"
+#include <stdbool.h>
+#include <stddef.h>
+
+// How a flat struct is laid out: its scalar4 members first, its uint4 members after them.
+typedef struct {
+    size_t size, scalar4_count, uint4_count;
+} FlatLayout;
+
+typedef struct {
+    void *items;
+    size_t count;
+    FlatLayout layout;
+} FlatArray;
+
+typedef enum { FLAT_HEADER, FLAT_FIRST_SHAPE, FLAT_OBJECTS = FLAT_FIRST_SHAPE + KIND_COUNT, FLAT_MATERIALS, FLAT_LIGHTS, FLAT_COUNT } FlatKind;
+
+// The arrays in the order of the kernels' arguments.
+typedef struct {
+    FlatArray arrays[FLAT_COUNT];
+} FlatScene;
+
+typedef struct {
+    uint32_t width, height, sample_count;
+    bool shift_to_eye; // else positions stay as they are
+    bool wide;         // the kernel's precision is double; else every number is first rounded to float
+} FlattenSettings;
+
+// Every number of the scene is rounded to the kernel's precision once, after the eye's position was subtracted in
+// double; what is derived from numbers (axes, slopes, squares of a checker) is derived from the rounded ones.
+void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings);
+void flat_scene_free(FlatScene *flat);
+
+// Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
+size_t flat_array_size(const FlatArray *array, bool wide);
+void flat_array_write(const FlatArray *array, bool wide, void *target);

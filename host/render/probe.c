@@ -1,0 +1,72 @@
+// Explicit rays.
+#include "host/base/fault.h"
+#include "host/render/renderer_state.h"
+#include <stdlib.h>
+
+enum { PROBE_GROUP = 64, PROBE_RAYS_OF_LAUNCH = 1 << 18, RAY_SCALARS = 8, RESULT_SCALARS = 4 };
+
+static void scalar_set(void *scalars, size_t index, bool wide, double value)
+{
+    if (wide)
+        ((double *)scalars)[index] = value;
+    else
+        ((float *)scalars)[index] = (float)value;
+}
+
+static double scalar_at(const void *scalars, size_t index, bool wide)
+{
+    return wide ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
+}
+
+static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count, ProbeHit *hits)
+{
+    bool wide = renderer->report.wide;
+    size_t scalar = renderer_scalar_size(renderer);
+    void *values = memory_allocate((size_t)count * RAY_SCALARS, scalar);
+    for (uint32_t i = 0; i < count; i++) {
+        const double ray[RAY_SCALARS] = {rays[i].origin[0],    rays[i].origin[1],    rays[i].origin[2],
+                                         rays[i].direction[0], rays[i].direction[1], rays[i].direction[2],
+                                         rays[i].tmin,         rays[i].tmax};
+        for (size_t k = 0; k < RAY_SCALARS; k++)
+            scalar_set(values, i * RAY_SCALARS + k, wide, ray[k]);
+    }
+    Compute *compute = renderer->compute;
+    cl_mem ray_buffer = buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, values, CL_MEM_READ_ONLY);
+    free(values);
+    size_t result_size = (size_t)count * RESULT_SCALARS * scalar, object_size = (size_t)count * sizeof(uint32_t);
+    cl_mem results = buffer_create(compute, result_size, NULL, CL_MEM_WRITE_ONLY);
+    cl_mem objects = buffer_create(compute, object_size, NULL, CL_MEM_WRITE_ONLY);
+
+    cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
+    kernel_argument(kernel, FLAT_COUNT, sizeof(cl_mem), &ray_buffer);
+    kernel_argument(kernel, FLAT_COUNT + 1, sizeof count, &count);
+    kernel_argument(kernel, FLAT_COUNT + 2, sizeof(cl_mem), &results);
+    kernel_argument(kernel, FLAT_COUNT + 3, sizeof(cl_mem), &objects);
+    size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes;
+    size_t local = PROBE_GROUP, global = (items + local - 1) / local * local;
+    renderer_launch(renderer, KERNEL_TRACE, 1, &global, &local);
+
+    const void *result = renderer_map(renderer, results, result_size);
+    const uint32_t *object = renderer_map(renderer, objects, object_size);
+    for (uint32_t i = 0; i < count; i++) {
+        hits[i].object = object[i];
+        hits[i].t = scalar_at(result, (size_t)i * RESULT_SCALARS, wide);
+        for (size_t axis = 0; axis < 3; axis++)
+            hits[i].normal[axis] = scalar_at(result, (size_t)i * RESULT_SCALARS + 1 + axis, wide);
+    }
+    renderer_unmap(renderer, results, result);
+    renderer_unmap(renderer, objects, object);
+    cl_must(clFinish(compute->queue));
+    cl_must(clReleaseMemObject(ray_buffer));
+    cl_must(clReleaseMemObject(results));
+    cl_must(clReleaseMemObject(objects));
+}
+
+void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, ProbeHit *hits)
+{
+    for (size_t first = 0; first < ray_count; first += PROBE_RAYS_OF_LAUNCH) {
+        size_t left = ray_count - first;
+        uint32_t count = left < PROBE_RAYS_OF_LAUNCH ? (uint32_t)left : PROBE_RAYS_OF_LAUNCH;
+        probe_some(renderer, rays + first, count, hits + first);
+    }
+}

@@ -1,0 +1,193 @@
+#include "host/base/array.h"
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/render/renderer_state.h"
+#include <math.h>
+#include <stdlib.h>
+
+const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double"};
+
+static const struct {
+    const char *file, *name;
+} kernel_sources[KERNEL_COUNT] = {
+    [KERNEL_RENDER] = {"render.cl", "render"},
+    [KERNEL_AOV] = {"aov.cl", "aov"},
+    [KERNEL_TRACE] = {"trace.cl", "trace"},
+};
+
+static bool settings_fit(const RenderSettings *settings, const Device *device, MessageList *messages)
+{
+    uint32_t lanes = settings->lanes;
+    if (lanes != 0 && lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16) {
+        message_add(messages, MESSAGE_ERROR, "lanes must be 1, 4, 8 or 16, not %u", lanes);
+        return false;
+    }
+    if (settings->precision == PRECISION_DOUBLE && !device->fp64) {
+        message_add(messages, MESSAGE_ERROR, "precision double: the device \"%s\" has no 64-bit floating point",
+                    device->name);
+        return false;
+    }
+    return true;
+}
+
+static bool array_is_finite(const FlatArray *array, bool wide)
+{
+    double largest = wide ? INFINITY : 3.4028234663852886e38;
+    for (size_t i = 0; i < array->count; i++) {
+        const double *numbers = (const double *)(const void *)((const char *)array->items + i * array->layout.size);
+        for (size_t k = 0; k < 4 * array->layout.scalar4_count; k++)
+            if (!(fabs(numbers[k]) <= largest) || isinf(numbers[k])) return false;
+    }
+    return true;
+}
+
+static bool scene_fits(const FlatScene *flat, const Renderer *renderer, MessageList *messages)
+{
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        if (array_is_finite(&flat->arrays[kind], renderer->report.wide)) continue;
+        message_add(messages, MESSAGE_ERROR, "a number of the scene does not fit precision %s: its magnitude is beyond %s",
+                    precision_names[renderer->settings.precision], renderer->report.wide ? "1.8e308" : "3.4e38");
+        return false;
+    }
+    return true;
+}
+
+static void upload(Renderer *renderer, const FlatScene *flat)
+{
+    bool wide = renderer->report.wide;
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        size_t size = flat_array_size(&flat->arrays[kind], wide);
+        void *bytes = memory_allocate(size + 1, 1);
+        flat_array_write(&flat->arrays[kind], wide, bytes);
+        renderer->arrays[kind] =
+            buffer_create(renderer->compute, size, size > 0 ? bytes : NULL, CL_MEM_READ_ONLY);
+        free(bytes);
+    }
+}
+
+// Everything that tells one variant of the kernel text from another.
+static void prelude_write(Renderer *renderer)
+{
+    Precision precision = renderer->settings.precision;
+    bool correct = renderer->compute->device->correctly_rounded;
+    Text *text = &renderer->prelude;
+    text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
+    text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
+    text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
+    text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
+    text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
+    features_write_prelude(text, renderer->report.features);
+
+    renderer->options = "-cl-std=CL1.2";
+    if (precision == PRECISION_FAST) renderer->options = "-cl-std=CL1.2 -cl-fast-relaxed-math";
+    if (precision == PRECISION_STRICT && correct)
+        renderer->options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
+}
+
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings, MessageList *messages)
+{
+    if (!settings_fit(settings, compute->device, messages)) return NULL;
+    Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
+    renderer->compute = compute;
+    renderer->settings = *settings;
+    renderer->light_count = scene->lights.count;
+    RenderReport *report = &renderer->report;
+    report->wide = settings->precision == PRECISION_DOUBLE;
+    report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->wide);
+    report->features = features_of(scene) | settings->extra_features;
+    report->build_from_cache = true;
+
+    double start = clock_seconds();
+    FlatScene flat;
+    flatten(&flat, scene,
+            &(FlattenSettings){settings->width, settings->height, settings->sample_count, settings->shift_to_eye,
+                               report->wide});
+    report->flatten_seconds = clock_seconds() - start;
+    if (!scene_fits(&flat, renderer, messages)) {
+        flat_scene_free(&flat);
+        free(renderer);
+        return NULL;
+    }
+    start = clock_seconds();
+    upload(renderer, &flat);
+    report->upload_seconds = clock_seconds() - start;
+    flat_scene_free(&flat);
+    prelude_write(renderer);
+    return renderer;
+}
+
+void renderer_close(Renderer *renderer)
+{
+    if (!renderer) return;
+    for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
+        if (!renderer->kernels[kind].kernel) continue;
+        cl_must(clReleaseKernel(renderer->kernels[kind].kernel));
+        program_close(&renderer->kernels[kind].program);
+    }
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        cl_must(clReleaseMemObject(renderer->arrays[kind]));
+    text_free(&renderer->prelude);
+    free(renderer->report.launches.items);
+    free(renderer->report.reads.items);
+    free(renderer);
+}
+
+size_t renderer_scalar_size(const Renderer *renderer)
+{
+    return renderer->report.wide ? sizeof(double) : sizeof(float);
+}
+
+cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
+{
+    KernelSlot *slot = &renderer->kernels[kind];
+    if (slot->kernel) return slot->kernel;
+    slot->request = (ProgramRequest){
+        .root = kernel_sources[kind].file,
+        .prelude = text_c(&renderer->prelude),
+        .options = renderer->options,
+        .no_cache = renderer->settings.no_cache,
+    };
+    program_build(renderer->compute, &slot->request, &slot->program);
+    renderer->report.kernel_hash = slot->program.text_hash;
+    renderer->report.build_seconds += slot->program.build_seconds;
+    renderer->report.build_from_cache &= slot->program.from_cache;
+    cl_int status;
+    slot->kernel = clCreateKernel(slot->program.program, kernel_sources[kind].name, &status);
+    cl_check(status, "clCreateKernel");
+    for (cl_uint i = 0; i < FLAT_COUNT; i++)
+        kernel_argument(slot->kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
+    return slot->kernel;
+}
+
+LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *global,
+                           const size_t *local)
+{
+    KernelSlot *slot = &renderer->kernels[kind];
+    LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, global, local);
+    array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
+    if (!slot->stored) program_store(renderer->compute, &slot->request, &slot->program);
+    slot->stored = true;
+    return time;
+}
+
+const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
+{
+    double start = clock_seconds();
+    cl_event event;
+    cl_int status;
+    const void *mapped =
+        clEnqueueMapBuffer(renderer->compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size, 0, NULL, &event, &status);
+    cl_check(status, "clEnqueueMapBuffer");
+    array_push(renderer->report.reads, ((NamedLaunch){"read-back", event_time(event, start)}));
+    return mapped;
+}
+
+void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped)
+{
+    cl_must(clEnqueueUnmapMemObject(renderer->compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL));
+}
+
+const RenderReport *renderer_report(const Renderer *renderer)
+{
+    return &renderer->report;
+}

@@ -1,0 +1,38 @@
+// The inside of a Renderer, shared by the files of this room.
+#pragma once
+
+#include "host/render/flatten.h"
+#include "host/render/renderer.h"
+
+typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_TRACE, KERNEL_COUNT } KernelKind;
+
+typedef struct {
+    ProgramRequest request;
+    Program program;
+    cl_kernel kernel; // NULL until first asked for
+    bool stored;
+} KernelSlot;
+
+struct Renderer {
+    Compute *compute;
+    RenderSettings settings;
+    RenderReport report;
+    Text prelude;
+    const char *options;
+    cl_mem arrays[FLAT_COUNT];
+    size_t light_count;
+    KernelSlot kernels[KERNEL_COUNT];
+};
+
+size_t renderer_scalar_size(const Renderer *renderer);
+
+// The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first asked for.
+cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
+
+// Launches, notes the time in the report, and has the finished machine code kept after the first launch.
+LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *global,
+                           const size_t *local);
+
+// Maps a buffer for the host to read, noting the time; release with renderer_unmap.
+const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
+void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

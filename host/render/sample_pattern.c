@@ -1,0 +1,33 @@
+#include "host/render/sample_pattern.h"
+
+#include "host/base/fault.h"
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+
+// The R2 sequence, whose steps are the powers of the inverse of the plastic number (Roberts, The unreasonable
+// effectiveness of quasirandom sequences, 2018), moved so that the samples' mean is the pixel's center: a picture does
+// not shift with the number of samples. The few that the move takes out of the pixel stay at its edge.
+void *sample_pattern(uint32_t count, bool wide)
+{
+    const double steps[2] = {0.7548776662466927, 0.5698402909980532};
+    double *offsets = memory_allocate(2 * (size_t)count, sizeof *offsets);
+    for (int axis = 0; axis < 2; axis++) {
+        double mean = 0;
+        for (uint32_t i = 0; i < count; i++) {
+            double place = 0.5 + steps[axis] * i;
+            offsets[2 * i + (uint32_t)axis] = 2 * (place - floor(place)) - 1;
+            mean += offsets[2 * i + (uint32_t)axis] / count;
+        }
+        for (uint32_t i = 0; i < count; i++) {
+            double *offset = &offsets[2 * i + (uint32_t)axis];
+            *offset = fmin(fmax(*offset - mean, -1), 1);
+        }
+    }
+    if (wide) return offsets;
+    float *narrow = memory_allocate(2 * (size_t)count, sizeof *narrow);
+    for (size_t i = 0; i < 2 * (size_t)count; i++)
+        narrow[i] = (float)offsets[i];
+    free(offsets);
+    return narrow;
+}

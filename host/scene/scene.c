@@ -1,0 +1,95 @@
+#include "host/scene/scene.h"
+#include "host/base/array.h"
+#include "host/base/text.h"
+#include "host/scene/scene_build.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+const char *const shape_names[SHAPE_COUNT] = {
+    [SHAPE_SPHERE] = "sphere",     [SHAPE_PLANE] = "plane",       [SHAPE_DISC] = "disc",
+    [SHAPE_BOX] = "box",           [SHAPE_CYLINDER] = "cylinder", [SHAPE_CONE] = "cone",
+    [SHAPE_TRIANGLE] = "triangle",
+};
+
+Material material_default(void)
+{
+    return (Material){.color = {1, 1, 1},
+                      .ambient = 1,
+                      .diffuse = {1, 1, 1},
+                      .shininess = 32,
+                      .ior = 1.5,
+                      .checker_size = 1};
+}
+
+uint32_t scene_add_material(Scene *scene, const Material *material, const char *name)
+{
+    array_push(scene->materials, *material);
+    array_push(scene->material_names, memory_copy_text(name));
+    return (uint32_t)(scene->materials.count - 1);
+}
+
+void scene_add_object(Scene *scene, Object object, const Material *material)
+{
+    object.material = scene_add_material(scene, material, "");
+    array_push(scene->objects, object);
+}
+
+bool scene_finish(Scene *scene, Report *report)
+{
+    if (!report_close(report)) {
+        scene_free(scene);
+        return false;
+    }
+    if (!scene->objects.count)
+        message_add(report->messages, MESSAGE_WARNING, "%s: no objects", report->source->file);
+    if (!scene->lights.count)
+        message_add(report->messages, MESSAGE_WARNING, "%s: no lights", report->source->file);
+    return true;
+}
+
+void scene_free(Scene *scene)
+{
+    for (size_t i = 0; i < scene->material_names.count; i++)
+        free(scene->material_names.items[i]);
+    free(scene->material_names.items);
+    free(scene->lights.items);
+    free(scene->materials.items);
+    free(scene->objects.items);
+    *scene = (Scene){0};
+}
+
+static bool ends_with(const char *path, const char *ending)
+{
+    size_t length = strlen(path), ending_length = strlen(ending);
+    return length > ending_length && !strcasecmp(path + length - ending_length, ending);
+}
+
+static bool scene_read(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
+{
+    if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
+    if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
+    return scene_read_yaml(scene, source, messages);
+}
+
+bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+{
+    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg"};
+    *scene = (Scene){0};
+    bool is_known = false;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        is_known |= ends_with(path, endings[i]);
+    if (!is_known) {
+        message_add(messages, MESSAGE_ERROR, "%s: a scene's name ends in .yaml, .yml, .rt or .cfg", path);
+        return false;
+    }
+    Text text = {0};
+    bool read = text_read_file(&text, path, messages);
+    if (read) {
+        Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+        read = scene_read(scene, &source, options, messages);
+    }
+    text_free(&text);
+    return read;
+}

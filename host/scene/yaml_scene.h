@@ -1,0 +1,18 @@
+// The parts of a native scene, one file each.
+#pragma once
+
+#include "host/scene/scene_build.h"
+#include "host/scene/yaml_fields.h"
+
+// The `materials` mapping; names are known to read_material from then on.
+void yaml_read_materials(YamlReader *reader, const YamlNode *node);
+
+// Reads a material's name or an inline material to a uint32_t, its index.
+FieldReader read_material;
+
+// The material of objects that name none.
+uint32_t material_default_index(YamlReader *reader);
+
+void yaml_read_camera(YamlReader *reader, const YamlNode *node);
+void yaml_read_lights(YamlReader *reader, const YamlNode *node);
+void yaml_read_objects(YamlReader *reader, const YamlNode *node);

@@ -1,0 +1,28 @@
+// What lies behind each pixel's center, in place of its color.
+#include "film.h"
+#include "phong.h"
+
+kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global scalar *normals,
+                global scalar *positions, global int *objects_hit, global int *shadows)
+{
+    Scene scene = SCENE_FROM_ARGUMENTS;
+    SceneHeader frame = *header;
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
+    Tile tile = band_tile(&band);
+    if (!lanes_any(tile.inside)) return;
+
+    Ray ray = camera_ray(&frame, tile.pixels, 0, 0, tile.inside);
+    Hit hit = closest_hit(&scene, &ray);
+    Surface surface = surface_at(&scene, &ray, &hit);
+    const Vector nothing = {(real)(0), (real)(0), (real)(0)};
+    film_store(ts, &tile, 1, 0, lanes_select(surface.found, hit.t, (real)(INFINITY)));
+    film_store_color(normals, &tile, vector_select(surface.found, surface.shading_normal, nothing));
+    film_store_color(positions, &tile, vector_select(surface.found, surface.position, nothing));
+    film_store_integer(objects_hit, &tile, 1, 0, hit.object);
+    uint light_count = frame.picture.w;
+    for (uint i = 0; i < light_count; i++) {
+        mask shadowed;
+        phong_light(&scene, &surface, &ray, i, &shadowed);
+        film_store_integer(shadows, &tile, light_count, i, lanes_select(shadowed, (integer)(1), (integer)(0)));
+    }
+}

@@ -1,0 +1,65 @@
+// A band of the picture's region: which pixels a work-item carries, and where its values go.
+#ifndef FILM_H
+#define FILM_H
+
+#include "camera.h"
+
+typedef struct {
+    uint first_x, first_y, width, height; // in the whole picture
+} Band;
+
+typedef struct {
+    Pixels pixels;
+    mask inside;
+    integer index; // of each pixel within the band
+} Tile;
+
+static inline Tile band_tile(const Band *band)
+{
+    Tile tile;
+    integer x = (integer)((scalar_integer)(get_global_id(0) * TILE_WIDTH)) + LANE_X;
+    integer y = (integer)((scalar_integer)(get_global_id(1) * TILE_HEIGHT)) + LANE_Y;
+    tile.inside = (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
+    tile.index = y * (integer)((scalar_integer)band->width) + x;
+    tile.pixels.x = x + (integer)((scalar_integer)band->first_x);
+    tile.pixels.y = y + (integer)((scalar_integer)band->first_y);
+    return tile;
+}
+
+// Stores or loads one of `stride` values per pixel.
+static inline void film_store(global scalar *film, const Tile *tile, uint stride, uint channel, real value)
+{
+    RealLanes values = {value};
+    IntegerLanes inside = {tile->inside}, index = {tile->index};
+    for (uint lane = 0; lane < LANES; lane++)
+        if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = values.each[lane];
+}
+
+static inline void film_store_integer(global int *film, const Tile *tile, uint stride, uint channel, integer value)
+{
+    IntegerLanes values = {value}, inside = {tile->inside}, index = {tile->index};
+    for (uint lane = 0; lane < LANES; lane++)
+        if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = (int)values.each[lane];
+}
+
+static inline void film_store_color(global scalar *film, const Tile *tile, Vector color)
+{
+    film_store(film, tile, 3, 0, color.x);
+    film_store(film, tile, 3, 1, color.y);
+    film_store(film, tile, 3, 2, color.z);
+}
+
+static inline Vector film_load_color(global const scalar *film, const Tile *tile)
+{
+    RealLanes x = {(real)(0)}, y = x, z = x;
+    IntegerLanes inside = {tile->inside}, index = {tile->index};
+    for (uint lane = 0; lane < LANES; lane++) {
+        if (!inside.each[lane]) continue;
+        x.each[lane] = film[(size_t)index.each[lane] * 3];
+        y.each[lane] = film[(size_t)index.each[lane] * 3 + 1];
+        z.each[lane] = film[(size_t)index.each[lane] * 3 + 2];
+    }
+    return (Vector){x.all, y.all, z.all};
+}
+
+#endif

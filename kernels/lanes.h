@@ -1,0 +1,156 @@
+// All that knows the width: how many rays one work-item carries (LANES), in which precision.
+//
+// Above this file code reads like the scalar algorithm, with a mask where it would branch. A mask is what a
+// comparison gives: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
+#ifndef LANES_H
+#define LANES_H
+
+#pragma OPENCL FP_CONTRACT OFF
+
+#if IS_DOUBLE
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+typedef double scalar;
+typedef double4 scalar4;
+typedef long scalar_integer;
+#define REAL_BASE double
+#define INTEGER_BASE long
+#define UNIT_ROUNDOFF 0x1p-53
+#define LARGEST DBL_MAX
+#define SMALLEST_RATIO 0x1p-1000
+#else
+typedef float scalar;
+typedef float4 scalar4;
+typedef int scalar_integer;
+#define REAL_BASE float
+#define INTEGER_BASE int
+#define UNIT_ROUNDOFF 0x1p-24f
+#define LARGEST FLT_MAX
+#define SMALLEST_RATIO 0x1p-120f
+#endif
+
+#define JOIN_TOKENS(a, b) a##b
+#define JOIN(a, b) JOIN_TOKENS(a, b)
+
+#if LANES == 1
+typedef scalar real;
+typedef scalar_integer integer;
+#define LANES_CONVERT(base) JOIN(convert_, base)
+#define LANES_AS(base) JOIN(as_, base)
+#else
+typedef JOIN(REAL_BASE, LANES) real;
+typedef JOIN(INTEGER_BASE, LANES) integer;
+#define LANES_CONVERT(base) JOIN(JOIN(convert_, base), LANES)
+#define LANES_AS(base) JOIN(JOIN(as_, base), LANES)
+#endif
+
+typedef integer mask;
+
+#define real_from_integer LANES_CONVERT(REAL_BASE)
+#define integer_from_real LANES_CONVERT(INTEGER_BASE)
+#define real_from_bits LANES_AS(REAL_BASE)
+#define bits_from_real LANES_AS(INTEGER_BASE)
+
+// The tile of neighboring pixels that one work-item carries, and each lane's place in it.
+#if LANES == 1
+#define TILE_WIDTH 1
+#define TILE_HEIGHT 1
+#define LANE_X ((integer)(0))
+#define LANE_Y ((integer)(0))
+#elif LANES == 4
+#define TILE_WIDTH 2
+#define TILE_HEIGHT 2
+#define LANE_X ((integer)(0, 1, 0, 1))
+#define LANE_Y ((integer)(0, 0, 1, 1))
+#elif LANES == 8
+#define TILE_WIDTH 4
+#define TILE_HEIGHT 2
+#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
+#elif LANES == 16
+#define TILE_WIDTH 4
+#define TILE_HEIGHT 4
+#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
+#endif
+
+#define lanes_select(condition, yes, no) ((condition) ? (yes) : (no))
+
+static inline mask mask_all(void)
+{
+    return (real)(0) == (real)(0);
+}
+
+static inline mask mask_none(void)
+{
+    return (real)(0) != (real)(0);
+}
+
+#if LANES == 1
+static inline bool lanes_any(mask condition)
+{
+    return condition != 0;
+}
+
+static inline scalar_integer lanes_smallest(integer value)
+{
+    return value;
+}
+#else
+// Halving, written out: compilers turn it into one test of the mask register.
+static inline bool lanes_any(mask condition)
+{
+#if LANES == 16
+    JOIN(INTEGER_BASE, 8) eighth = condition.lo | condition.hi;
+    JOIN(INTEGER_BASE, 4) quarter = eighth.lo | eighth.hi;
+#elif LANES == 8
+    JOIN(INTEGER_BASE, 4) quarter = condition.lo | condition.hi;
+#else
+    JOIN(INTEGER_BASE, 4) quarter = condition;
+#endif
+    JOIN(INTEGER_BASE, 2) half_ = quarter.lo | quarter.hi;
+    return (half_.x | half_.y) != 0;
+}
+
+static inline scalar_integer lanes_smallest(integer value)
+{
+#if LANES == 16
+    JOIN(INTEGER_BASE, 8) eighth = min(value.lo, value.hi);
+    JOIN(INTEGER_BASE, 4) quarter = min(eighth.lo, eighth.hi);
+#elif LANES == 8
+    JOIN(INTEGER_BASE, 4) quarter = min(value.lo, value.hi);
+#else
+    JOIN(INTEGER_BASE, 4) quarter = value;
+#endif
+    JOIN(INTEGER_BASE, 2) half_ = min(quarter.lo, quarter.hi);
+    return min(half_.x, half_.y);
+}
+#endif
+
+static inline bool lanes_all(mask condition)
+{
+    return !lanes_any(!condition);
+}
+
+// Comparisons in place of fmin and fmax: no promise about NaN is needed, and they are one instruction.
+static inline real real_min(real a, real b)
+{
+    return lanes_select(a < b, a, b);
+}
+
+static inline real real_max(real a, real b)
+{
+    return lanes_select(a > b, a, b);
+}
+
+// Lanes as an array, to load and store them one by one.
+typedef union {
+    real all;
+    scalar each[LANES];
+} RealLanes;
+
+typedef union {
+    integer all;
+    scalar_integer each[LANES];
+} IntegerLanes;
+
+#endif

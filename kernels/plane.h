@@ -1,0 +1,49 @@
+// Plane.
+#ifndef PLANE_H
+#define PLANE_H
+
+#include "ray.h"
+
+// t = height / along where that is a number, tested without dividing.
+static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
+{
+    mask hit = ray->active & (fabs(height) * (real)(SMALLEST_RATIO) < fabs(along));
+    *t = real_divide(height, lanes_select(hit, along, (real)(1)));
+    return hit & (*t > ray->near);
+}
+
+// t = n . (p - o) / n . d, the difference taken first. Only n . d = 0 is no hit: a threshold would cut the horizon.
+static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, real *t)
+{
+    real along;
+    real height;
+    if (IS_COMPENSATED) {
+        along = pair_vector_dot_vector(pair_vector_of(normal), ray->direction).high;
+        height = pair_vector_dot_vector(pair_vector_difference(point, ray->origin), normal).high;
+    } else {
+        along = vector_dot(normal, ray->direction);
+        height = vector_dot(normal, vector_subtract(point, ray->origin));
+    }
+    return plane_quotient(height, along, ray, t);
+}
+
+static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
+{
+    return plane_crossing(vector_of(plane->point), vector_of(plane->normal), ray, t);
+}
+
+// The point where the ray crosses a plane, moved onto it once.
+static inline Patch plane_crossing_patch(Vector point, Vector normal, const Ray *ray, real t)
+{
+    Vector unit = vector_normalize(normal);
+    Vector from_point = ray_point_from(ray, point, t);
+    from_point = vector_fma(unit, -vector_dot(unit, from_point), from_point);
+    return patch_make(vector_add(from_point, point), unit, vector_magnitude(from_point) + vector_magnitude(point));
+}
+
+static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)
+{
+    return plane_crossing_patch(vector_of(plane->point), vector_of(plane->normal), ray, t);
+}
+
+#endif

@@ -1,0 +1,106 @@
+// Rays, their hits, and what a surface looks like where one is hit.
+#ifndef RAY_H
+#define RAY_H
+
+#include "vector.h"
+
+#include "types.h"
+
+typedef struct {
+    Vector origin, direction; // the direction need not be unit
+    real squared;             // direction . direction
+    real inverse_squared;
+    real near, far; // hits lie strictly between
+    mask active;    // the lanes that carry a ray at all
+    // for boxes: 1 / direction; 0 where the component is 0
+    Vector inverse;
+    // for triangles: unit vectors across the direction, and along it
+    Vector across_u, across_v, along;
+} Ray;
+
+typedef struct {
+    real t;
+    integer object; // its id; -1: nothing hit
+} Hit;
+
+// A point of a surface. `size` is the magnitude of the numbers the point was computed from: its distance from the
+// true surface is below 16 u size + 4 u |position|.
+typedef struct {
+    Vector position;
+    Vector normal;         // unit, of the geometry, either side
+    Vector shading_normal; // unit; differs on smooth triangles
+    real size;
+} Patch;
+
+static inline real real_inverse_or_zero(real a)
+{
+    mask zero = a == (real)(0);
+    return lanes_select(zero, (real)(0), real_divide((real)(1), lanes_select(zero, (real)(1), a)));
+}
+
+// A frame across a unit vector without a branch (Duff et al., Building an orthonormal basis, revisited, JCGT 6(1),
+// 2017, listing 3).
+static inline void frame_across(Vector unit, Vector *u, Vector *v)
+{
+    real side = lanes_select(unit.z >= (real)(0), (real)(1), (real)(-1));
+    real a = -real_divide((real)(1), side + unit.z);
+    real b = unit.x * unit.y * a;
+    *u = (Vector){fma(side * unit.x * unit.x, a, (real)(1)), side * b, -side * unit.x};
+    *v = (Vector){b, fma(unit.y * unit.y, a, side), -unit.y};
+}
+
+static inline Ray ray_make(Vector origin, Vector direction, real near, real far, mask active)
+{
+    Ray ray;
+    ray.origin = origin;
+    ray.direction = direction;
+    ray.squared = vector_dot(direction, direction);
+    ray.inverse_squared = real_inverse_or_zero(ray.squared);
+    ray.near = near;
+    ray.far = far;
+    ray.active = active & (ray.squared > (real)(0));
+    if (HAS_BOXES)
+        ray.inverse = (Vector){real_inverse_or_zero(direction.x), real_inverse_or_zero(direction.y),
+                               real_inverse_or_zero(direction.z)};
+    if (HAS_TRIANGLES) {
+        ray.along = vector_normalize(direction);
+        frame_across(ray.along, &ray.across_u, &ray.across_v);
+    }
+    return ray;
+}
+
+// The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies before it.
+static inline real ray_first(const Ray *ray, real near_t, real far_t)
+{
+    return lanes_select(near_t > ray->near, near_t, far_t);
+}
+
+static inline Vector ray_point(const Ray *ray, real t)
+{
+    return vector_fma(ray->direction, t, ray->origin);
+}
+
+// The same point as seen from another; compensated, it is as exact as t is, however far the ray has come.
+static inline Vector ray_point_from(const Ray *ray, Vector from, real t)
+{
+    if (!IS_COMPENSATED) return vector_fma(ray->direction, t, vector_subtract(ray->origin, from));
+    PairVector start = pair_vector_difference(ray->origin, from);
+    return (Vector){pair_add(start.x, pair_product(ray->direction.x, t)).high,
+                    pair_add(start.y, pair_product(ray->direction.y, t)).high,
+                    pair_add(start.z, pair_product(ray->direction.z, t)).high};
+}
+
+static inline Patch patch_make(Vector position, Vector normal, real size)
+{
+    return (Patch){position, normal, normal, size};
+}
+
+static inline void patch_keep(Patch *patch, mask where, const Patch *other)
+{
+    patch->position = vector_select(where, other->position, patch->position);
+    patch->normal = vector_select(where, other->normal, patch->normal);
+    patch->shading_normal = vector_select(where, other->shading_normal, patch->shading_normal);
+    patch->size = lanes_select(where, other->size, patch->size);
+}
+
+#endif

@@ -1,0 +1,107 @@
+// What a hit looks like to the lights: its place, its normals, its material.
+#ifndef SURFACE_H
+#define SURFACE_H
+
+#include "scene.h"
+
+typedef Vector Color3;
+
+typedef struct {
+    mask found;
+    Vector position;
+    Vector normal;         // unit, of the geometry, facing the ray
+    Vector shading_normal; // unit, on the same side
+    real error;            // the position is at most this far from the true surface
+    Color3 color, diffuse;
+    real ambient, specular, shininess;
+} Surface;
+
+static inline Patch shape_patch(const Scene *scene, uint kind, uint index, const Ray *ray, real t)
+{
+#define PATCH_OF_SHAPE(feature, Type, name)                                                                  \
+    if (HAS_##feature && kind == KIND_##feature) {                                                           \
+        Type shape = scene->name##s[index];                                                                  \
+        return name##_patch(&shape, ray, t);                                                                 \
+    }
+    SHAPE_LIST(PATCH_OF_SHAPE)
+    return patch_make(ray->origin, ray->direction, (real)(0));
+}
+
+// The checker's square at each point: even or odd. On a plane or disc squares lie in the surface; elsewhere they are
+// cubes in space, looked up a 1024th of a cube behind the surface, so that a face lying on the border between cubes
+// has one color.
+static inline mask checker_odd(const Scene *scene, uint kind, uint index, const Patch *patch, Vector inward,
+                               scalar4 grid)
+{
+    real cells;
+    if (HAS_PLANES && kind == KIND_PLANES) {
+        Plane plane = scene->planes[index];
+        cells = floor(vector_dot(patch->position, vector_of(plane.grid_u)) + (real)(plane.grid_u.w)) +
+                floor(vector_dot(patch->position, vector_of(plane.grid_v)) + (real)(plane.grid_v.w));
+    } else if (HAS_DISCS && kind == KIND_DISCS) {
+        Disc disc = scene->discs[index];
+        cells = floor(vector_dot(patch->position, vector_of(disc.grid_u)) + (real)(disc.grid_u.w)) +
+                floor(vector_dot(patch->position, vector_of(disc.grid_v)) + (real)(disc.grid_v.w));
+    } else {
+        Vector cell = vector_fma(patch->position, (real)(grid.w), vector_of(grid));
+        cell = vector_fma(inward, (real)(0x1p-10f), cell);
+        cells = floor(cell.x) + floor(cell.y) + floor(cell.z);
+    }
+    real halved = cells * (real)(0.5f);
+    return floor(halved) != halved;
+}
+
+// Rays of one tile mostly meet one or two objects: each object among the hits is looked up once, for all its lanes.
+static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *hit)
+{
+    Surface surface;
+    surface.found = hit_found(hit);
+    Patch patch = patch_make(ray->origin, ray->direction, (real)(0));
+    surface.color = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
+    surface.ambient = surface.specular = surface.shininess = (real)(0);
+
+    const integer settled = (integer)(INT_MAX);
+    integer pending = lanes_select(surface.found, hit->object, settled);
+    for (;;) {
+        scalar_integer object = lanes_smallest(pending);
+        if (object == INT_MAX) break;
+        mask same = pending == (integer)(object);
+        pending = lanes_select(same, settled, pending);
+
+        uint4 entry = scene->objects[object].kind_index_material;
+        Patch found = shape_patch(scene, entry.x, entry.y, ray, hit->t);
+        patch_keep(&patch, same, &found);
+
+        Material material = scene->materials[entry.z];
+        Color3 color = vector_of(material.color);
+        if (HAS_CHECKERS && material.grid.w != 0) {
+            mask against = vector_dot(found.normal, ray->direction) > (real)(0);
+            Vector inward = vector_select(against, found.normal, vector_negate(found.normal));
+            mask odd = checker_odd(scene, entry.x, entry.y, &found, inward, material.grid);
+            color = vector_select(odd, vector_of(material.other_color), color);
+        }
+        surface.color = vector_select(same, color, surface.color);
+        surface.diffuse = vector_select(same, vector_of(material.diffuse), surface.diffuse);
+        surface.ambient = lanes_select(same, (real)(material.color.w), surface.ambient);
+        surface.specular = lanes_select(same, (real)(material.diffuse.w), surface.specular);
+        surface.shininess = lanes_select(same, (real)(material.other_color.w), surface.shininess);
+    }
+
+    surface.position = patch.position;
+    mask away = vector_dot(patch.normal, ray->direction) > (real)(0);
+    surface.normal = vector_select(away, vector_negate(patch.normal), patch.normal);
+    mask shading_away = vector_dot(patch.shading_normal, surface.normal) < (real)(0);
+    surface.shading_normal =
+        vector_select(shading_away, vector_negate(patch.shading_normal), patch.shading_normal);
+    surface.error = (real)(UNIT_ROUNDOFF) * fma((real)(16), patch.size, (real)(4) * vector_magnitude(patch.position));
+    return surface;
+}
+
+// Where a ray that leaves the surface on the normal's side starts: off it by twice the bound on the position's
+// error, once for that error and once for the new ray's own test of the same surface.
+static inline Vector surface_leave(const Surface *surface)
+{
+    return vector_fma(surface->normal, surface->error + surface->error, surface->position);
+}
+
+#endif

@@ -1,0 +1,96 @@
+// Triangle, watertight: a ray that meets an edge or a vertex shared by triangles meets one of them.
+//
+// Vertices are taken from the ray's start and turned into a frame whose third axis is the ray; the same vertex gives
+// the same numbers in every triangle. There the signs of three edge functions decide, and product_difference has
+// the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection, JCGT 2(1), 2013; they shear along
+// the direction's largest axis and fall back to double precision where an edge function is 0).
+#ifndef TRIANGLE_H
+#define TRIANGLE_H
+
+#include "plane.h"
+
+typedef struct {
+    real u, v, w;     // edge functions opposite a, b, c; all of one sign inside, edges included
+    real determinant; // their sum
+    real a_depth, b_depth, c_depth; // of the vertices, along the ray
+} TriangleEdges;
+
+static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *ray)
+{
+    Vector a = vector_subtract(vector_of(triangle->a), ray->origin);
+    Vector b = vector_subtract(vector_of(triangle->b), ray->origin);
+    Vector c = vector_subtract(vector_of(triangle->c), ray->origin);
+    real ax = vector_dot(a, ray->across_u), ay = vector_dot(a, ray->across_v);
+    real bx = vector_dot(b, ray->across_u), by = vector_dot(b, ray->across_v);
+    real cx = vector_dot(c, ray->across_u), cy = vector_dot(c, ray->across_v);
+    TriangleEdges edges;
+    edges.u = product_difference(cx, by, cy, bx);
+    edges.v = product_difference(ax, cy, ay, cx);
+    edges.w = product_difference(bx, ay, by, ax);
+    edges.determinant = edges.u + edges.v + edges.w;
+    edges.a_depth = vector_dot(a, ray->along);
+    edges.b_depth = vector_dot(b, ray->along);
+    edges.c_depth = vector_dot(c, ray->along);
+    return edges;
+}
+
+// Compensated: the depth of the triangle's plane, its normal and height in pairs.
+static inline real triangle_plane_depth(const Triangle *triangle, const Ray *ray, real otherwise)
+{
+    Vector a = vector_of(triangle->a);
+    PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
+    PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
+    PairVector normal = {pair_product_difference(ab.y, ac.z, ab.z, ac.y),
+                         pair_product_difference(ab.z, ac.x, ab.x, ac.z),
+                         pair_product_difference(ab.x, ac.y, ab.y, ac.x)};
+    real along = pair_vector_dot_vector(normal, ray->along).high;
+    real height = pair_vector_dot(pair_vector_difference(a, ray->origin), normal).high;
+    real depth;
+    mask crosses = plane_quotient(height, along, ray, &depth);
+    return lanes_select(crosses, depth, otherwise);
+}
+
+// The depth is held between those of the vertices: a sliver seen edge-on would else be hit far outside itself.
+static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
+{
+    TriangleEdges edges = triangle_edges(triangle, ray);
+    const real zero = (real)(0);
+    mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
+    mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
+    mask hit = ray->active & (all_positive | all_negative) & (edges.determinant != zero);
+    if (!lanes_any(hit)) return mask_none();
+
+    real inverse = real_divide((real)(1), lanes_select(hit, edges.determinant, (real)(1)));
+    real depth = fma(edges.u * inverse, edges.a_depth,
+                     fma(edges.v * inverse, edges.b_depth, edges.w * inverse * edges.c_depth));
+    real nearest = real_min(real_min(edges.a_depth, edges.b_depth), edges.c_depth);
+    real farthest = real_max(real_max(edges.a_depth, edges.b_depth), edges.c_depth);
+    if (IS_COMPENSATED) depth = triangle_plane_depth(triangle, ray, depth);
+    depth = real_min(real_max(depth, nearest), farthest);
+    *t = real_divide(depth, real_sqrt(ray->squared));
+    return hit & (*t > ray->near);
+}
+
+static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
+{
+    (void)t;
+    TriangleEdges edges = triangle_edges(triangle, ray);
+    mask degenerate = edges.determinant == (real)(0);
+    real inverse = real_divide((real)(1), lanes_select(degenerate, (real)(1), edges.determinant));
+    real u = edges.u * inverse, v = edges.v * inverse, w = edges.w * inverse;
+    Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
+    Vector normal = vector_normalize(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
+    Vector position = vector_fma(a, u, vector_fma(b, v, vector_scale(c, w)));
+    real size = real_max(real_max(vector_magnitude(a), vector_magnitude(b)), vector_magnitude(c));
+    Patch patch = patch_make(position, normal, size);
+    if (triangle->id.y) {
+        Vector smooth_ = vector_fma(vector_of(triangle->normal_a), u,
+                                    vector_fma(vector_of(triangle->normal_b), v,
+                                               vector_scale(vector_of(triangle->normal_c), w)));
+        mask vanishes = vector_dot(smooth_, smooth_) == (real)(0);
+        patch.shading_normal = vector_select(vanishes, normal, vector_normalize(smooth_));
+    }
+    return patch;
+}
+
+#endif

@@ -1,0 +1,115 @@
+// The flat structs that host and kernels share, one array of them per shape.
+//
+// The kernels see them in their own precision: `scalar` is float or double. The host always writes them in
+// double and narrows an array as it uploads it; that needs one rule: in every struct the scalar4 members come
+// first, the uint4 members last (tests/test_layout.c checks each on the device).
+//
+// Positions are relative to the eye. Axes and normals are the scene's own, scaled by a power of two to a
+// length in 1/2..1, so that they are exact and never overflow.
+#ifndef TYPES_H
+#define TYPES_H
+
+#ifndef __OPENCL_VERSION__
+#include <stdint.h>
+
+typedef struct {
+    _Alignas(32) double x;
+    double y, z, w;
+} scalar4;
+
+typedef struct {
+    _Alignas(16) uint32_t x;
+    uint32_t y, z, w;
+} uint4;
+#endif
+
+typedef struct {
+    scalar4 center_radius; // xyz center, w radius
+    uint4 id;              // x: the object's id
+} Sphere;
+
+typedef struct {
+    scalar4 point;
+    scalar4 normal;
+    scalar4 grid_u, grid_v; // checker squares along the plane: u = xyz . p + w
+    uint4 id;
+} Plane;
+
+typedef struct {
+    scalar4 center_radius;
+    scalar4 normal;
+    scalar4 grid_u, grid_v;
+    uint4 id;
+} Disc;
+
+typedef struct {
+    scalar4 low, high;
+    uint4 id;
+} Box;
+
+// Cylinder and cone: the points with |p x axis| = radius + slope (p . axis), p from the base. Radius and slope
+// are in units of |axis|, so that the axis need not be unit.
+typedef struct {
+    scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
+    scalar4 axis_slope;  // xyz axis, w slope
+    scalar4 range;       // x: p . axis runs from 0 to this where finite; y: |axis|; z: |axis|^2
+    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED
+} Revolution;
+
+enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2 };
+
+typedef Revolution Cylinder; // slope 0
+typedef Revolution Cone;
+
+typedef struct {
+    scalar4 a, b, c;
+    scalar4 normal_a, normal_b, normal_c; // unit, where smooth
+    uint4 id;                             // y: 1 where smooth
+} Triangle;
+
+// Every shape: its feature, its struct, its name. Adding one begins here: docs/adding-a-shape.md.
+// clang-format off
+#define SHAPE_LIST(SHAPE)                \
+    SHAPE(SPHERES,   Sphere,   sphere)   \
+    SHAPE(PLANES,    Plane,    plane)    \
+    SHAPE(DISCS,     Disc,     disc)     \
+    SHAPE(BOXES,     Box,      box)      \
+    SHAPE(CYLINDERS, Cylinder, cylinder) \
+    SHAPE(CONES,     Cone,     cone)     \
+    SHAPE(TRIANGLES, Triangle, triangle)
+// clang-format on
+
+#define SHAPE_KIND(feature, Type, name) KIND_##feature,
+enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
+
+// Where an object's id leads.
+typedef struct {
+    uint4 kind_index_material; // x: KIND_…, y: index in that shape's array, z: index of the material
+} ObjectEntry;
+
+typedef struct {
+    scalar4 color;          // rgb, w: ka
+    scalar4 diffuse;        // kd rgb, w: ks
+    scalar4 other_color;    // the checker's second color, w: shininess
+    scalar4 grid;           // xyz: where the eye stands among the checker's cells, w: cells per unit; 0: plain
+} Material;
+
+enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
+
+typedef struct {
+    scalar4 color;
+    scalar4 position;  // from the eye; point and spot
+    scalar4 direction; // unit, the way the light travels; directional and spot
+    scalar4 cone;      // spot: x: 1 - cos(half-angle), y: 1 - cos(angle - penumbra), z: 1 / (x - y), 0 for a hard edge
+    uint4 kind;        // x: LIGHT_KIND_…
+} Light;
+
+typedef struct {
+    scalar4 background, ambient;
+    // A picture's ray: forward + x right + y up, x and y in half pixels from the picture's center.
+    scalar4 forward, right, up;
+    uint4 picture;   // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 counts[2]; // of each KIND_…, in its order
+} SceneHeader;
+
+#endif

@@ -1,0 +1,58 @@
+#include "tests/child.h"
+
+#include "host/base/fault.h"
+#include <ftw.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+ChildEnd child_run(void (*work)(void *result), void *result, size_t size)
+{
+    ChildEnd end = {.status = -1};
+    void *shared = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    FILE *errors = tmpfile();
+    if (shared == MAP_FAILED || !errors) fault("no memory or file for a child");
+    memcpy(shared, result, size);
+    fflush(NULL);
+    pid_t child = fork();
+    if (child < 0) fault("no child");
+    if (child == 0) {
+        dup2(fileno(errors), STDERR_FILENO);
+        work(shared);
+        fflush(NULL);
+        _exit(0);
+    }
+    int status;
+    if (waitpid(child, &status, 0) == child && WIFEXITED(status)) end.status = WEXITSTATUS(status);
+    rewind(errors);
+    end.errors[fread(end.errors, 1, sizeof end.errors - 1, errors)] = '\0';
+    fclose(errors);
+    memcpy(result, shared, size);
+    munmap(shared, size);
+    return end;
+}
+
+char *scratch_open(void)
+{
+    char folder[] = "/tmp/glint-test-XXXXXX";
+    if (!mkdtemp(folder)) fault("no scratch folder");
+    setenv("XDG_CACHE_HOME", folder, 1);
+    setenv("POCL_CACHE_DIR", folder, 1);
+    setenv("TMPDIR", folder, 1);
+    return memory_copy_text(folder);
+}
+
+static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place)
+{
+    (void)status, (void)kind, (void)place;
+    return remove(path);
+}
+
+void scratch_close(char *folder)
+{
+    nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+    free(folder);
+}

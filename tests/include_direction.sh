@@ -1,0 +1,78 @@
+#!/bin/sh
+# Includes run one way: main, cli, {measure, render}, {scene, opencl, image}, base. A room includes itself and the rooms
+# below it; only render includes the kernels' shared headers; only opencl and render include OpenCL's.
+set -eu
+cd "$(dirname "$0")/.."
+
+# Prints each forbidden include below the folder, as file:line: and what is wrong.
+forbidden_includes() {
+    (cd "$1" && find host kernels -name '*.[ch]' -o -name '*.cl' | sort | xargs grep -nHE '^[ \t]*#[ \t]*include') |
+        awk -F: '
+            BEGIN { level["base"] = 0; level["scene"] = level["opencl"] = level["image"] = 1
+                    level["measure"] = level["render"] = 2; level["cli"] = 3; level["main.c"] = 4 }
+            function wrong(what) { print $1 ":" $2 ": " what }
+            {
+                split($1, source, "/"); split($3, quoted, "[<>\"]"); file = quoted[2]; split(file, target, "/")
+                room = source[2]
+                if (source[1] == "kernels") {
+                    if (file ~ /\//) wrong("a kernel includes " file ", which is not a kernel file")
+                } else if (!(room in level)) wrong("no room is called " room)
+                else if ($3 ~ /</) {
+                    if (target[1] == "CL" && room != "opencl" && room != "render") wrong(room " includes OpenCL")
+                } else if (target[1] == "kernels") {
+                    if (room != "render" || (file != "kernels/types.h" && file != "kernels/features.h"))
+                        wrong(room " includes " file)
+                } else if (target[1] != "host" || !(target[2] in level)) wrong(file " is in no room")
+                else if (room != target[2] && level[target[2]] >= level[room]) wrong(room " includes " target[2])
+            }'
+}
+
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+failed=0
+
+# The check itself: a tree with one include is as allowed as the first argument says.
+expect() {
+    rm -rf "$scratch/tree"
+    mkdir -p "$scratch/tree/kernels" "$scratch/tree/host" "$scratch/tree/$(dirname "$2")"
+    echo "$3" >"$scratch/tree/$2"
+    found=$(forbidden_includes "$scratch/tree")
+    case $1:$found in
+    allowed: | forbidden:?*) ;;
+    *)
+        echo "$2 with $3 should be $1; found: $found"
+        failed=1
+        ;;
+    esac
+}
+
+expect allowed host/main.c '#include "host/cli/commands.h"'
+expect allowed host/cli/render.c '#include "host/render/renderer.h"'
+expect allowed host/render/renderer.c '#include "host/base/text.h"'
+expect allowed host/render/features.h '#include "kernels/features.h"'
+expect allowed host/render/flatten.c '#include <CL/cl.h>'
+expect allowed host/scene/scene.c '#include <stdio.h>'
+expect allowed kernels/render.cl '#include "lanes.h"'
+expect forbidden host/cli/render.c '#include "host/main.c"'
+expect forbidden host/measure/report.c '  #  include "host/cli/commands.h"'
+expect forbidden host/measure/report.c '#include "host/render/renderer.h"'
+expect forbidden host/render/renderer.c '#include "host/measure/report.h"'
+expect forbidden host/render/renderer.c '#include "host/cli/commands.h"'
+expect forbidden host/scene/scene.c '#include "host/opencl/device.h"'
+expect forbidden host/opencl/device.c '#include "host/scene/scene.h"'
+expect forbidden host/image/png.c '#include "host/scene/scene.h"'
+expect forbidden host/base/text.c '#include "host/scene/scene.h"'
+expect forbidden host/base/text.c '#include "text.h"'
+expect forbidden host/scene/scene.c '#include <CL/cl.h>'
+expect forbidden host/measure/report.c '#include <CL/cl.h>'
+expect forbidden host/scene/scene.c '#include "kernels/types.h"'
+expect forbidden host/render/flatten.c '#include "kernels/sphere.h"'
+expect forbidden host/extra/thing.c '#include "host/base/text.h"'
+expect forbidden kernels/types.h '#include "host/base/text.h"'
+
+found=$(forbidden_includes .)
+if [ -n "$found" ]; then
+    echo "$found"
+    failed=1
+fi
+exit $failed

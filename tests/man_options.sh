@@ -1,0 +1,79 @@
+#!/bin/bash
+# The options of each subcommand are the same in its --help, in the man page and in the completions of three shells.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+GLINT=${GLINT:-build/glint}
+"$GLINT" --version >/dev/null
+
+# Options that stand in the text, one a line; all but -h and --help, which every subcommand has.
+options() {
+    { grep -oE '(^|[^a-zA-Z=-])--?[a-zA-Z][a-z-]*' || true; } | sed 's/^[^-]*//; /^-h$/d; /^--help$/d' | sort -u
+}
+
+# Of a help line only what stands before the gap counts: the description may speak of other options.
+in_help() { "$GLINT" "$1" --help 2>&1 | sed -n 's/^ *\(-.*\)/\1/p' | sed 's/  .*//' | options; }
+
+in_man() {
+    sed -n "/^\.SS glint $1\$/,/^\.S[SH]/p" docs/glint.1 | grep '^\\fB\\-' | sed 's/\\f[BIR]//g; s/\\-/-/g' | options
+}
+
+in_bash() { (. tools/completions/glint.bash && _glint_options "$1" | options); }
+
+in_zsh() {
+    sed -n "/^_glint_$1()/,/^}/p" tools/completions/glint.zsh |
+        sed -nE "s/^ *'(\\(.*\\)')?([-{])/\\2/p" | sed 's/\[.*//' | options
+}
+
+in_fish() {
+    { grep -E "__fish_seen_subcommand_from [a-z ]*\<$1\>" tools/completions/glint.fish || true; } |
+        sed -E "s/ -d '.*//; s/^.*seen_subcommand_from[^']*'//; s/ -s ([a-zA-Z])/ -\1/; s/ -l ([a-z])/ --\1/; s/ -[FkrxXa]\>//g" |
+        options
+}
+
+failed=0
+subcommands='render trace check devices'
+for subcommand in $subcommands; do
+    help=$(in_help "$subcommand")
+    if [ -z "$help" ]; then
+        echo "glint $subcommand --help lists no options"
+        failed=1
+        continue
+    fi
+    for place in man bash zsh fish; do
+        if ! difference=$(diff <(echo "$help") <("in_$place" "$subcommand")); then
+            echo "glint $subcommand: --help (<) and $place (>) differ:"
+            echo "$difference" | grep '^[<>]'
+            failed=1
+        fi
+    done
+done
+
+listed=$("$GLINT" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p' | xargs)
+if [ "$listed" != "$subcommands" ]; then
+    echo "glint --help lists the subcommands '$listed'; looked at here, and in the man page: '$subcommands'"
+    failed=1
+fi
+
+# bash's completion at work: $1 is what stands on the line, $2 what it should offer.
+offers() {
+    local offered
+    offered=$(
+        . tools/completions/glint.bash
+        read -ra COMP_WORDS <<<"$1"
+        case $1 in *' ') COMP_WORDS+=('') ;; esac
+        COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
+        _glint
+        echo "${COMPREPLY[*]}"
+    )
+    [ "$offered" = "$2" ] || {
+        echo "completion of '$1' offers '$offered', not '$2'"
+        failed=1
+    }
+}
+offers 'glint r' render
+offers 'glint render --si' --size
+offers 'glint check --le' --lenient
+offers 'glint render --lanes 1' '1 16'
+offers 'glint render --timing = j' json
+offers 'glint render --timing LICEN' LICENSE
+exit $failed

@@ -1,0 +1,102 @@
+// The renderer as tests use it: one device for the whole program, taken as glint takes its own.
+#pragma once
+
+#include "host/render/renderer.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static DeviceList probe_devices;
+static Compute probe_compute;
+
+// For cmocka's group setup and teardown.
+static inline int probe_open(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    device_list_open(&probe_devices);
+    const Device *device = device_choose(&probe_devices, getenv("GLINT_DEVICE"), &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (device == NULL) return -1;
+    compute_open(&probe_compute, device);
+    return 0;
+}
+
+static inline int probe_close(void **state)
+{
+    (void)state;
+    compute_close(&probe_compute);
+    device_list_close(&probe_devices);
+    return 0;
+}
+
+static inline bool probe_has(Precision precision)
+{
+    return precision != PRECISION_DOUBLE || probe_compute.device->fp64;
+}
+
+static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings *settings)
+{
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, scene, settings, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    return renderer;
+}
+
+// Closest hits with every feature built in, so that one program serves all scenes. False where the device
+// cannot, after its reason is printed.
+static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const ProbeRay *rays,
+                               size_t count, ProbeHit *hits)
+{
+    const RenderSettings settings = {.width = 1,
+                                     .height = 1,
+                                     .region_width = 1,
+                                     .region_height = 1,
+                                     .sample_count = 1,
+                                     .precision = precision,
+                                     .lanes = lanes,
+                                     .extra_features = FEATURE_ALL};
+    Renderer *renderer = probe_renderer(scene, &settings);
+    if (renderer == NULL) return false;
+    renderer_trace(renderer, rays, count, hits);
+    renderer_close(renderer);
+    return true;
+}
+
+typedef struct {
+    float *next;
+    size_t row_length;
+} ProbeFilm;
+
+static inline bool probe_keep_band(void *context, const Band *band, double fraction_done)
+{
+    (void)fraction_done;
+    ProbeFilm *film = context;
+    size_t count = band->row_count * film->row_length;
+    memcpy(film->next, band->colors, count * sizeof *film->next);
+    film->next += count;
+    return true;
+}
+
+// The whole picture, one sample a pixel, as glint renders it: built for what the scene needs, seen from the
+// eye.
+static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t height, Precision precision,
+                                float *colors)
+{
+    const RenderSettings settings = {.width = width,
+                                     .height = height,
+                                     .region_width = width,
+                                     .region_height = height,
+                                     .sample_count = 1,
+                                     .precision = precision,
+                                     .shift_to_eye = true};
+    Renderer *renderer = probe_renderer(scene, &settings);
+    if (renderer == NULL) return false;
+    ProbeFilm film = {.row_length = 3 * (size_t)width};
+    film.next = colors;
+    bool whole = renderer_render(renderer, 0, probe_keep_band, &film);
+    renderer_close(renderer);
+    return whole;
+}

@@ -1,0 +1,127 @@
+#include "tests/reference.h"
+#include "tests/reference_quad.h"
+
+// A shadow ray leaves out this part of its way at either end: far over the rounding of quadruple precision,
+// far under any gap that a scene's doubles can express at its own scale.
+#define END_PART ((Quad)1e-12L)
+
+ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
+                                  unsigned row)
+{
+    Quad3 forward = quad3_unit(quad3_subtract(quad3(camera->look_at), quad3(camera->position)));
+    Quad3 right = quad3_cross(forward, quad3_unit(quad3(camera->up)));
+    if (quad3_length(right) < (Quad)1e-12L) right = quad3_cross(forward, quad3_least_axis(forward));
+    right = quad3_unit(right);
+    Quad3 up = quad3_cross(right, forward);
+
+    Quad side = camera->field_axis == FIELD_VERTICAL ? height : width;
+    Quad half_pixel = camera->half_tangent / side;
+    Quad x = ((Quad)2 * column + 1 - width) * half_pixel;
+    Quad y = -((Quad)2 * row + 1 - height) * half_pixel;
+    Quad3 sideways = quad3_add(quad3_scale(right, x), quad3_scale(up, y));
+    return (ReferenceRay){quad3(camera->position), quad3_add(forward, sideways), 0, (Quad)FLT_MAX};
+}
+
+// A point of a surface, the unit normal that faces the eye and the unit direction to the eye.
+typedef struct {
+    Quad3 point, normal, to_eye;
+    Quad scale; // how far the point is from the ray's origin
+    uint32_t object;
+} Surface;
+
+static long double square_of(Quad coordinate, double size, Quad *margin)
+{
+    long double place = (long double)(coordinate / size);
+    *margin = quad_minimum(*margin, 2 * size * quad_absolute(place - roundl(place)));
+    return floorl(place);
+}
+
+// Solids are cut from a checkered block of the world, the cube told a 1024th of its side behind the surface,
+// so that a face between two cubes has one color; planes and discs carry squares of their own.
+static Color checker_color(const Object *object, const Material *material, const ReferenceHit *hit,
+                           Quad3 point, Quad *margin)
+{
+    bool flat = object->kind == SHAPE_PLANE || object->kind == SHAPE_DISC;
+    double size = material->checker_size;
+    long double squares;
+    if (flat) {
+        Vector3 given = object->kind == SHAPE_PLANE ? object->as.plane.normal : object->as.disc.normal;
+        Quad3 normal = quad3_unit(quad3(given));
+        Quad3 along = quad3_beside(normal), across = quad3_cross(normal, along);
+        squares = square_of(quad3_dot(point, along), size, margin) +
+                  square_of(quad3_dot(point, across), size, margin);
+    } else {
+        point = quad3_subtract(point, quad3_scale(hit->normal, size / 1024));
+        squares = square_of(point.x, size, margin) + square_of(point.y, size, margin) +
+                  square_of(point.z, size, margin);
+    }
+    return material->checker_colors[fmodl(squares, 2) != 0];
+}
+
+// Full within angle - penumbra, none beyond the angle, the smooth step 3 x^2 - 2 x^3 of 1 - cos between.
+static Quad spot_factor(const Light *light, Quad3 from_light)
+{
+    const long double degree = acosl(-1) / 180;
+    Quad along = quad3_dot(quad3_unit(quad3(light->direction)), quad3_unit(from_light));
+    Quad versine = 1 - along;
+    Quad outer = 1 - cosl(light->angle * degree);
+    Quad inner = 1 - cosl((light->angle - light->penumbra) * degree);
+    if (versine <= inner) return 1;
+    if (versine >= outer) return 0;
+    Quad x = (outer - versine) / (outer - inner);
+    return x * x * (3 - 2 * x);
+}
+
+static void add_light(const Scene *scene, const Light *light, const Material *material, Color base,
+                      const Surface *surface, ReferenceColor *sum)
+{
+    bool endless = light->kind == LIGHT_DIRECTIONAL;
+    Quad3 way = endless ? quad3_scale(quad3(light->direction), -1)
+                        : quad3_subtract(quad3(light->position), surface->point);
+    Quad3 to_light = quad3_unit(way);
+    Quad facing = quad3_dot(surface->normal, to_light);
+    sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
+    if (facing <= 0) return;
+
+    Quad start = endless ? END_PART * surface->scale / quad3_length(way) : END_PART;
+    ReferenceRay shadow = {surface->point, way, start, endless ? (Quad)LDBL_MAX : 1 - END_PART};
+    bool blocked = false;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        ReferenceHit blocker = reference_hit_object(&scene->objects.items[i], &shadow);
+        // The surface lies against itself; where it shadows itself is told by `facing`.
+        if (i != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
+        blocked = blocked || blocker.found;
+    }
+    if (blocked) return;
+
+    Quad strength = light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(way, -1)) : 1;
+    Quad3 mirrored = quad3_subtract(quad3_scale(surface->normal, 2 * facing), to_light);
+    Quad alignment = quad3_dot(mirrored, surface->to_eye);
+    double diffuse = (double)(strength * facing);
+    double highlight =
+        (double)(strength * powl(alignment > 0 ? (long double)alignment : 0, material->shininess));
+    highlight *= material->specular;
+    sum->color.x += light->color.x * (material->diffuse.x * base.x * diffuse + highlight);
+    sum->color.y += light->color.y * (material->diffuse.y * base.y * diffuse + highlight);
+    sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight);
+}
+
+ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
+{
+    ReferenceHit hit = reference_hit(scene, ray);
+    if (!hit.found) return (ReferenceColor){scene->background, (double)hit.margin};
+
+    const Object *object = &scene->objects.items[hit.object];
+    const Material *material = &scene->materials.items[object->material];
+    Quad length = quad3_length(ray->direction);
+    Surface surface = {reference_point(ray, hit.t), hit.shading_normal,
+                       quad3_scale(ray->direction, -1 / length), hit.t * length, hit.object};
+    Color base = material->color;
+    if (material->checker) base = checker_color(object, material, &hit, surface.point, &hit.margin);
+
+    Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
+    ReferenceColor sum = {vector_scale(ambient, material->ambient), (double)hit.margin};
+    for (size_t i = 0; i < scene->lights.count; i++)
+        add_light(scene, &scene->lights.items[i], material, base, &surface, &sum);
+    return sum;
+}

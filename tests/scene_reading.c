@@ -1,0 +1,81 @@
+#include "tests/scene_reading.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages)
+{
+    Source source = {.file = name, .bytes = text_c(text), .length = text->count};
+    SceneOptions options = {.lenient = lenient};
+    const char *ending = strrchr(name, '.');
+    if (!strcmp(ending, ".rt")) return scene_read_rt(scene, &source, &options, messages);
+    if (!strcmp(ending, ".cfg")) return scene_read_cfg(scene, &source, messages);
+    return scene_read_yaml(scene, &source, messages);
+}
+
+void message_describe(Text *description, const Message *message)
+{
+    if (message->line) text_appendf(description, "%u:%u: ", message->line, message->column);
+    text_appendf(description, "%s: %s\n", message->severity == MESSAGE_ERROR ? "error" : "warning",
+                 message->text);
+}
+
+Text scene_messages(const char *name, const char *text, bool lenient)
+{
+    Text source = {0}, described = {0};
+    text_append(&source, text, strlen(text));
+    MessageList messages = {0};
+    Scene scene;
+    bool read = scene_read_text(&scene, name, &source, lenient, &messages);
+    assert_int_equal(read, message_count(&messages, MESSAGE_ERROR) == 0);
+    for (size_t i = 0; i < messages.count; i++)
+        message_describe(&described, &messages.items[i]);
+    scene_free(&scene);
+    message_list_free(&messages);
+    text_free(&source);
+    return described;
+}
+
+Scene scene_of_file(const char *path)
+{
+    MessageList messages = {0};
+    SceneOptions options = {0};
+    Scene scene;
+    bool read = scene_load(&scene, path, &options, &messages);
+    message_list_print(&messages, stderr);
+    assert_true(read);
+    assert_int_equal(messages.count, 0);
+    return scene;
+}
+
+Scene scene_of_text(const char *name, const char *text)
+{
+    Text source = {0};
+    text_append(&source, text, strlen(text));
+    MessageList messages = {0};
+    Scene scene;
+    bool read = scene_read_text(&scene, name, &source, false, &messages);
+    if (!read) message_list_print(&messages, stderr);
+    assert_true(read);
+    message_list_free(&messages);
+    text_free(&source);
+    return scene;
+}
+
+void check_number(double value, double expected, const char *file, int line)
+{
+    if (fabs(value - expected) <= 1e-14 * fmax(1, fabs(expected))) return;
+    print_error("%.17g, not %.17g\n", value, expected);
+    _fail(file, line);
+}
+
+void check_vector(Vector3 vector, Vector3 expected, const char *file, int line)
+{
+    check_number(vector.x, expected.x, file, line);
+    check_number(vector.y, expected.y, file, line);
+    check_number(vector.z, expected.z, file, line);
+}

@@ -1,0 +1,33 @@
+// Scenes from texts and files, for the tests of the readers.
+#pragma once
+
+#include "host/base/text.h"
+#include "host/scene/scene.h"
+
+// Reads with the reader for the ending of `name`.
+bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages);
+
+// A message as tests write it: `line:column: severity: text`, without a place where it has none.
+void message_describe(Text *description, const Message *message);
+
+// All messages that a text gets, one a line. Whether the scene was read must agree with them.
+Text scene_messages(const char *name, const char *text, bool lenient);
+
+// A scene that must be read without any message; `name` relative to the repository.
+Scene scene_of_file(const char *path);
+// The same from a text.
+Scene scene_of_text(const char *name, const char *text);
+
+void check_number(double value, double expected, const char *file, int line);
+void check_vector(Vector3 vector, Vector3 expected, const char *file, int line);
+
+// Equal but for the rounding of a few operations.
+#define assert_number(value, expected)    check_number(value, expected, __FILE__, __LINE__)
+#define assert_vector(vector, ex, ey, ez) check_vector(vector, (Vector3){ex, ey, ez}, __FILE__, __LINE__)
+
+#define assert_messages(name, text, expected)                                                                \
+    do {                                                                                                     \
+        Text messages_got = scene_messages(name, text, false);                                               \
+        assert_string_equal(text_c(&messages_got), expected);                                                \
+        text_free(&messages_got);                                                                            \
+    } while (0)

@@ -1,0 +1,341 @@
+// Messages with their place, growing text, words near to one another, and output beside its target.
+#include "host/base/array.h"
+#include "host/base/clock.h"
+#include "host/base/output.h"
+#include "host/base/text.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char folder[] = "/tmp/glint-test-XXXXXX";
+
+static int folder_make(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static int folder_remove(void **state)
+{
+    (void)state;
+    return chdir("/") == 0 && rmdir(folder) == 0 ? 0 : -1;
+}
+
+static char *printed(const MessageList *messages)
+{
+    char *bytes = NULL;
+    size_t length = 0;
+    FILE *stream = open_memstream(&bytes, &length);
+    assert_non_null(stream);
+    message_list_print(messages, stream);
+    fclose(stream);
+    return bytes;
+}
+
+static void check_message(const char *bytes, size_t offset, const char *expected)
+{
+    MessageList messages = {0};
+    Source source = {"a.yaml", bytes, strlen(bytes)};
+    message_add_at(&messages, MESSAGE_ERROR, &source, offset, "bad %s", "word");
+    char *text = printed(&messages);
+    assert_string_equal(text, expected);
+    free(text);
+    message_list_free(&messages);
+}
+
+static void test_message_place(void **state)
+{
+    (void)state;
+    check_message("one\ntwo three\n", 8, "a.yaml:2:5: error: bad word\ntwo three\n    ^\n");
+    check_message("one", 0, "a.yaml:1:1: error: bad word\none\n^\n");
+    check_message("one", 99, "a.yaml:1:4: error: bad word\none\n   ^\n");
+    check_message("one\n", 4, "a.yaml:2:1: error: bad word\n\n^\n");
+    check_message("", 0, "a.yaml:1:1: error: bad word\n\n^\n");
+    check_message("one\r\ntwo\r\n", 6, "a.yaml:2:2: error: bad word\ntwo\n ^\n");
+    check_message("\xEF\xBB\xBFone", 4, "a.yaml:1:2: error: bad word\none\n ^\n");
+}
+
+static void test_message_characters(void **state)
+{
+    (void)state;
+    check_message("\ta\tb", 3, "a.yaml:1:4: error: bad word\n\ta\tb\n\t \t^\n");
+    check_message("\xC3\xA9\xE2\x98\x83x", 5, "a.yaml:1:3: error: bad word\n\xC3\xA9\xE2\x98\x83x\n  ^\n");
+    check_message("\x1B[1m\xFF\xC2\x9Bx", 7, "a.yaml:1:7: error: bad word\n?[1m??x\n      ^\n");
+    check_message("\xED\xA0\x80\xC0\xAF.", 5, "a.yaml:1:6: error: bad word\n?????.\n     ^\n");
+}
+
+static void test_message_long_line(void **state)
+{
+    (void)state;
+    char line[1001];
+    memset(line, 'a', 1000);
+    line[1000] = '\0';
+    check_message(line, 500, "a.yaml:1:501: error: bad word\n");
+    char expected[400];
+    snprintf(expected, sizeof expected, "a.yaml:1:1: error: bad word\n%.240s\n^\n", line);
+    check_message(line, 0, expected);
+}
+
+static void test_message_without_place(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    message_add(&messages, MESSAGE_WARNING, "one\n%d\x1B", 2);
+    message_add(&messages, MESSAGE_ERROR, "three");
+    assert_int_equal(message_count(&messages, MESSAGE_WARNING), 1);
+    assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
+    char *text = printed(&messages);
+    assert_string_equal(text, "glint: warning: one?2?\nglint: error: three\n");
+    free(text);
+    message_list_free(&messages);
+    assert_int_equal(messages.count, 0);
+}
+
+static void test_text(void **state)
+{
+    (void)state;
+    Text text = {0};
+    assert_string_equal(text_c(&text), "");
+    text_append(&text, "ab\0c", 4);
+    for (int i = 0; i < 1000; i++)
+        text_appendf(&text, "%03d", i);
+    assert_int_equal(text.count, 3004);
+    assert_memory_equal(text.items, "ab\0c000001", 10);
+    assert_string_equal(text.items + 3001, "999");
+    text_free(&text);
+    assert_null(text.items);
+}
+
+static void test_text_character_size(void **state)
+{
+    (void)state;
+    assert_int_equal(text_character_size("a", 1), 1);
+    assert_int_equal(text_character_size("\xC3\xA9", 2), 2);
+    assert_int_equal(text_character_size("\xC3\xA9", 1), 0);
+    assert_int_equal(text_character_size("\xF4\x8F\xBF\xBF", 4), 4);
+    assert_int_equal(text_character_size("\xF4\x90\x80\x80", 4), 0);
+    assert_int_equal(text_character_size("\xE0\x80\x80", 3), 0);
+    assert_int_equal(text_character_size("\xC1\x81", 2), 0);
+    assert_int_equal(text_character_size("", 0), 0);
+}
+
+static void test_text_nearest(void **state)
+{
+    (void)state;
+    const char *const known[] = {"radius", "center", "material", "color", "up", "angle"};
+    const size_t count = sizeof known / sizeof *known;
+    assert_string_equal(text_nearest("radios", known, count), "radius");
+    assert_string_equal(text_nearest("centre", known, count), "center");
+    assert_string_equal(text_nearest("colour", known, count), "color");
+    assert_string_equal(text_nearest("coolr", known, count), "color");
+    assert_string_equal(text_nearest("meterail", known, count), "material");
+    assert_string_equal(text_nearest("angel", known, count), "angle");
+    assert_string_equal(text_nearest("up", known, count), "up");
+    assert_null(text_nearest("shininess", known, count));
+    assert_null(text_nearest("x", known, count));
+    assert_null(text_nearest("", known, count));
+    assert_null(text_nearest("rad", known, count));
+    assert_null(text_nearest("radius", known, 0));
+}
+
+static void test_array(void **state)
+{
+    (void)state;
+    struct {
+        uint64_t *items;
+        size_t count, capacity;
+    } numbers = {0};
+    for (uint64_t i = 0; i < 5000; i++)
+        array_push(numbers, i * i);
+    assert_int_equal(numbers.count, 5000);
+    assert_true(numbers.capacity >= numbers.count);
+    for (uint64_t i = 0; i < 5000; i++)
+        assert_int_equal(numbers.items[i], i * i);
+    free(numbers.items);
+}
+
+static void test_clock(void **state)
+{
+    (void)state;
+    double last = clock_seconds();
+    for (int i = 0; i < 1000; i++) {
+        double now = clock_seconds();
+        assert_true(now >= last);
+        last = now;
+    }
+}
+
+static void file_write(const char *path, const char *bytes)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_true(fputs(bytes, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void check_content(const char *path, const char *expected)
+{
+    Text text = {0};
+    MessageList messages = {0};
+    assert_true(text_read_file(&text, path, &messages));
+    assert_string_equal(text_c(&text), expected);
+    text_free(&text);
+}
+
+static void check_only_message(MessageList *messages, const char *expected)
+{
+    assert_int_equal(messages->count, 1);
+    assert_string_equal(messages->items[0].text, expected);
+    message_list_free(messages);
+}
+
+static unsigned mode_of(const char *path)
+{
+    struct stat status;
+    assert_int_equal(lstat(path, &status), 0);
+    return status.st_mode & 0777;
+}
+
+static void test_read_failures(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    Text text = {0};
+    assert_false(text_read_file(&text, "nothing", &messages));
+    check_only_message(&messages, "cannot read 'nothing': No such file or directory");
+    assert_false(text_read_file(&text, ".", &messages));
+    check_only_message(&messages, "cannot read '.': Is a directory");
+    text_free(&text);
+}
+
+static void test_output_commit(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    mode_t mask = umask(027);
+    assert_true(output_open(&output, "new", &messages));
+    char temporary[64];
+    snprintf(temporary, sizeof temporary, "%s", output.temporary);
+    assert_int_equal(strncmp(temporary, ".new.", 5), 0);
+    assert_int_equal(access("new", F_OK), -1);
+    assert_true(output_write(&output, "whole", 5, &messages));
+    assert_true(output_commit(&output, &messages));
+    umask(mask);
+    check_content("new", "whole");
+    assert_int_equal(access(temporary, F_OK), -1);
+    assert_int_equal(mode_of("new"), 0640);
+    assert_int_equal(messages.count, 0);
+    unlink("new");
+}
+
+static void test_output_replaces_what_a_link_leads_to(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    file_write("real", "old");
+    assert_int_equal(chmod("real", 0604), 0);
+    assert_int_equal(symlink("real", "link"), 0);
+    assert_true(output_open(&output, "link", &messages));
+    assert_true(output_write(&output, "new", 3, &messages));
+    check_content("link", "old");
+    assert_true(output_commit(&output, &messages));
+    check_content("real", "new");
+    assert_int_equal(mode_of("real"), 0604);
+    struct stat status;
+    assert_int_equal(lstat("link", &status), 0);
+    assert_true(S_ISLNK(status.st_mode));
+    unlink("link");
+    unlink("real");
+}
+
+static void test_output_failures(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    assert_false(output_open(&output, "nowhere/new", &messages));
+    check_only_message(&messages, "cannot create 'nowhere/new': No such file or directory");
+    assert_false(output_open(&output, "/", &messages));
+    check_only_message(&messages, "cannot write '/': Is a directory");
+    assert_false(output_open(&output, "", &messages));
+    check_only_message(&messages, "cannot create '': No such file or directory");
+    assert_true(output_open(&output, "/dev/full", &messages));
+    assert_null(output.temporary);
+    assert_true(output_write(&output, "x", 1, &messages)); // buffered
+    assert_false(output_commit(&output, &messages));
+    check_only_message(&messages, "cannot write '/dev/full': No space left on device");
+    assert_true(output_open(&output, "/dev/null", &messages));
+    assert_true(output_write(&output, "x", 1, &messages));
+    assert_true(output_commit(&output, &messages));
+}
+
+static void test_output_abandon(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    file_write("kept", "old");
+    assert_true(output_open(&output, "kept", &messages));
+    assert_true(output_write(&output, "new", 3, &messages));
+    char temporary[64];
+    snprintf(temporary, sizeof temporary, "%s", output.temporary);
+    assert_int_equal(access(temporary, F_OK), 0);
+    output_abandon(&output);
+    assert_int_equal(access(temporary, F_OK), -1);
+    check_content("kept", "old");
+    unlink("kept");
+}
+
+// A process that faults with a file half written: status 2, the old file whole, nothing beside it (the folder
+// could not be removed at the end otherwise).
+static void test_fault_removes_the_temporary(void **state)
+{
+    (void)state;
+    file_write("kept", "old");
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        MessageList messages = {0};
+        OutputFile output;
+        if (!freopen("/dev/null", "w", stderr) || !output_open(&output, "kept", &messages)) _exit(9);
+        fault("as meant");
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), EXIT_MACHINE);
+    check_content("kept", "old");
+    unlink("kept");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_message_place),
+        cmocka_unit_test(test_message_characters),
+        cmocka_unit_test(test_message_long_line),
+        cmocka_unit_test(test_message_without_place),
+        cmocka_unit_test(test_text),
+        cmocka_unit_test(test_text_character_size),
+        cmocka_unit_test(test_text_nearest),
+        cmocka_unit_test(test_array),
+        cmocka_unit_test(test_clock),
+        cmocka_unit_test(test_read_failures),
+        cmocka_unit_test(test_output_commit),
+        cmocka_unit_test(test_output_replaces_what_a_link_leads_to),
+        cmocka_unit_test(test_output_failures),
+        cmocka_unit_test(test_output_abandon),
+        cmocka_unit_test(test_fault_removes_the_temporary),
+    };
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
+}

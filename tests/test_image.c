@@ -1,0 +1,398 @@
+// Pictures out and in: every format's round trip, notes, and failures that leave the old file as it was.
+#include "host/image/image.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <openexr.h>
+#include <png.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char folder[] = "/tmp/glint-test-XXXXXX";
+static const ImageNote notes[] = {{"Software", "glint 1"}, {"Scene", "caf\xC3\xA9.yaml"}, {NULL, NULL}};
+
+static int folder_make(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static unsigned folder_count(void)
+{
+    unsigned count = 0;
+    DIR *entries = opendir(folder);
+    assert_non_null(entries);
+    for (const struct dirent *entry; (entry = readdir(entries));)
+        count += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
+    closedir(entries);
+    return count;
+}
+
+static int folder_remove(void **state)
+{
+    (void)state;
+    DIR *entries = opendir(folder);
+    for (const struct dirent *entry; entries && (entry = readdir(entries));)
+        unlink(entry->d_name);
+    closedir(entries);
+    return chdir("/") == 0 && rmdir(folder) == 0 ? 0 : -1;
+}
+
+// Values from below 0 to above 1, none of them alike.
+static float *values_make(uint32_t count)
+{
+    float *values = malloc(count * sizeof *values);
+    assert_non_null(values);
+    for (uint32_t i = 0; i < count; i++)
+        values[i] = -0.1F + 1.2F * (float)((i * 7919U) % count) / (float)count;
+    return values;
+}
+
+static void check_no_messages(MessageList *messages)
+{
+    if (messages->count) message_list_print(messages, stderr);
+    assert_int_equal(messages->count, 0);
+}
+
+// Writes in uneven bands, so that a format's own blocks lie across them.
+static void picture_write(const char *path, const ImageHeader *header, const void *values, size_t value_size)
+{
+    MessageList messages = {0};
+    ImageWriter *writer = image_writer_open(path, header, &messages);
+    assert_non_null(writer);
+    uint32_t row = 0;
+    for (uint32_t band = 1; row < header->height; row += band, band += 2) {
+        if (band > header->height - row) band = header->height - row;
+        const char *pixels =
+            (const char *)values + (size_t)row * header->width * header->channels * value_size;
+        assert_true(image_writer_rows(writer, pixels, band, &messages));
+    }
+    assert_true(image_writer_commit(writer, &messages));
+    check_no_messages(&messages);
+}
+
+static Image picture_read(const char *path)
+{
+    MessageList messages = {0};
+    Image image;
+    assert_true(image_read(&image, path, &messages));
+    check_no_messages(&messages);
+    return image;
+}
+
+static void check_display_round_trip(const char *path, uint32_t channels, Transfer transfer, unsigned bits)
+{
+    ImageHeader header = {image_format_of(path), 37, 41, channels, transfer, bits, 'f', notes};
+    uint32_t count = 37 * 41 * channels;
+    float *values = values_make(count);
+    picture_write(path, &header, values, sizeof *values);
+    Image image = picture_read(path);
+    assert_int_equal(image.width, 37);
+    assert_int_equal(image.height, 41);
+    assert_int_equal(image.channels, channels);
+    assert_true(image.display);
+    assert_int_equal(image.transfer, header.format == IMAGE_PNG ? transfer : TRANSFER_NONE);
+    float maximum = bits == 8 ? 255.0F : 65535.0F;
+    for (uint32_t i = 0; i < count; i++)
+        assert_true(image.values[i] == (float)image_quantize(values[i], transfer, bits) / maximum);
+    image_free(&image);
+    free(values);
+}
+
+static void test_display_formats(void **state)
+{
+    (void)state;
+    const char *const paths[] = {"a.png", "a.ppm"};
+    for (size_t i = 0; i < 2; i++) {
+        for (uint32_t channels = 1; channels <= 3; channels += 2) {
+            check_display_round_trip(paths[i], channels, TRANSFER_SRGB, 8);
+            check_display_round_trip(paths[i], channels, TRANSFER_SRGB, 16);
+            check_display_round_trip(paths[i], channels, TRANSFER_NONE, 8);
+            check_display_round_trip(paths[i], channels, TRANSFER_NONE, 16);
+        }
+    }
+}
+
+static void check_float_round_trip(const char *path, uint32_t channels)
+{
+    ImageHeader header = {image_format_of(path), 37, 41, channels, TRANSFER_SRGB, 8, 'f', notes};
+    uint32_t count = 37 * 41 * channels;
+    float *values = values_make(count);
+    values[3] = INFINITY;
+    values[4] = NAN;
+    values[5] = 1e30F;
+    picture_write(path, &header, values, sizeof *values);
+    Image image = picture_read(path);
+    assert_int_equal(image.width, 37);
+    assert_int_equal(image.height, 41);
+    assert_int_equal(image.channels, channels);
+    assert_false(image.display);
+    assert_memory_equal(image.values, values, count * sizeof *values);
+    image_free(&image);
+    free(values);
+}
+
+static void test_float_formats(void **state)
+{
+    (void)state;
+    check_float_round_trip("a.exr", 1);
+    check_float_round_trip("a.exr", 3);
+    check_float_round_trip("a.npy", 1);
+    check_float_round_trip("a.npy", 3);
+    check_float_round_trip("a.npy", 5);
+}
+
+static void test_npy_types(void **state)
+{
+    (void)state;
+    const uint32_t integers[] = {0, 1, 7, 16777216, 4294967040U, 5};
+    ImageHeader header = {IMAGE_NPY, 3, 2, 1, TRANSFER_NONE, 8, 'u', NULL};
+    picture_write("u.npy", &header, integers, sizeof *integers);
+    Image image = picture_read("u.npy");
+    for (int i = 0; i < 6; i++)
+        assert_true(image.values[i] == (float)integers[i]);
+    image_free(&image);
+
+    const double doubles[] = {0.1, -1e300, 3, 4, 5, 6};
+    header.npy_type = 'd';
+    picture_write("d.npy", &header, doubles, sizeof *doubles);
+    image = picture_read("d.npy");
+    assert_true(image.values[0] == 0.1F && image.values[1] == -INFINITY && image.values[5] == 6.0F);
+    image_free(&image);
+}
+
+static void test_npy_bytes(void **state)
+{
+    (void)state;
+    const float value = 1.5F;
+    ImageHeader header = {IMAGE_NPY, 1, 1, 1, TRANSFER_NONE, 8, 'f', NULL};
+    picture_write("b.npy", &header, &value, sizeof value);
+    char bytes[256];
+    FILE *file = fopen("b.npy", "rb");
+    assert_non_null(file);
+    assert_int_equal(fread(bytes, 1, sizeof bytes, file), 132);
+    fclose(file);
+    assert_memory_equal(
+        bytes, "\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': False, 'shape': (1, 1), }",
+        10 + 57);
+    assert_int_equal(bytes[127], '\n');
+    assert_memory_equal(bytes + 128, "\x00\x00\xC0\x3F", 4);
+}
+
+// The chunks in front of the pixels, as libpng sees them.
+static void test_png_notes(void **state)
+{
+    (void)state;
+    ImageHeader header = {IMAGE_PNG, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
+    float *values = values_make(60);
+    picture_write("notes.png", &header, values, sizeof *values);
+    free(values);
+    FILE *file = fopen("notes.png", "rb");
+    assert_non_null(file);
+    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+    png_infop info = png_create_info_struct(png);
+    png_init_io(png, file);
+    png_read_info(png, info); // stops in front of IDAT
+    png_textp texts;
+    int count = 0;
+    assert_int_equal(png_get_text(png, info, &texts, &count), 2);
+    for (int i = 0; i < count; i++) {
+        assert_string_equal(texts[i].key, notes[i].key);
+        assert_string_equal(texts[i].text, notes[i].value);
+    }
+    assert_int_equal(texts[0].compression, PNG_TEXT_COMPRESSION_NONE);
+    assert_int_equal(texts[1].compression, PNG_ITXT_COMPRESSION_NONE);
+    assert_int_not_equal(png_get_valid(png, info, PNG_INFO_sRGB), 0);
+    png_destroy_read_struct(&png, &info, NULL);
+    fclose(file);
+}
+
+static void test_exr_notes(void **state)
+{
+    (void)state;
+    ImageHeader header = {IMAGE_EXR, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
+    float *values = values_make(60);
+    picture_write("notes.exr", &header, values, sizeof *values);
+    free(values);
+    exr_context_t context;
+    assert_int_equal(exr_start_read(&context, "notes.exr", NULL), EXR_ERR_SUCCESS);
+    for (const ImageNote *note = notes; note->key; note++) {
+        char key[64];
+        const char *value;
+        snprintf(key, sizeof key, "glint.%s", note->key);
+        assert_int_equal(exr_attr_get_string(context, 0, key, NULL, &value), EXR_ERR_SUCCESS);
+        assert_string_equal(value, note->value);
+    }
+    exr_compression_t compression;
+    assert_int_equal(exr_get_compression(context, 0, &compression), EXR_ERR_SUCCESS);
+    assert_int_equal(compression, EXR_COMPRESSION_ZIP);
+    assert_int_equal(exr_finish(&context), EXR_ERR_SUCCESS);
+}
+
+static void file_write(const char *path, const char *bytes, size_t length)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, length, file), length);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void check_content(const char *path, const char *expected)
+{
+    char bytes[64] = "";
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    (void)!fread(bytes, 1, sizeof bytes - 1, file);
+    fclose(file);
+    assert_string_equal(bytes, expected);
+}
+
+static const char *const endings[] = {"png", "ppm", "exr", "npy"};
+
+static void test_abandoned_leaves_the_old_file(void **state)
+{
+    (void)state;
+    float *values = values_make(8 * 40 * 3);
+    for (size_t i = 0; i < 4; i++) {
+        char path[16];
+        snprintf(path, sizeof path, "old.%s", endings[i]);
+        file_write(path, "old", 3);
+        unsigned before = folder_count();
+        MessageList messages = {0};
+        ImageHeader header = {image_format_of(path), 8, 40, 3, TRANSFER_SRGB, 8, 'f', notes};
+        ImageWriter *writer = image_writer_open(path, &header, &messages);
+        assert_non_null(writer);
+        assert_true(image_writer_rows(writer, values, 20, &messages));
+        assert_int_equal(folder_count(), before + 1);
+        image_writer_abandon(writer);
+        assert_int_equal(folder_count(), before);
+        check_content(path, "old");
+        check_no_messages(&messages);
+    }
+    free(values);
+}
+
+// Every write to /dev/full fails as on a full disk; enough rows that no buffer holds them all.
+static void test_disk_full(void **state)
+{
+    (void)state;
+    enum { SIDE = 256 };
+    float *values = values_make(SIDE * SIDE * 3);
+    for (size_t i = 0; i < 4; i++) {
+        MessageList messages = {0};
+        ImageHeader header = {image_format_of(endings[i]), SIDE, SIDE, 3, TRANSFER_SRGB, 16, 'f', notes};
+        header.format = (ImageFormat)i;
+        ImageWriter *writer = image_writer_open("/dev/full", &header, &messages);
+        if (writer) {
+            image_writer_rows(writer, values, SIDE, &messages);
+            assert_false(image_writer_commit(writer, &messages));
+        }
+        assert_int_equal(messages.count, 1);
+        assert_string_equal(messages.items[0].text, "cannot write '/dev/full': No space left on device");
+        message_list_free(&messages);
+    }
+    free(values);
+}
+
+static void test_folder_that_is_not_there(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    ImageHeader header = {IMAGE_PNG, 8, 8, 3, TRANSFER_SRGB, 8, 'f', NULL};
+    assert_null(image_writer_open("nowhere/a.png", &header, &messages));
+    assert_int_equal(messages.count, 1);
+    assert_string_equal(messages.items[0].text, "cannot create 'nowhere/a.png': No such file or directory");
+    message_list_free(&messages);
+}
+
+static void test_format_by_ending(void **state)
+{
+    (void)state;
+    assert_int_equal(image_format_of("a.b/c.PNG"), IMAGE_PNG);
+    assert_int_equal(image_format_of("c.ppm"), IMAGE_PPM);
+    assert_int_equal(image_format_of("c.Exr"), IMAGE_EXR);
+    assert_int_equal(image_format_of("c.npy"), IMAGE_NPY);
+    assert_int_equal(image_format_of("png"), IMAGE_UNKNOWN);
+    assert_int_equal(image_format_of("c.png.bak"), IMAGE_UNKNOWN);
+}
+
+static void check_refused(const char *bytes, size_t length, const char *reason)
+{
+    file_write("bad", bytes, length);
+    MessageList messages = {0};
+    Image image;
+    assert_false(image_read(&image, "bad", &messages));
+    assert_null(image.values);
+    assert_int_equal(messages.count, 1);
+    char expected[256];
+    snprintf(expected, sizeof expected, "cannot read 'bad': %s", reason);
+    assert_string_equal(messages.items[0].text, expected);
+    message_list_free(&messages);
+}
+
+#define CHECK_REFUSED(bytes, reason) check_refused(bytes, sizeof(bytes) - 1, reason)
+
+static void test_bad_files(void **state)
+{
+    (void)state;
+    CHECK_REFUSED("", "neither PNG, PPM, EXR nor NPY");
+    CHECK_REFUSED("hello", "neither PNG, PPM, EXR nor NPY");
+    CHECK_REFUSED("P6\n1 x\n255\n", "PPM: the header is damaged");
+    CHECK_REFUSED("P6\n1 1\n70000\nabc", "PPM: the maximum must be 1 to 65535, not 70000");
+    CHECK_REFUSED("P6\n0 1\n255\n", "the picture is empty");
+    CHECK_REFUSED("P6\n2 2\n255\n12345678901", "PPM: the file ends too early");
+    CHECK_REFUSED("P6\n2000000000 2000000000\n255\n123", "the file is too short for its picture");
+    CHECK_REFUSED("P3 1 1 9 1 2 x", "PPM: value 3 of 3 is missing or no number");
+    CHECK_REFUSED("P3 1 1 9 1 12 3", "PPM: value 2, 12, is above the maximum, 9");
+    CHECK_REFUSED("\x93NUMPY\x04\0\0\0", "NPY: the header is damaged");
+    CHECK_REFUSED("\x93NUMPY\x01\0\xFF\0{}", "NPY: the header is damaged");
+    CHECK_REFUSED("\x93NUMPY\x01\0\x02\0{}", "NPY: the type must be <f4, <f8, <u4 or |u1");
+    CHECK_REFUSED("\x93NUMPY\x01\0\x27\0{'descr': '<f4', 'fortran_order': True}",
+                  "NPY: the array must be in C order");
+    CHECK_REFUSED("\x93NUMPY\x01\0\x38\0{'descr':'<f4','fortran_order':False,'shape':(2000, 2)}  ",
+                  "the file is too short for its picture");
+    CHECK_REFUSED("\x93NUMPY\x01\0\x38\0{'descr':'<f4','fortran_order':False,'shape':(5,)}       ",
+                  "NPY: the array must have 2 or 3 dimensions");
+    CHECK_REFUSED("\x89PNG", "PNG: the file ends too early");
+    CHECK_REFUSED("\x89PNGxxxxxxxxxxxxxxx", "PNG: PNG file corrupted by ASCII conversion");
+    CHECK_REFUSED("\x76\x2F\x31\x01", "EXR: the file ends too early");
+}
+
+static void test_text_pixmap(void **state)
+{
+    (void)state;
+    const char bytes[] = "P3 # colors\n# more\n2 1\n4\n0 1 2\n3 4 # last\n1";
+    file_write("text.ppm", bytes, sizeof bytes - 1);
+    Image image = picture_read("text.ppm");
+    assert_int_equal(image.width, 2);
+    assert_int_equal(image.channels, 3);
+    const float expected[] = {0, 0.25F, 0.5F, 0.75F, 1, 0.25F};
+    assert_memory_equal(image.values, expected, sizeof expected);
+    image_free(&image);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_display_formats),
+        cmocka_unit_test(test_float_formats),
+        cmocka_unit_test(test_npy_types),
+        cmocka_unit_test(test_npy_bytes),
+        cmocka_unit_test(test_png_notes),
+        cmocka_unit_test(test_exr_notes),
+        cmocka_unit_test(test_abandoned_leaves_the_old_file),
+        cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_folder_that_is_not_there),
+        cmocka_unit_test(test_format_by_ending),
+        cmocka_unit_test(test_bad_files),
+        cmocka_unit_test(test_text_pixmap),
+    };
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
+}

@@ -1,0 +1,315 @@
+// The structs that host and kernels share lie the same way on both sides: their sizes and the places of their members,
+// as the device's compiler has them in float and in double, and their values after the host's narrowing.
+#include "host/base/fault.h"
+#include "host/opencl/compose.h"
+#include "host/render/flatten.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+// Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the member.
+// REALS are scalar4, INTEGERS uint4.
+// clang-format off
+#define MEMBER_LIST(REALS, INTEGERS)                                             \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, background)                     \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, ambient)                        \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[1])                   \
+    REALS(FLAT_FIRST_SHAPE + KIND_SPHERES, Sphere, Sphere, center_radius)        \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_SPHERES, Sphere, Sphere, id)                \
+    REALS(FLAT_FIRST_SHAPE + KIND_PLANES, Plane, Plane, point)                   \
+    REALS(FLAT_FIRST_SHAPE + KIND_PLANES, Plane, Plane, normal)                  \
+    REALS(FLAT_FIRST_SHAPE + KIND_PLANES, Plane, Plane, grid_u)                  \
+    REALS(FLAT_FIRST_SHAPE + KIND_PLANES, Plane, Plane, grid_v)                  \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_PLANES, Plane, Plane, id)                   \
+    REALS(FLAT_FIRST_SHAPE + KIND_DISCS, Disc, Disc, center_radius)              \
+    REALS(FLAT_FIRST_SHAPE + KIND_DISCS, Disc, Disc, normal)                     \
+    REALS(FLAT_FIRST_SHAPE + KIND_DISCS, Disc, Disc, grid_u)                     \
+    REALS(FLAT_FIRST_SHAPE + KIND_DISCS, Disc, Disc, grid_v)                     \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_DISCS, Disc, Disc, id)                      \
+    REALS(FLAT_FIRST_SHAPE + KIND_BOXES, Box, Box, low)                          \
+    REALS(FLAT_FIRST_SHAPE + KIND_BOXES, Box, Box, high)                         \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_BOXES, Box, Box, id)                        \
+    REALS(FLAT_FIRST_SHAPE + KIND_CYLINDERS, Cylinder, Cylinder, base_radius)    \
+    REALS(FLAT_FIRST_SHAPE + KIND_CYLINDERS, Cylinder, Cylinder, axis_slope)     \
+    REALS(FLAT_FIRST_SHAPE + KIND_CYLINDERS, Cylinder, Cylinder, range)          \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_CYLINDERS, Cylinder, Cylinder, id)          \
+    REALS(FLAT_FIRST_SHAPE + KIND_CONES, Cone, Cone, base_radius)                \
+    REALS(FLAT_FIRST_SHAPE + KIND_CONES, Cone, Cone, axis_slope)                 \
+    REALS(FLAT_FIRST_SHAPE + KIND_CONES, Cone, Cone, range)                      \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_CONES, Cone, Cone, id)                      \
+    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, a)              \
+    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, b)              \
+    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, c)              \
+    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, normal_a)       \
+    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, normal_b)       \
+    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, normal_c)       \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, id)          \
+    INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, other_color)                   \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
+    REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
+    REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
+    REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
+    REALS(FLAT_LIGHTS, Light, FlatLight, cone)                                   \
+    INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)
+// clang-format on
+
+typedef struct {
+    size_t kind;
+    const char *type, *name;
+    size_t host_offset, host_size; // in the host's struct, which is the double kernels'
+    bool integers;
+} Member;
+
+#define REALS_ENTRY(kind, Type, HostType, member)                                                                  \
+    {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), false},
+#define INTEGERS_ENTRY(kind, Type, HostType, member)                                                               \
+    {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), true},
+static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY)};
+enum { MEMBER_COUNT = sizeof members / sizeof *members };
+
+// One object of every shape, so that flatten shows every struct's layout.
+static const char scene_text[] =
+    "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
+    "lights: [{point: {position: [1, 2, 3]}}]\n"
+    "objects:\n"
+    "  - sphere: {center: [0, 0, 0], radius: 1}\n"
+    "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+    "  - disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}\n"
+    "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
+    "  - cylinder: {from: [0, 0, 0], to: [0, 1, 0], radius: 1}\n"
+    "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
+    "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}\n";
+
+static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
+{
+    Scene scene = scene_of_text("layout.yaml", scene_text);
+    FlatScene flat;
+    flatten(&flat, &scene, &(FlattenSettings){1, 1, 1, true, wide});
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        assert_true(flat.arrays[kind].count > 0);
+        layouts[kind] = flat.arrays[kind].layout;
+    }
+    flat_scene_free(&flat);
+    scene_free(&scene);
+}
+
+// The test's own kernels behind lanes.h and types.h: what the device thinks of each member, and its value in the second
+// struct of an array.
+static void kernels_write(Text *text)
+{
+    text_appendf(text, "#include \"lanes.h\"\n#include \"types.h\"\n"
+                       "kernel void layout(global uint *sizes, global uint *offsets, uint unused)\n{\n");
+    for (size_t i = 0; i < MEMBER_COUNT; i++)
+        text_appendf(text,
+                     "    { %s s; sizes[%zu] = sizeof(s);\n"
+                     "      offsets[%zu] = (uint)((private char *)&s.%s - (private char *)&s); }\n",
+                     members[i].type, i, i, members[i].name);
+    text_appendf(text, "}\n"
+                       "kernel void member(global const uint4 *items, global void *values, uint which)\n{\n"
+                       "    switch (which) {\n");
+    for (size_t i = 0; i < MEMBER_COUNT; i++)
+        text_appendf(text, "    case %zu: vstore4(((global const %s *)items)[1].%s, 0, (global %s *)values); break;\n", i,
+                     members[i].type, members[i].name, members[i].integers ? "uint" : "scalar");
+    text_appendf(text, "    }\n}\n");
+}
+
+static cl_program program_make(bool wide)
+{
+    size_t file_count = 0;
+    while (kernel_files[file_count].name)
+        file_count++;
+    KernelFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
+    memcpy(files, kernel_files, file_count * sizeof *files);
+    Text text = {0};
+    kernels_write(&text);
+    files[file_count] = (KernelFile){"layout.cl", text_c(&text)};
+    const char *prelude = wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
+    char *composed = kernel_compose(files, "layout.cl", prelude, NULL);
+    assert_non_null(composed);
+    const char *source = composed;
+    cl_int status;
+    cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
+    cl_check(status, "clCreateProgramWithSource");
+    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, "-cl-std=CL1.2", NULL, NULL));
+    free(composed);
+    text_free(&text);
+    free(files);
+    return program;
+}
+
+// Runs a kernel of two buffers and a number; both buffers are written back.
+static void kernel_run(cl_program program, const char *name, void *first, size_t first_size, void *second,
+                       size_t second_size, uint32_t number)
+{
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program, name, &status);
+    cl_check(status, "clCreateKernel");
+    cl_mem buffers[] = {buffer_create(&probe_compute, first_size, first, CL_MEM_READ_WRITE),
+                        buffer_create(&probe_compute, second_size, second, CL_MEM_READ_WRITE)};
+    kernel_argument(kernel, 0, sizeof(cl_mem), &buffers[0]);
+    kernel_argument(kernel, 1, sizeof(cl_mem), &buffers[1]);
+    kernel_argument(kernel, 2, sizeof number, &number);
+    const size_t one = 1;
+    kernel_launch(&probe_compute, kernel, 1, &one, &one);
+    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[0], CL_TRUE, 0, first_size, first, 0, NULL, NULL));
+    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[1], CL_TRUE, 0, second_size, second, 0, NULL, NULL));
+    cl_must(clReleaseMemObject(buffers[0]));
+    cl_must(clReleaseMemObject(buffers[1]));
+    cl_must(clReleaseKernel(kernel));
+}
+
+// Where the rule of types.h puts a member: scalar4 members first, as many bytes as the kernel's four numbers have.
+static size_t member_offset(const Member *member, const FlatLayout *layout, bool wide)
+{
+    if (wide) return member->host_offset;
+    size_t reals_size = layout->scalar4_count * sizeof(scalar4);
+    if (!member->integers) return member->host_offset / 2;
+    return member->host_offset - reals_size / 2;
+}
+
+static void layout_check(bool wide)
+{
+    FlatLayout layouts[FLAT_COUNT];
+    layouts_of_host(layouts, wide);
+    cl_program program = program_make(wide);
+    uint32_t sizes[MEMBER_COUNT] = {0}, offsets[MEMBER_COUNT] = {0};
+    kernel_run(program, "layout", sizes, sizeof sizes, offsets, sizeof offsets, 0);
+    for (size_t i = 0; i < MEMBER_COUNT; i++) {
+        const FlatArray one = {NULL, 1, layouts[members[i].kind]};
+        size_t size = flat_array_size(&one, wide), offset = member_offset(&members[i], &one.layout, wide);
+        if (sizes[i] != size) fail_msg("sizeof(%s): %u on the device, %zu here", members[i].type, sizes[i], size);
+        if (offsets[i] != offset)
+            fail_msg("%s.%s: at %u on the device, at %zu here", members[i].type, members[i].name, offsets[i], offset);
+    }
+    cl_must(clReleaseProgram(program));
+}
+
+// Numbers that no two places share and that float holds exactly.
+static double real_at(size_t member, size_t component)
+{
+    return (double)(8 * member + component) + 0.25;
+}
+
+static uint32_t integer_at(size_t member, size_t component)
+{
+    return (uint32_t)(0x80000000u + 8 * member + component);
+}
+
+// Two structs with every member of the kind set in the second.
+static FlatArray array_fill(size_t kind, const FlatLayout *layout)
+{
+    FlatArray array = {aligned_alloc(64, (2 * layout->size + 63) / 64 * 64), 2, *layout};
+    assert_non_null(array.items);
+    memset(array.items, 0, 2 * layout->size);
+    for (size_t i = 0; i < MEMBER_COUNT; i++) {
+        if (members[i].kind != kind) continue;
+        char *place = (char *)array.items + layout->size + members[i].host_offset;
+        for (size_t k = 0; k < 4; k++) {
+            if (members[i].integers)
+                ((uint32_t *)(void *)place)[k] = integer_at(i, k);
+            else
+                ((double *)(void *)place)[k] = real_at(i, k);
+        }
+    }
+    return array;
+}
+
+static void member_check(cl_program program, size_t index, void *bytes, size_t size, bool wide)
+{
+    union {
+        double wide[4];
+        float narrow[4];
+        uint32_t integers[4];
+    } values = {{0}};
+    kernel_run(program, "member", bytes, size, &values, sizeof values, (uint32_t)index);
+    for (size_t k = 0; k < 4; k++) {
+        bool equal = members[index].integers ? values.integers[k] == integer_at(index, k)
+                     : wide                  ? values.wide[k] == real_at(index, k)
+                                             : (double)values.narrow[k] == real_at(index, k);
+        if (!equal)
+            fail_msg("%s.%s, component %zu: what the host uploaded is not what the device reads", members[index].type,
+                     members[index].name, k);
+    }
+}
+
+static void values_check(bool wide)
+{
+    FlatLayout layouts[FLAT_COUNT];
+    layouts_of_host(layouts, wide);
+    cl_program program = program_make(wide);
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        FlatArray array = array_fill(kind, &layouts[kind]);
+        size_t size = flat_array_size(&array, wide);
+        char *bytes = memory_allocate(size, 1);
+        flat_array_write(&array, wide, bytes);
+        for (size_t i = 0; i < MEMBER_COUNT; i++)
+            if (members[i].kind == kind) member_check(program, i, bytes, size, wide);
+        free(bytes);
+        free(array.items);
+    }
+    cl_must(clReleaseProgram(program));
+}
+
+// The list above misses no member: together they fill their struct.
+static void list_is_complete(void **state)
+{
+    (void)state;
+    FlatLayout layouts[FLAT_COUNT];
+    layouts_of_host(layouts, true);
+    size_t filled[FLAT_COUNT] = {0};
+    for (size_t i = 0; i < MEMBER_COUNT; i++)
+        filled[members[i].kind] += members[i].host_size;
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        size_t padding = layouts[kind].size - filled[kind];
+        if (filled[kind] > layouts[kind].size || padding >= sizeof(scalar4))
+            fail_msg("flat kind %zu: members of %zu bytes listed, the struct has %zu", kind, filled[kind],
+                     layouts[kind].size);
+    }
+}
+
+static void layout_in_float(void **state)
+{
+    (void)state;
+    layout_check(false);
+}
+
+static void layout_in_double(void **state)
+{
+    (void)state;
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    layout_check(true);
+}
+
+static void values_in_float(void **state)
+{
+    (void)state;
+    values_check(false);
+}
+
+static void values_in_double(void **state)
+{
+    (void)state;
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    values_check(true);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(list_is_complete), cmocka_unit_test(layout_in_float),  cmocka_unit_test(layout_in_double),
+        cmocka_unit_test(values_in_float),  cmocka_unit_test(values_in_double),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}

@@ -1,0 +1,106 @@
+// The composed kernel text, its hash, and the judgement of event times: all without a device.
+#include "host/opencl/compose.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static const KernelFile files[] = {
+    {"root.cl", "// root\n#include \"a.h\"\n  #  include \"kernels/b.h\" // again\n#include \"a.h\"\nlast"},
+    {"a.h", "first of a\n#include \"b.h\"\nlast of a\n"},
+    {"b.h", "#include <stdint.h>\n#include \"a.h\"\n// #include \"none.h\"\n#included \"x\"\nb\n"},
+    {"lost.cl", "#include \"gone.h\"\n"},
+    {NULL, NULL},
+};
+
+static void test_each_include_once(void **state)
+{
+    (void)state;
+    char *text = kernel_compose(files, "root.cl", "#define X 1", NULL);
+    assert_string_equal(text, "#line 1 \"prelude\"\n#define X 1\n"
+                              "#line 1 \"root.cl\"\n// root\n"
+                              "#line 1 \"a.h\"\nfirst of a\n"
+                              "#line 1 \"b.h\"\n#include <stdint.h>\n"
+                              "\n#line 3 \"b.h\"\n// #include \"none.h\"\n#included \"x\"\nb\n"
+                              "#line 3 \"a.h\"\nlast of a\n"
+                              "#line 3 \"root.cl\"\n"
+                              "\n#line 4 \"root.cl\"\n"
+                              "\n#line 5 \"root.cl\"\nlast\n");
+    free(text);
+}
+
+static void test_missing_files(void **state)
+{
+    (void)state;
+    char *missing = NULL;
+    assert_null(kernel_compose(files, "lost.cl", "", &missing));
+    assert_string_equal(missing, "gone.h");
+    free(missing);
+    assert_null(kernel_compose(files, "root", "", &missing));
+    assert_string_equal(missing, "root");
+    free(missing);
+    assert_null(kernel_compose(files, "lost.cl", "", NULL));
+    assert_null(program_text("no such file", ""));
+}
+
+static void test_every_embedded_file_composes(void **state)
+{
+    (void)state;
+    for (const KernelFile *file = kernel_files; file->name; file++) {
+        char *text = program_text(file->name, "");
+        if (!text) print_error("%s\n", file->name);
+        assert_non_null(text);
+        assert_null(strstr(text, "\n#include \""));
+        free(text);
+    }
+}
+
+// Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".
+static void test_hash(void **state)
+{
+    (void)state;
+    assert_true(hash_bytes(HASH_START, "", 0) == UINT64_C(0xcbf29ce484222325));
+    assert_true(hash_bytes(HASH_START, "a", 1) == UINT64_C(0xaf63dc4c8601ec8c));
+    assert_true(hash_bytes(HASH_START, "foobar", 6) == UINT64_C(0x85944171f73967e8));
+    assert_true(hash_bytes(hash_bytes(HASH_START, "foo", 3), "bar", 3) == UINT64_C(0x85944171f73967e8));
+}
+
+static void test_event_times(void **state)
+{
+    (void)state;
+    static const struct {
+        cl_ulong queued, start, end;
+        double host, resolution, seconds;
+        bool trusted;
+    } cases[] = {
+        {1000, 2000, 1002000, 2e-3, 1e-9, 1e-3, true},    // within what the host saw
+        {0, 0, 0, 2e-3, 1e-9, 0, false},                  // a runtime that reports zeros
+        {1000, 0, 5000, 2e-3, 1e-9, 0, false},            // one that forgets the start
+        {1000, 5000, 4000, 2e-3, 1e-9, 0, false},         // end before start
+        {1000, 5000, 5000, 2e-3, 1e-9, 0, false},         // no time at all
+        {1000, 2000, 1002000, 0.995e-3, 0, 1e-3, true},   // 0.5 % longer
+        {1000, 2000, 1002000, 0.98e-3, 0, 1e-3, false},   // 2 % longer
+        {1000, 2000, 1002000, 0.98e-3, 1e-4, 1e-3, true}, // the same with a coarse timer
+        {0, 2000, 1002000, 2e-3, 1e-9, 1e-3, true},       // only the queue's moment is missing
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        LaunchTime time = launch_time_judge(cases[i].queued, cases[i].start, cases[i].end, cases[i].host,
+                                            cases[i].resolution);
+        assert_float_equal(time.event_seconds, cases[i].seconds, 1e-12);
+        assert_int_equal(time.trusted, cases[i].trusted);
+        assert_true(time.host_seconds == cases[i].host);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_each_include_once),
+        cmocka_unit_test(test_missing_files),
+        cmocka_unit_test(test_every_embedded_file_composes),
+        cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_event_times),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

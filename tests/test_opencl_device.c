@@ -1,0 +1,187 @@
+// Choice among fabricated devices, and the list of the real ones.
+#include "host/opencl/device.h"
+#include "tests/child.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static Device fabricated(unsigned index, cl_device_type type, const char *name, const char *platform)
+{
+    return (Device){
+        .index = index,
+        .type = type,
+        .name = (char *)(uintptr_t)name,
+        .platform_name = (char *)(uintptr_t)platform,
+        .available = true,
+        .compiler = true,
+        .little_endian = true,
+        .native_float_width = 8,
+        .native_double_width = 4,
+        .fp64 = true,
+    };
+}
+
+typedef struct {
+    Device items[6];
+    DeviceList list;
+} Machine;
+
+// A CPU, an accelerator, a GPU without a compiler, two usable GPUs, a CPU of another make.
+static void machine_fill(Machine *machine)
+{
+    Device *items = machine->items;
+    items[0] = fabricated(0, CL_DEVICE_TYPE_CPU, "pthread-haswell", "Portable Computing Language");
+    items[1] = fabricated(1, CL_DEVICE_TYPE_ACCELERATOR, "Tile Board", "Acme");
+    items[2] = fabricated(2, CL_DEVICE_TYPE_GPU, "Iris Mute", "Acme");
+    items[2].compiler = false;
+    items[3] = fabricated(3, CL_DEVICE_TYPE_GPU, "Force RTX 3090", "Vendor CUDA");
+    items[4] = fabricated(4, CL_DEVICE_TYPE_GPU, "Force RTX 3090", "Vendor CUDA");
+    items[4].twin = 1;
+    items[5] = fabricated(5, CL_DEVICE_TYPE_CPU, "Xeon", "Acme");
+    machine->list = (DeviceList){.items = items, .count = 6, .platform_count = 3};
+}
+
+static void test_choice(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *wish;
+        int index;
+    } cases[] = {
+        {NULL, 3},   {"gpu", 3},    {"GPU", 3},  {"cpu", 0},     {"Cpu", 0},      {"0", 0},
+        {"4", 4},    {"5", 5},      {"3090", 3}, {"force", 3},   {"haswell", 0},  {"portable", 0},
+        {"XEON", 5}, {"tile", 1},   {"acme", 5}, {"2", -1},      {"mute", -1},    {"nonsense", -1},
+        {"6", -1},   {"-1", -1},    {"00", 0},   {"0x0", -1},    {"99999999999999999999999", -1},
+    };
+    Machine machine;
+    machine_fill(&machine);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        MessageList messages = {0};
+        const Device *device = device_choose(&machine.list, cases[i].wish, &messages);
+        int index = device ? (int)device->index : -1;
+        if (index != cases[i].index) print_error("wish %s\n", cases[i].wish ? cases[i].wish : "NULL");
+        assert_int_equal(index, cases[i].index);
+        assert_int_equal(message_count(&messages, MESSAGE_ERROR), index < 0);
+        if (index < 0) {
+            assert_non_null(strstr(messages.items[0].text, cases[i].wish));
+            assert_non_null(strstr(messages.items[0].text, "2 (Iris Mute, gpu, unusable: no compiler)"));
+        }
+        message_list_free(&messages);
+    }
+}
+
+static void test_choice_falls_back(void **state)
+{
+    (void)state;
+    Machine machine;
+    machine_fill(&machine);
+    MessageList messages = {0};
+    machine.list.count = 3;
+    assert_int_equal(device_choose(&machine.list, NULL, &messages)->index, 0);
+    machine.items[0].available = false;
+    assert_int_equal(device_choose(&machine.list, NULL, &messages)->index, 1);
+    machine.items[1].little_endian = false;
+    assert_null(device_choose(&machine.list, NULL, &messages));
+    assert_non_null(strstr(messages.items[0].text, "unusable: big-endian"));
+    machine.list.count = 0;
+    assert_null(device_choose(&machine.list, NULL, &messages));
+    assert_non_null(strstr(messages.items[1].text, "pocl-opencl-icd"));
+    message_list_free(&messages);
+}
+
+static void test_lanes(void **state)
+{
+    (void)state;
+    static const unsigned cases[][2] = {{1, 1}, {2, 1}, {3, 1}, {4, 4}, {8, 8}, {12, 8}, {16, 16}, {64, 16}};
+    Device device = fabricated(0, CL_DEVICE_TYPE_CPU, "", "");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        device.native_float_width = cases[i][0];
+        device.native_double_width = cases[i][0] / 2;
+        assert_int_equal(device_lanes(&device, false), cases[i][1]);
+        device.native_double_width = cases[i][0];
+        assert_int_equal(device_lanes(&device, true), cases[i][1]);
+    }
+    device.type = CL_DEVICE_TYPE_GPU;
+    assert_int_equal(device_lanes(&device, false), 1);
+}
+
+static void test_wish(void **state)
+{
+    (void)state;
+    unsetenv("GLINT_DEVICE");
+    assert_null(device_wish(NULL));
+    setenv("GLINT_DEVICE", "", 1);
+    assert_null(device_wish(NULL));
+    setenv("GLINT_DEVICE", "cpu", 1);
+    assert_string_equal(device_wish(NULL), "cpu");
+    assert_string_equal(device_wish("gpu"), "gpu");
+    unsetenv("GLINT_DEVICE");
+}
+
+typedef struct {
+    size_t count;
+    bool sound;
+} ListFacts;
+
+static void list_look(void *result)
+{
+    ListFacts *facts = result;
+    DeviceList list;
+    device_list_open(&list);
+    facts->count = list.count;
+    facts->sound = list.empty_platform_count <= list.platform_count;
+    for (size_t i = 0; i < list.count; i++) {
+        const Device *device = &list.items[i];
+        unsigned twins_before = 0;
+        for (size_t j = 0; j < i; j++)
+            twins_before += list.items[j].platform == device->platform &&
+                            strcmp(list.items[j].name, device->name) == 0;
+        facts->sound &= device->index == i && device->name[0] != '\0' && device->platform_name[0] != '\0' &&
+                        device->compute_units > 0 && device->native_float_width > 0 &&
+                        (device->native_double_width > 0) == device->fp64 && device->memory_bytes > 0 &&
+                        device->twin == twins_before;
+    }
+    device_list_close(&list);
+    device_list_close(&list);
+}
+
+static void test_list_of_this_machine(void **state)
+{
+    (void)state;
+    ListFacts facts = {0};
+    assert_int_equal(child_run(list_look, &facts, sizeof facts).status, 0);
+    assert_true(facts.count > 0);
+    assert_true(facts.sound);
+}
+
+static void test_list_without_platforms(void **state)
+{
+    (void)state;
+    const char *before = getenv("OCL_ICD_VENDORS");
+    char *kept = before ? strdup(before) : NULL;
+    char *empty = scratch_open();
+    setenv("OCL_ICD_VENDORS", empty, 1);
+    ListFacts facts = {.count = 99};
+    assert_int_equal(child_run(list_look, &facts, sizeof facts).status, 0);
+    assert_int_equal(facts.count, 0);
+    assert_true(facts.sound);
+    unsetenv("OCL_ICD_VENDORS");
+    if (kept) setenv("OCL_ICD_VENDORS", kept, 1);
+    free(kept);
+    scratch_close(empty);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_choice),
+        cmocka_unit_test(test_choice_falls_back),
+        cmocka_unit_test(test_lanes),
+        cmocka_unit_test(test_wish),
+        cmocka_unit_test(test_list_of_this_machine),
+        cmocka_unit_test(test_list_without_platforms),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,322 @@
+// The reference itself, against roots known by hand or from certified interval arithmetic.
+#include "tests/reference.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#define MISS                                    NAN
+#define assert_near(value, expected, tolerance) assert_true(fabs((value) - (expected)) <= (tolerance))
+#define COUNT(array)                            (sizeof(array) / sizeof *(array))
+
+typedef struct {
+    const char *name;
+    Object object;
+    Vector3 origin, direction;
+    double t; // MISS: none
+} Known;
+
+static Object sphere(Vector3 center, double radius)
+{
+    return (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, radius}};
+}
+
+static Object cylinder(Vector3 from, Vector3 axis, double radius, bool finite, bool caps)
+{
+    return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {from, axis, radius, finite, caps}};
+}
+
+static Object frustum(double first, double second, bool caps)
+{
+    return (Object){.kind = SHAPE_CONE, .as.cone = {{0, 0, 0}, {0, 0, 2}, {first, second}, 0, true, caps}};
+}
+
+static Object endless_cone(double slope)
+{
+    return (Object){.kind = SHAPE_CONE, .as.cone = {.axis = {0, 0, 1}, .slope = slope}};
+}
+
+static Object triangle(double side)
+{
+    return (Object){.kind = SHAPE_TRIANGLE, .as.triangle.vertices = {{0, 0, 0}, {side, 0, 0}, {0, side, 0}}};
+}
+
+static void check(const Known *known, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        Object object = reference_round_object(&known[i].object);
+        ReferenceRay ray = reference_ray_rounded(known[i].origin, known[i].direction);
+        ReferenceHit hit = reference_hit_object(&object, &ray);
+        double t = hit.found ? (double)hit.t : MISS;
+        bool right = isnan(known[i].t) ? !hit.found : fabs(t - known[i].t) <= 2e-13 * known[i].t;
+        if (!right) fail_msg("%s, row %zu: t = %.17g, not %.17g", known[i].name, i, t, known[i].t);
+        if (!hit.found) continue;
+        Quad3 n = hit.normal;
+        assert_true(fabs((double)(n.x * n.x + n.y * n.y + n.z * n.z - 1)) < 1e-28);
+        assert_true(n.x * ray.direction.x + n.y * ray.direction.y + n.z * ray.direction.z <= 0);
+    }
+}
+
+static void knows_spheres(void **state)
+{
+    (void)state;
+    const Object unit = sphere((Vector3){0, 0, 0}, 1), tiny = sphere((Vector3){0.3, 0.2, 5}, 1e-4);
+    const Object ground = sphere((Vector3){0, -1e6, 0}, 1e6);
+    const Vector3 z = {0, 0, 1}, zero = {0, 0, 0}, eye = {0, 1, 0};
+    const Known known[] = {
+        {"far", unit, {0.6, 0, -100}, z, 100 - 0.7999999821186064},
+        {"far", unit, {0.6, 0, -1e6}, z, 1e6 - 0.7999999821186064},
+        {"tiny", tiny, zero, {0.3, 0.2, 5}, 0.9999800517985821},
+        {"tiny", tiny, zero, {0.3 + 9.9e-5, 0.2, 5}, 0.9999957319126598},
+        {"tiny", tiny, zero, {0.3 + 1.01e-4, 0.2, 5}, MISS},
+        {"ground", ground, eye, {0, -1, 0}, 1},
+        {"ground", ground, eye, {sqrt(0.75), -0.5, 0}, 2.0000030000089},
+        {"ground", ground, eye, {sqrt(1 - 0.00141 * 0.00141), -0.00141, 0}, MISS},
+        {"tangent", unit, {1 - 0x1p-20, 0, -5}, z, 4.9986189323973},
+        {"tangent", unit, {1 - 0x1p-24, 0, -5}, z, 4.9996547330221},
+        {"tangent", unit, {1 + 0x1p-23, 0, -5}, z, MISS},
+        {"inside", unit, {0.5, 0, 0}, {1, 0, 0}, 0.5},
+        {"inside", unit, {0.999999, 0, 0}, {1, 0, 0}, 1.0132789611816e-6},
+        {"inside", unit, {0.999999, 0, 0}, {0, 1, 0}, 0.0014235718793335},
+        {"behind", unit, {0, 0, 5}, z, MISS},
+    };
+    check(known, COUNT(known));
+}
+
+static void knows_flat_shapes(void **state)
+{
+    (void)state;
+    const Object plane = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
+    const Object disc = {.kind = SHAPE_DISC, .as.disc = {{0, 0, 2}, {0, 0, 3}, 0.5}};
+    const Object box = {.kind = SHAPE_BOX, .as.box = {{-1, -1, -1}, {1, 1, 1}}};
+    const Object plate = {.kind = SHAPE_BOX, .as.box = {{0, 0, 0}, {1, 1, 1e-6}}};
+    const Vector3 z = {0, 0, 1};
+    const Known known[] = {
+        {"horizon", plane, {0, 1.7, 0}, {0, -0x1p-1, 1}, 1.7000000476837158 * 0x1p1},
+        {"horizon", plane, {0, 1.7, 0}, {0, -0x1p-23, 1}, 14260634},
+        {"horizon", plane, {0, 1.7, 0}, {0, 0x1p-23, 1}, MISS},
+        {"horizon", plane, {0, 1.7, 0}, {0, 0, 1}, MISS},
+        {"horizon", plane, {0, 1.7, 0}, {0, -0.0, 1}, MISS},
+        {"disc", disc, {0.5, 0, 0}, z, 2},
+        {"disc", disc, {0.5 + 0x1p-20, 0, 0}, z, MISS},
+        {"disc", disc, {0, 0, 2}, {1, 0, 0}, MISS},
+        {"face", box, {1, 0, -5}, z, 4},
+        {"face", box, {-1, -1, -5}, {-0.0, -0.0, 1}, 4},
+        {"face", box, {1 + 0x1p-23, 0, -5}, z, MISS},
+        {"face", box, {1, 0, 0}, z, 1},
+        {"inside", box, {0.25, 0, 0}, {1, 0, 0}, 0.75},
+        {"plate", plate, {0.5, 0.5, 10}, {0, 0, -1}, 9.999999000000002},
+        {"triangle", triangle(2e-4), {2e-4 / 3, 2e-4 / 3, -1}, z, 1},
+        {"triangle", triangle(0x1p40), {0x1p40 / 3, 0x1p40 / 3, -0x1p40}, z, 0x1p40},
+        {"triangle", triangle(1), {0.5, 0.51, -1}, z, MISS},
+    };
+    check(known, COUNT(known));
+}
+
+static void knows_cylinders(void **state)
+{
+    (void)state;
+    const Vector3 zero = {0, 0, 0}, x = {1, 0, 0}, z = {0, 0, 1};
+    const Object endless = cylinder(zero, z, 1, false, false);
+    const Object capped = cylinder(zero, (Vector3){0, 0, 2}, 1, true, true);
+    const Object open = cylinder(zero, (Vector3){0, 0, 2}, 1, true, false);
+    const Object wire = cylinder((Vector3){-1e4, 0, 0}, (Vector3){2e4, 0, 0}, 1e-3, true, true);
+    const Known known[] = {
+        {"parallel", endless, {0.5, 0, -3}, z, MISS},
+        {"parallel", endless, {2, 0, -3}, z, MISS},
+        {"parallel", capped, {0.5, 0, -3}, z, 3},
+        {"parallel", capped, {0.5, 0, 1}, z, 1},
+        {"parallel", capped, {2, 0, -3}, z, MISS},
+        {"parallel", open, {0.5, 0, -3}, z, MISS},
+        {"through the opening", open, {0, 0, -1}, {0.5, 0, 1}, 2},
+        {"past the end", capped, {-5, 0, 2.25}, x, MISS},
+        {"nearly parallel", endless, zero, {0x1p-20, 0, 1}, 0x1p20},
+        {"nearly parallel", endless, {0.25, 0, 0}, {0x1p-10, 0, 1}, 768},
+        {"wire", wire, {0, 5e-4, -10}, z, 9.9991339745551},
+        {"tangent", endless, {-1e3, 0.5, 0}, x, 999.13397459622},
+        {"tangent", endless, {-1e3, 0.99999, 0}, x, 999.99552483963},
+        {"tangent", endless, {-1e3, 1.00001, 0}, x, MISS},
+        {"tangent", endless, {-1e5, 0.99, 0}, x, 99999.858932707},
+    };
+    check(known, COUNT(known));
+}
+
+static void knows_cones(void **state)
+{
+    (void)state;
+    const Object half = endless_cone(0.5), right = endless_cone(1);
+    const Object tip = frustum(1, 0, true), cup = frustum(0.5, 1, false);
+    const Vector3 x = {1, 0, 0}, z = {0, 0, 1};
+    const Known known[] = {
+        {"apex", half, {5, 0, 0x1p-20}, {-1, 0, 0}, 4.9999995231628},
+        {"apex", half, {0, 0, -5}, z, 5},
+        {"apex", half, {5, 0x1p-20, 0x1p-20}, {-1, 0, 0}, MISS},
+        {"along a generator", right, {3, 0.5, 1}, {-1, 0, 1}, 1.03125},
+        {"along a generator", right, {3, 0.5, 1}, {-1, 0, 1 + 0x1p-23}, 1.0312499375723},
+        {"along a generator", right, {3, 0.5, 1}, {-1, 0, 1 - 0x1p-24}, 1.0312500312139},
+        {"either nappe", half, {5, 0, -2}, {-1, 0, 0}, 4},
+        {"either nappe", half, {5, 0, 2}, {-1, 0, 0}, 4},
+        {"tip", tip, {-5, 0, 1}, x, 4.5},
+        {"tip", tip, {0.25, 0, 5}, {0, 0, -1}, 3.5},
+        {"base", tip, {0.25, 0, -1}, z, 1},
+        {"mirror nappe", tip, {-5, 0, 3}, x, MISS},
+        {"inside", tip, {0, 0, 1}, x, 0.5},
+        {"cup", cup, {0.75, 0, 5}, {0, 0, -1}, 4},
+        {"through the cup", cup, {0.25, 0, 5}, {0, 0, -1}, MISS},
+    };
+    check(known, COUNT(known));
+}
+
+static Scene one_object(Object *object, Material *material, Light *lights, size_t light_count)
+{
+    Scene scene = {.background = {0.1, 0.2, 0.3}, .ambient = {0.5, 0.5, 0.5}};
+    scene.objects.items = object;
+    scene.objects.count = 1;
+    scene.materials.items = material;
+    scene.materials.count = 1;
+    scene.lights.items = lights;
+    scene.lights.count = light_count;
+    return scene;
+}
+
+static double red(const Scene *scene, Vector3 origin, Vector3 direction)
+{
+    ReferenceRay ray = reference_ray(origin, direction);
+    return reference_color(scene, &ray).color.x;
+}
+
+static void shades_as_phong(void **state)
+{
+    (void)state;
+    Object floor = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
+    Material material = {
+        .color = {0.8, 0, 0}, .ambient = 0.5, .diffuse = {0.5, 0, 0}, .specular = 0.25, .shininess = 2};
+    Light light = {.kind = LIGHT_POINT, .color = {2, 2, 2}, .position = {3, 4, 0}};
+    Scene scene = one_object(&floor, &material, &light, 1);
+
+    // At the origin N.L = 4/5; seen from straight above, R.V is the same.
+    double expected = 0.5 * 0.5 * 0.8 + 2 * (0.5 * 0.8 * 0.8 + 0.25 * 0.64);
+    assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), expected, 1e-15);
+    assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, 1, 0}), 0.1, 0);
+    // From below, the light is behind the surface.
+    assert_near(red(&scene, (Vector3){0, -2, 0}, (Vector3){0, 1, 0}), 0.2, 1e-16);
+
+    light = (Light){.kind = LIGHT_DIRECTIONAL, .color = {2, 2, 2}, .direction = {-3, -4, 0}};
+    assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), expected, 1e-15);
+
+    // Half-way between full light and none in 1 - cos, the smooth step is a half.
+    double outer = 1 - cos(60 * acos(-1) / 180), inner = 1 - cos(20 * acos(-1) / 180);
+    double halfway = acos(1 - (outer + inner) / 2);
+    light = (Light){.kind = LIGHT_SPOT,
+                    .color = {2, 2, 2},
+                    .position = {0, 4, 0},
+                    .angle = 60,
+                    .penumbra = 40,
+                    .direction = {sin(halfway), -cos(halfway), 0}};
+    assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), 0.2 + (0.4 + 0.25), 1e-15);
+    light.direction = (Vector3){1, -0.5, 0};
+    assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), 0.2, 1e-16);
+}
+
+static void casts_shadows(void **state)
+{
+    (void)state;
+    // The shadow of a unit sphere that stands on a plane under a light ten high ends at 10 / sqrt 80.
+    Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}},
+                        sphere((Vector3){0, 1, 0}, 1)};
+    Material material = {.diffuse = {1, 1, 1}, .color = {1, 1, 1}};
+    Light light = {.kind = LIGHT_POINT, .color = {1, 1, 1}, .position = {0, 10, 0}};
+    Scene scene = one_object(objects, &material, &light, 1);
+    scene.objects.count = COUNT(objects);
+    const double edge = 10 / sqrt(80);
+    for (int side = -1; side <= 1; side += 2) {
+        double x = edge * (1 + side * 1e-9);
+        ReferenceRay ray = reference_ray((Vector3){x + 2, 3, 0}, (Vector3){-2, -3, 0});
+        ReferenceColor seen = reference_color(&scene, &ray);
+        assert_int_equal(seen.color.x > 0, side > 0);
+        assert_true(seen.margin > 1e-10 && seen.margin < 1e-8);
+    }
+}
+
+static void lays_checkers(void **state)
+{
+    (void)state;
+    Object floor = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
+    Material material = {
+        .ambient = 1, .checker = true, .checker_size = 2, .checker_colors = {{1, 1, 1}, {0.5, 0.5, 0.5}}};
+    Scene scene = one_object(&floor, &material, NULL, 0);
+    const Vector3 down = {0, -1, 0};
+    // The floor's own axes are x and -z.
+    assert_near(red(&scene, (Vector3){1, 1, -1}, down), 0.5, 0);
+    assert_near(red(&scene, (Vector3){3, 1, -1}, down), 0.25, 0);
+    assert_near(red(&scene, (Vector3){3, 1, -3}, down), 0.5, 0);
+    assert_near(red(&scene, (Vector3){-1, 1, -1}, down), 0.25, 0);
+    assert_near(red(&scene, (Vector3){-1, 1, 1}, down), 0.5, 0);
+    floor = (Object){.kind = SHAPE_BOX, .as.box = {{-4, -1, -4}, {4, 1, 4}}};
+    assert_near(red(&scene, (Vector3){1, 5, 1}, down), 0.5, 0);
+    assert_near(red(&scene, (Vector3){-1, 5, 1}, down), 0.25, 0);
+}
+
+static void aims_cameras(void **state)
+{
+    (void)state;
+    Camera camera = {.position = {1, 2, 3}, .look_at = {1, 2, -1}, .up = {0, 5, 0}, .half_tangent = 0.5};
+    ReferenceRay ray = reference_camera_ray(&camera, 4, 2, 0, 0);
+    // Forward -z, half a pixel up from the middle, one and a half to the left; a pixel is 1/2 wide.
+    assert_true(ray.direction.x == -(Quad)0.75 && ray.direction.y == (Quad)0.25 && ray.direction.z == -1);
+    camera.field_axis = FIELD_HORIZONTAL;
+    ray = reference_camera_ray(&camera, 4, 2, 3, 1);
+    assert_true(ray.direction.x == (Quad)0.375 && ray.direction.y == -(Quad)0.125 && ray.direction.z == -1);
+    // Looking along `up`, the first axis square to the view stands in: here x is the way up.
+    camera.up = (Vector3){0, 0, 2};
+    ray = reference_camera_ray(&camera, 1, 2, 0, 0);
+    assert_true(ray.direction.x == (Quad)0.5 && ray.direction.y == 0);
+}
+
+static void rounds_every_number(void **state)
+{
+    (void)state;
+    const Vector3 third = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+    const double rounded = (double)(1.0f / 3);
+    Object object = {.kind = SHAPE_BOX, .as.box = {third, third}};
+    object = reference_round_object(&object);
+    const double numbers[] = {object.as.box.min.x, object.as.box.min.y, object.as.box.min.z,
+                              object.as.box.max.x, object.as.box.max.y, object.as.box.max.z};
+    for (size_t i = 0; i < COUNT(numbers); i++)
+        assert_near(numbers[i], rounded, 0);
+    object = frustum(1.0 / 3, 1.0 / 3, true);
+    object.as.cone.from = object.as.cone.axis = third;
+    object = reference_round_object(&object);
+    assert_near(object.as.cone.from.z + object.as.cone.axis.z, (double)(2.0f / 3), 0);
+    assert_near(object.as.cone.radius[1], rounded, 0);
+}
+
+static void finds_the_nearest(void **state)
+{
+    (void)state;
+    Object objects[] = {sphere((Vector3){0, 0, 9}, 1), sphere((Vector3){0, 0, 5}, 1),
+                        sphere((Vector3){0, 0, 6}, 2)};
+    Scene scene = one_object(objects, NULL, NULL, 0);
+    scene.objects.count = COUNT(objects);
+    ReferenceRay ray = reference_ray((Vector3){0, 0, 0}, (Vector3){0, 0, 1});
+    ReferenceHit hit = reference_hit(&scene, &ray);
+    assert_int_equal(hit.object, 1);
+    assert_true(hit.t == 4 && hit.margin == 0);
+    ray.tmin = 4;
+    assert_true(reference_hit(&scene, &ray).t == 6);
+    assert_near(reference_ulp(1, 24), 0x1p-23, 0);
+    assert_near(reference_ulp(-3, 53), 0x1p-51, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(knows_spheres),       cmocka_unit_test(knows_flat_shapes),
+        cmocka_unit_test(knows_cylinders),     cmocka_unit_test(knows_cones),
+        cmocka_unit_test(shades_as_phong),     cmocka_unit_test(casts_shadows),
+        cmocka_unit_test(lays_checkers),       cmocka_unit_test(aims_cameras),
+        cmocka_unit_test(rounds_every_number), cmocka_unit_test(finds_the_nearest),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

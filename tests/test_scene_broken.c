@@ -1,0 +1,169 @@
+// Every scene in tests/broken gets exactly the messages beside it, and every message has such a scene.
+#include "host/base/array.h"
+#include "tests/scene_reading.h"
+
+#include <ctype.h>
+#include <dirent.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { BROKEN_SCENES_AT_LEAST = 30 };
+
+static Text all_expected;
+
+static Text file_text(const char *path)
+{
+    Text text = {0};
+    MessageList messages = {0};
+    if (!text_read_file(&text, path, &messages)) message_list_print(&messages, stderr);
+    assert_int_equal(messages.count, 0);
+    return text;
+}
+
+static bool name_ends_with(const char *name, const char *ending)
+{
+    size_t length = strlen(name), ending_length = strlen(ending);
+    return length > ending_length && !strcmp(name + length - ending_length, ending);
+}
+
+static void check_scene(const char *folder, const char *name)
+{
+    Text path = {0}, expected_path = {0}, got = {0};
+    text_appendf(&path, "%s/%s", folder, name);
+    text_append(&expected_path, path.items, (size_t)(strrchr(path.items, '.') - path.items));
+    text_appendf(&expected_path, ".expected");
+    Text text = file_text(text_c(&path)), expected = file_text(text_c(&expected_path));
+    text_append(&all_expected, text_c(&expected), expected.count);
+
+    MessageList messages = {0};
+    Scene scene;
+    bool read = scene_read_text(&scene, name, &text, false, &messages);
+    for (size_t i = 0; i < messages.count; i++)
+        message_describe(&got, &messages.items[i]);
+    if (read || strcmp(text_c(&got), text_c(&expected)) != 0)
+        fail_msg("%s:\n%sexpected:\n%s", text_c(&path), text_c(&got), text_c(&expected));
+    assert_null(scene.objects.items);
+    message_list_free(&messages);
+    text_free(&path);
+    text_free(&expected_path);
+    text_free(&got);
+    text_free(&text);
+    text_free(&expected);
+}
+
+static void check_folder(const char *folder, const char *ending)
+{
+    DIR *entries = opendir(folder);
+    assert_non_null(entries);
+    size_t count = 0;
+    for (const struct dirent *entry; (entry = readdir(entries));) {
+        if (!name_ends_with(entry->d_name, ending)) continue;
+        check_scene(folder, entry->d_name);
+        count++;
+    }
+    closedir(entries);
+    assert_in_range(count, BROKEN_SCENES_AT_LEAST, SIZE_MAX);
+}
+
+static void test_yaml(void **state)
+{
+    (void)state;
+    check_folder("tests/broken/yaml", ".yaml");
+}
+
+static void test_rt(void **state)
+{
+    (void)state;
+    check_folder("tests/broken/rt", ".rt");
+}
+
+static void test_cfg(void **state)
+{
+    (void)state;
+    check_folder("tests/broken/cfg", ".cfg");
+}
+
+// The longest part of a format that is told as it stands, to find the message by.
+static char *format_core(const char *format, size_t length)
+{
+    const char *longest = format;
+    size_t longest_length = 0;
+    for (size_t start = 0, i = 0; i <= length; i++) {
+        if (i < length && format[i] != '%') continue;
+        if (i - start > longest_length) {
+            longest = format + start;
+            longest_length = i - start;
+        }
+        for (i++; i < length && strchr(".*0123456789z", format[i]); i++)
+            continue;
+        start = i + 1; // after the conversion
+    }
+    return strndup(longest, longest_length);
+}
+
+static size_t check_source(const char *path)
+{
+    Text text = file_text(path);
+    size_t count = 0;
+    for (const char *at = text_c(&text); (at = strstr(at, "report_error("));) {
+        const char *quote = strchr(at, '"'), *end_of_call = strchr(at, ';');
+        at += strlen("report_error(");
+        if (!quote || quote > end_of_call) continue;
+        char *core = format_core(quote + 1, (size_t)(strchr(quote + 1, '"') - quote - 1));
+        if (*core && !strstr(text_c(&all_expected), core))
+            fail_msg("%s: no broken scene for \"%s\"", path, core);
+        count += *core != '\0';
+        free(core);
+    }
+    text_free(&text);
+    return count;
+}
+
+// Runs after the folders were read.
+static void test_every_message_has_a_scene(void **state)
+{
+    (void)state;
+    DIR *entries = opendir("host/scene");
+    assert_non_null(entries);
+    size_t count = 0;
+    for (const struct dirent *entry; (entry = readdir(entries));) {
+        if (!name_ends_with(entry->d_name, ".c")) continue;
+        Text path = {0};
+        text_appendf(&path, "host/scene/%s", entry->d_name);
+        count += check_source(text_c(&path));
+        text_free(&path);
+    }
+    closedir(entries);
+    assert_in_range(count, 40, SIZE_MAX);
+    text_free(&all_expected);
+}
+
+static void test_names(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    SceneOptions options = {0};
+    Scene scene;
+    assert_false(scene_load(&scene, "tests/scenes/complete.txt", &options, &messages));
+    assert_string_equal(messages.items[0].text,
+                        "tests/scenes/complete.txt: a scene's name ends in .yaml, .yml, .rt or .cfg");
+    assert_false(scene_load(&scene, ".rt", &options, &messages));
+    assert_false(scene_load(&scene, "tests/scenes/absent.yml", &options, &messages));
+    assert_non_null(strstr(messages.items[2].text, "absent.yml"));
+    assert_int_equal(messages.count, 3);
+    message_list_free(&messages);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_yaml),  cmocka_unit_test(test_rt),
+        cmocka_unit_test(test_cfg),   cmocka_unit_test(test_every_message_has_a_scene),
+        cmocka_unit_test(test_names),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

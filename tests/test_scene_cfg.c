@@ -1,0 +1,140 @@
+// `.cfg`: every block's values, and the tolerances.
+#include "tests/scene_reading.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define CAMERA "=>camera :\n{\n\tposition 0 0 5\n\tlook_at 0 0 -1\n}\n"
+#define LIGHT  "=>light :\n{\n\tposition 0 9 0\n\tintensity 1 1 1\n}\n"
+#define SPHERE "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 0\n\tcolor 0 0 0\n\tdiffuse 1 1 1\n\tspecular 0\n}\n"
+
+static Scene complete;
+
+static int complete_open(void **state)
+{
+    (void)state;
+    complete = scene_of_file("tests/scenes/complete.cfg");
+    return 0;
+}
+
+static int complete_close(void **state)
+{
+    (void)state;
+    scene_free(&complete);
+    return 0;
+}
+
+static const Material *material_of(const Object *object)
+{
+    return &complete.materials.items[object->material];
+}
+
+static void test_scene(void **state)
+{
+    (void)state;
+    assert_vector(complete.camera.position, 0, 0, 5);
+    assert_vector(complete.camera.look_at, 0, 0, -1);
+    assert_vector(complete.camera.up, 0, 1, 0);
+    assert_int_equal(complete.camera.field_axis, FIELD_HORIZONTAL);
+    assert_number(complete.camera.half_tangent, 0.25);
+    assert_number(complete.camera.frame_aspect, 0);
+    assert_vector(complete.ambient, 0.2, 0.2, 0.2);
+    assert_vector(complete.background, 0, 0, 0);
+    assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
+}
+
+static void test_light(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.lights.count, 1);
+    assert_int_equal(complete.lights.items[0].kind, LIGHT_POINT);
+    assert_vector(complete.lights.items[0].position, 1, 2, 3);
+    assert_vector(complete.lights.items[0].color, 0.5, 0.6, 0.7);
+}
+
+static void test_sphere(void **state)
+{
+    (void)state;
+    const Object *sphere = &complete.objects.items[0];
+    assert_int_equal(sphere->kind, SHAPE_SPHERE);
+    assert_vector(sphere->as.sphere.center, 0, -3, -5);
+    assert_number(sphere->as.sphere.radius, 2.5);
+    assert_vector(material_of(sphere)->color, 1, 0.4, 0);
+    assert_number(material_of(sphere)->ambient, 1);
+    assert_vector(material_of(sphere)->diffuse, 0.5, 0.6, 0.7);
+    assert_number(material_of(sphere)->specular, 1);
+    assert_number(material_of(sphere)->shininess, 30);
+}
+
+static void test_plane(void **state)
+{
+    (void)state;
+    const Object *plane = &complete.objects.items[1];
+    assert_int_equal(plane->kind, SHAPE_PLANE);
+    assert_vector(plane->as.plane.point, 0, -6, 0);
+    assert_vector(plane->as.plane.normal, 0, 1, 0);
+    assert_vector(material_of(plane)->color, 0, 0, 1);
+}
+
+static void test_cylinder(void **state)
+{
+    (void)state;
+    const Object *cylinder = &complete.objects.items[2];
+    assert_int_equal(cylinder->kind, SHAPE_CYLINDER);
+    assert_false(cylinder->as.cylinder.finite);
+    assert_vector(cylinder->as.cylinder.from, 3, 0, -9);
+    assert_vector(cylinder->as.cylinder.axis, 0, 2, 0);
+    assert_number(cylinder->as.cylinder.radius, 1);
+    assert_number(material_of(cylinder)->specular, 0.25);
+}
+
+static void test_cone(void **state)
+{
+    (void)state;
+    const Object *cone = &complete.objects.items[3];
+    assert_int_equal(cone->kind, SHAPE_CONE);
+    assert_false(cone->as.cone.finite);
+    assert_vector(cone->as.cone.from, -3, 0, -9);
+    assert_vector(cone->as.cone.axis, 1, 1, 0);
+    assert_number(cone->as.cone.slope, tan(0.5)); // the angle is in radians
+}
+
+static void test_any_order_and_blanks(void **state)
+{
+    (void)state;
+    assert_messages(
+        "s.cfg", SPHERE "\r\n\n" LIGHT "=> camera:\r\n\n{\r\n\n  look_at 0 0 1\r\n\tposition 0\t0 0\r\n}\r\n",
+        "");
+}
+
+static void test_text_between_blocks_is_skipped(void **state)
+{
+    (void)state;
+    assert_messages("s.cfg", CAMERA "transfo 1 2 3\n" LIGHT SPHERE, "6:1: warning: skipped 'transfo'\n");
+}
+
+static void test_no_lights_no_objects(void **state)
+{
+    (void)state;
+    assert_messages("s.cfg", CAMERA, "warning: s.cfg: no objects\nwarning: s.cfg: no lights\n");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_scene),
+        cmocka_unit_test(test_light),
+        cmocka_unit_test(test_sphere),
+        cmocka_unit_test(test_plane),
+        cmocka_unit_test(test_cylinder),
+        cmocka_unit_test(test_cone),
+        cmocka_unit_test(test_any_order_and_blanks),
+        cmocka_unit_test(test_text_between_blocks_is_skipped),
+        cmocka_unit_test(test_no_lights_no_objects),
+    };
+    return cmocka_run_group_tests(tests, complete_open, complete_close);
+}

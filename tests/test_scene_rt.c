@@ -1,0 +1,254 @@
+// `.rt`: every element's values, and what files in the wild hold and is tolerated.
+#include "tests/scene_reading.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define CAMERA "C 0,0,-5 0,0,1 60\n"
+#define LIT    CAMERA "L 0,9,0 1\n"
+#define SPHERE "sp 0,0,0 2 255,0,0\n"
+
+static Scene complete;
+
+static int complete_open(void **state)
+{
+    (void)state;
+    complete = scene_of_file("tests/scenes/complete.rt");
+    return 0;
+}
+
+static int complete_close(void **state)
+{
+    (void)state;
+    scene_free(&complete);
+    return 0;
+}
+
+static const Material *material_of(const Object *object)
+{
+    return &complete.materials.items[object->material];
+}
+
+static void test_scene(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.width, 640);
+    assert_int_equal(complete.height, 480);
+    assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
+    assert_vector(complete.ambient, 0.2, 0.1, 0);
+    assert_vector(complete.background, 0, 0, 0);
+    assert_vector(complete.camera.position, 0, 1, -5);
+    Vector3 view = vector_normalize(vector_subtract(complete.camera.look_at, complete.camera.position));
+    assert_vector(view, 0, 0, 1);
+    assert_vector(complete.camera.up, 0, 1, 0);
+    assert_int_equal(complete.camera.field_axis, FIELD_HORIZONTAL);
+    assert_number(complete.camera.half_tangent, tan(M_PI / 6));
+    assert_number(complete.camera.frame_aspect, 0);
+}
+
+static void test_lights(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.lights.count, 3);
+    const Light *lights = complete.lights.items;
+    assert_int_equal(lights[0].kind, LIGHT_POINT);
+    assert_vector(lights[0].position, 1, 2, 3);
+    assert_vector(lights[0].color, 0.5, 0, 0.1);
+    assert_vector(lights[1].color, 1, 1, 1);
+    assert_vector(lights[2].color, 0, 0, 0.25);
+}
+
+static void test_sphere_and_plane(void **state)
+{
+    (void)state;
+    const Object *sphere = &complete.objects.items[0], *plane = sphere + 1;
+    assert_int_equal(sphere->kind, SHAPE_SPHERE);
+    assert_vector(sphere->as.sphere.center, 1, 2, 3);
+    assert_number(sphere->as.sphere.radius, 2);
+    assert_vector(material_of(sphere)->color, 1, 0, 0);
+    assert_number(material_of(sphere)->specular, 0.5);
+    assert_number(material_of(sphere)->shininess, 10);
+    assert_int_equal(plane->kind, SHAPE_PLANE);
+    assert_vector(plane->as.plane.point, 0, -1, 0);
+    assert_vector(plane->as.plane.normal, 0, 1, 0);
+    assert_vector(material_of(plane)->color, 0, 1, 0);
+    assert_vector(material_of(plane)->diffuse, 1, 1, 1);
+    assert_number(material_of(plane)->ambient, 1);
+    assert_number(material_of(plane)->specular, 0);
+}
+
+static void test_cylinder_and_cone(void **state)
+{
+    (void)state;
+    const Object *cylinder = &complete.objects.items[2], *cone = &complete.objects.items[6];
+    assert_int_equal(cylinder->kind, SHAPE_CYLINDER);
+    assert_vector(cylinder->as.cylinder.from, 1, -1, 3); // its center is given
+    assert_vector(cylinder->as.cylinder.axis, 0, 6, 0);
+    assert_number(cylinder->as.cylinder.radius, 1);
+    assert_true(cylinder->as.cylinder.finite && cylinder->as.cylinder.caps);
+    assert_number(material_of(cylinder)->specular, 0.25);
+    assert_int_equal(cone->kind, SHAPE_CONE);
+    assert_vector(cone->as.cone.from, 1, 2, 3);
+    assert_vector(cone->as.cone.axis, 3, 0, 0);
+    assert_number(cone->as.cone.radius[0], 2);
+    assert_number(cone->as.cone.radius[1], 0);
+    assert_true(cone->as.cone.finite && cone->as.cone.caps);
+}
+
+static void test_square_and_triangle(void **state)
+{
+    (void)state;
+    const Object *first = &complete.objects.items[3], *second = first + 1, *triangle = first + 2;
+    assert_int_equal(first->kind, SHAPE_TRIANGLE);
+    assert_int_equal(first->material, second->material);
+    assert_vector(material_of(first)->color, 0.2, 0.4, 0.6);
+    assert_vector(first->as.triangle.vertices[0], -1, 0, 3);
+    assert_vector(first->as.triangle.vertices[1], 3, 0, 3);
+    assert_vector(first->as.triangle.vertices[2], 3, 4, 3);
+    assert_vector(second->as.triangle.vertices[0], -1, 0, 3);
+    assert_vector(second->as.triangle.vertices[1], 3, 4, 3);
+    assert_vector(second->as.triangle.vertices[2], -1, 4, 3);
+    assert_int_equal(triangle->kind, SHAPE_TRIANGLE);
+    assert_false(triangle->as.triangle.smooth);
+    assert_vector(triangle->as.triangle.vertices[1], 1, 0, 0);
+    assert_int_equal(complete.objects.count, 7);
+}
+
+static void test_square_on_the_floor(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("s.rt", LIT "sq 0,0,0 0,1,0 2 255,0,0\n");
+    size_t unbounded_count;
+    Bounds bounds = scene_bounds(&scene, &unbounded_count);
+    assert_vector(bounds.min, -1, 0, -1);
+    assert_vector(bounds.max, 1, 0, 1);
+    scene_free(&scene);
+}
+
+static void test_blanks_comments_and_line_ends(void **state)
+{
+    (void)state;
+    assert_messages(
+        "s.rt", "\xEF\xBB\xBF# top\r\n\r\n \tC\t0,0,0   0,0,1\t60 # end\r\nL 0,0,9 1#x\r\nsp 0,0,0 1 1,2,3",
+        "");
+}
+
+static void test_missing_parts_are_fine(void **state)
+{
+    (void)state;
+    assert_messages("s.rt", CAMERA, "warning: s.rt: no objects\nwarning: s.rt: no lights\n");
+    Scene scene = scene_of_text("s.rt", CAMERA);
+    assert_vector(scene.ambient, 0, 0, 0);
+    assert_int_equal(scene.width, 0);
+    scene_free(&scene);
+}
+
+static void test_axes_are_made_unit(void **state)
+{
+    (void)state;
+    assert_messages("s.rt", LIT "pl 0,0,0 0,0.5,0 255,0,0\n",
+                    "3:10: warning: 'normal' is not of unit length: made so\n");
+    assert_messages("s.rt", LIT "pl 0,0,0 0.577,0.577,0.577 255,0,0\n", "");
+    Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,0.5,0 1 4 255,0,0\n");
+    assert_vector(scene.objects.items[0].as.cylinder.from, 0, -2, 0);
+    assert_vector(scene.objects.items[0].as.cylinder.axis, 0, 4, 0);
+    scene_free(&scene);
+}
+
+static void test_zero_camera_direction(void **state)
+{
+    (void)state;
+    assert_messages("s.rt", "C -50,0,20 0,0,0 70\nL 0,9,0 1\n" SPHERE,
+                    "1:12: warning: 'direction' is zero: looks along +z\n");
+    Scene scene = scene_of_text("s.rt", "C 0,0,0 0,0,0 70\n");
+    assert_vector(scene.camera.look_at, 0, 0, 1);
+    scene_free(&scene);
+}
+
+static void test_far_camera_keeps_its_direction(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("s.rt", "C 1e20,0,0 0,0,1 70\n");
+    assert_true(scene.camera.look_at.z > 0);
+    scene_free(&scene);
+}
+
+static void test_color_before_sizes(void **state)
+{
+    (void)state;
+    assert_messages("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6\n",
+                    "3:16: warning: the color stands before the sizes\n");
+    Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
+    assert_number(scene.objects.items[0].as.cylinder.radius, 1);
+    assert_vector(scene.materials.items[0].color, 1, 0, 0);
+    assert_number(scene.materials.items[0].specular, 0.5);
+    scene_free(&scene);
+}
+
+static void test_first_of_several_old_cameras(void **state)
+{
+    (void)state;
+    assert_messages("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\nL 0,9,0 1\n" SPHERE,
+                    "2:1: warning: only the first camera is used\n");
+    Scene scene = scene_of_text("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\n");
+    assert_vector(scene.camera.position, 0, 0, 0);
+    scene_free(&scene);
+}
+
+static void test_lenient_skips_what_it_does_not_know(void **state)
+{
+    (void)state;
+    Text messages = scene_messages("s.rt", LIT "ma:steel 1\nsp 0,0,0 2 255,0,0 0.5 10 tex:earth.xpm\n", true);
+    assert_string_equal(text_c(&messages), "3:1: warning: skipped unknown element 'ma:steel'\n"
+                                           "4:27: warning: skipped 'tex:earth.xpm'\n");
+    text_free(&messages);
+}
+
+static void test_lenient_keeps_other_errors(void **state)
+{
+    (void)state;
+    Text messages = scene_messages("s.rt", LIT "sp 0,0,0 -2 255,0,0\n", true);
+    assert_string_equal(text_c(&messages), "3:10: error: 'diameter' must be greater than 0\n");
+    text_free(&messages);
+}
+
+static void test_many_warnings_are_counted(void **state)
+{
+    (void)state;
+    Text text = {0};
+    text_appendf(&text, LIT);
+    for (int i = 0; i < 30; i++)
+        text_appendf(&text, "pl 0,0,0 0,0.5,0 255,0,0\n");
+    Text messages = scene_messages("s.rt", text_c(&text), false);
+    assert_non_null(strstr(text_c(&messages), "22:10: warning: 'normal' is not of unit length: made so\n"
+                                              "warning: s.rt: 10 more warnings\n"));
+    text_free(&messages);
+    text_free(&text);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_scene),
+        cmocka_unit_test(test_lights),
+        cmocka_unit_test(test_sphere_and_plane),
+        cmocka_unit_test(test_cylinder_and_cone),
+        cmocka_unit_test(test_square_and_triangle),
+        cmocka_unit_test(test_square_on_the_floor),
+        cmocka_unit_test(test_blanks_comments_and_line_ends),
+        cmocka_unit_test(test_missing_parts_are_fine),
+        cmocka_unit_test(test_axes_are_made_unit),
+        cmocka_unit_test(test_zero_camera_direction),
+        cmocka_unit_test(test_far_camera_keeps_its_direction),
+        cmocka_unit_test(test_color_before_sizes),
+        cmocka_unit_test(test_first_of_several_old_cameras),
+        cmocka_unit_test(test_lenient_skips_what_it_does_not_know),
+        cmocka_unit_test(test_lenient_keeps_other_errors),
+        cmocka_unit_test(test_many_warnings_are_counted),
+    };
+    return cmocka_run_group_tests(tests, complete_open, complete_close);
+}

@@ -1,0 +1,282 @@
+// The native format: every key's value, every default, warnings, and the scene that is read.
+#include "tests/scene_reading.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
+#define LIT    CAMERA "lights:\n  - point: {position: [0, 9, 0]}\n"
+#define SPHERE "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n"
+
+static Scene complete;
+
+static int complete_open(void **state)
+{
+    (void)state;
+    complete = scene_of_file("tests/scenes/complete.yaml");
+    return 0;
+}
+
+static int complete_close(void **state)
+{
+    (void)state;
+    scene_free(&complete);
+    return 0;
+}
+
+static void test_scene_keys(void **state)
+{
+    (void)state;
+    assert_vector(complete.camera.position, 0, 1.5, -6);
+    assert_vector(complete.camera.look_at, 0, 1, 0);
+    assert_vector(complete.camera.up, 0, 1, 0.5);
+    assert_int_equal(complete.camera.field_axis, FIELD_VERTICAL);
+    assert_number(complete.camera.half_tangent, tan(20 * M_PI / 180));
+    assert_number(complete.camera.frame_aspect, 0);
+    assert_vector(complete.background, 0.2, 0.3, 0.5);
+    assert_vector(complete.ambient, 0.1, 0.2, 0.3);
+    assert_int_equal(complete.color_meaning, COLORS_LINEAR);
+    assert_int_equal(complete.width, 0);
+    assert_int_equal(complete.height, 0);
+}
+
+static void test_lights(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.lights.count, 4);
+    const Light *point = &complete.lights.items[0], *directional = point + 1, *spot = point + 2,
+                *other = point + 3;
+    assert_int_equal(point->kind, LIGHT_POINT);
+    assert_vector(point->position, 5, 8, -5);
+    assert_vector(point->color, 0.5, 0.25, 0.125); // times intensity
+    assert_int_equal(directional->kind, LIGHT_DIRECTIONAL);
+    assert_vector(directional->direction, 0, -1, 0.2);
+    assert_vector(directional->color, 1, 1, 1);
+    assert_int_equal(spot->kind, LIGHT_SPOT);
+    assert_vector(spot->position, 0, 5, 0);
+    assert_vector(spot->direction, 0, -4, 0);
+    assert_number(spot->angle, 30);
+    assert_number(spot->penumbra, 5);
+    assert_vector(other->direction, 0, -2, 0);
+    assert_vector(other->color, 2, 2, 2);
+    assert_number(other->penumbra, 0);
+}
+
+static void test_materials(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.materials.count, 5);
+    assert_int_equal(complete.material_names.count, 5);
+    assert_string_equal(complete.material_names.items[0], "red");
+    assert_string_equal(complete.material_names.items[1], "tiles");
+    assert_string_equal(complete.material_names.items[2], "");
+    const Material *red = &complete.materials.items[0], *tiles = red + 1, *plain = red + 2, *blue = red + 3;
+    assert_vector(red->color, 0.8, 0.1, 0.1);
+    assert_number(red->ambient, 0.9);
+    assert_vector(red->diffuse, 0.7, 0.7, 0.7);
+    assert_number(red->specular, 0.3);
+    assert_number(red->shininess, 64);
+    assert_number(red->reflection, 0.25);
+    assert_number(red->transmission, 0.5);
+    assert_number(red->ior, 1.33);
+    assert_false(red->checker);
+    assert_true(tiles->checker);
+    assert_vector(tiles->checker_colors[0], 1, 1, 1);
+    assert_vector(tiles->checker_colors[1], 0, 0.5, 0);
+    assert_number(tiles->checker_size, 2);
+    assert_vector(tiles->diffuse, 0.9, 0.8, 0.7);
+    assert_vector(blue->color, 0, 0, 1);
+    Material defaults = material_default();
+    assert_vector(plain->color, 1, 1, 1);
+    assert_number(plain->ambient, 1);
+    assert_vector(plain->diffuse, 1, 1, 1);
+    assert_number(plain->specular, 0);
+    assert_number(plain->shininess, 32);
+    assert_number(plain->reflection, 0);
+    assert_number(plain->transmission, 0);
+    assert_number(plain->ior, 1.5);
+    assert_number(defaults.checker_size, 1);
+}
+
+static void test_round_shapes(void **state)
+{
+    (void)state;
+    const Object *sphere = &complete.objects.items[0], *plane = sphere + 1, *disc = sphere + 2;
+    assert_int_equal(sphere->kind, SHAPE_SPHERE);
+    assert_int_equal(sphere->material, 0);
+    assert_vector(sphere->as.sphere.center, 0, 1, 0);
+    assert_number(sphere->as.sphere.radius, 1);
+    assert_int_equal(plane->kind, SHAPE_PLANE);
+    assert_int_equal(plane->material, 1);
+    assert_vector(plane->as.plane.point, 0, -1, 0);
+    assert_vector(plane->as.plane.normal, 0, 2, 0);
+    assert_int_equal(disc->kind, SHAPE_DISC);
+    assert_int_equal(disc->material, 2); // the default
+    assert_vector(disc->as.disc.center, 1, 2, 3);
+    assert_vector(disc->as.disc.normal, 0, 0, -1);
+    assert_number(disc->as.disc.radius, 0.5);
+}
+
+static void test_cylinders(void **state)
+{
+    (void)state;
+    const Object *open = &complete.objects.items[4], *capped = open + 1, *infinite = open + 2;
+    assert_int_equal(open->kind, SHAPE_CYLINDER);
+    assert_vector(open->as.cylinder.from, 1, 0, 0);
+    assert_vector(open->as.cylinder.axis, 0, 3, 0);
+    assert_number(open->as.cylinder.radius, 0.25);
+    assert_true(open->as.cylinder.finite);
+    assert_false(open->as.cylinder.caps);
+    assert_true(capped->as.cylinder.caps);
+    assert_false(infinite->as.cylinder.finite);
+    assert_false(infinite->as.cylinder.caps);
+    assert_vector(infinite->as.cylinder.from, 3, 0, 0);
+    assert_vector(infinite->as.cylinder.axis, 0, 0, 5);
+    assert_int_equal(infinite->material, 4); // an alias of an inline material is a material of its own
+    assert_number(complete.materials.items[4].shininess, 64);
+}
+
+static void test_cones(void **state)
+{
+    (void)state;
+    const Object *frustum = &complete.objects.items[7], *tip = frustum + 1, *infinite = frustum + 2;
+    assert_int_equal(frustum->kind, SHAPE_CONE);
+    assert_vector(frustum->as.cone.from, 0, 0, 1);
+    assert_vector(frustum->as.cone.axis, 0, 4, 0);
+    assert_number(frustum->as.cone.radius[0], 1);
+    assert_number(frustum->as.cone.radius[1], 0.5);
+    assert_true(frustum->as.cone.finite);
+    assert_true(frustum->as.cone.caps);
+    assert_number(tip->as.cone.radius[1], 0);
+    assert_false(tip->as.cone.caps);
+    assert_false(infinite->as.cone.finite);
+    assert_false(infinite->as.cone.caps);
+    assert_vector(infinite->as.cone.from, 0, 0, 2);
+    assert_vector(infinite->as.cone.axis, 3, 0, 0);
+    assert_number(infinite->as.cone.slope, 1);
+}
+
+static void test_flat_shapes(void **state)
+{
+    (void)state;
+    const Object *box = &complete.objects.items[3], *flat = &complete.objects.items[10], *smooth = flat + 1;
+    assert_int_equal(box->kind, SHAPE_BOX);
+    assert_vector(box->as.box.min, -1, -2, -3);
+    assert_vector(box->as.box.max, 1, 2, 3);
+    assert_int_equal(box->material, 3);
+    assert_int_equal(flat->kind, SHAPE_TRIANGLE);
+    assert_false(flat->as.triangle.smooth);
+    assert_vector(flat->as.triangle.vertices[1], 1, 0, 0);
+    assert_vector(flat->as.triangle.vertices[2], 0, 1, 0);
+    assert_true(smooth->as.triangle.smooth);
+    assert_vector(smooth->as.triangle.normals[1], 0, 1, -1);
+    assert_vector(smooth->as.triangle.normals[2], 1, 0, -1);
+    assert_int_equal(smooth->material, 0);
+}
+
+static void test_defaults(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("s.yaml", CAMERA);
+    assert_vector(scene.camera.up, 0, 1, 0);
+    assert_number(scene.camera.half_tangent, tan(25 * M_PI / 180));
+    assert_vector(scene.background, 0, 0, 0);
+    assert_vector(scene.ambient, 0, 0, 0);
+    assert_int_equal(scene.lights.count, 0);
+    assert_int_equal(scene.materials.count, 0);
+    assert_int_equal(scene.objects.count, 0);
+    scene_free(&scene);
+}
+
+static void test_focal_length(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text(
+        "s.yaml", "camera: {position: [0, 0, 0], look_at: [0, 0, 1], focal_length: 2, frame: [3, 2]}\n");
+    assert_int_equal(scene.camera.field_axis, FIELD_HORIZONTAL);
+    assert_number(scene.camera.half_tangent, 0.75);
+    assert_number(scene.camera.frame_aspect, 1.5);
+    scene_free(&scene);
+}
+
+static void test_block_style_and_number_forms(void **state)
+{
+    (void)state;
+    Scene scene =
+        scene_of_text("s.yaml", "\xEF\xBB\xBF---\r\n" // byte order mark, document start, CRLF
+                                "\"camera\":\r\n  position:\r\n    - +1.\r\n    - -.5\r\n    - 25e-1\r\n"
+                                "  look_at: ['0', \"0\", 1E+2]\r\n...\r\n");
+    assert_vector(scene.camera.position, 1, -0.5, 2.5);
+    assert_vector(scene.camera.look_at, 0, 0, 100);
+    scene_free(&scene);
+}
+
+static void test_tiny_numbers_are_zero(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("s.yaml", CAMERA "background: [1e-31, 1e-999, 1e-30]\n");
+    assert_true(scene.background.x == 0 && scene.background.y == 0 && scene.background.z == 1e-30);
+    scene_free(&scene);
+}
+
+static void test_materials_may_follow_objects(void **state)
+{
+    (void)state;
+    Scene scene =
+        scene_of_text("s.yaml", LIT "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: b}\n"
+                                    "materials: {a: {}, b: {shininess: 7}}\n");
+    assert_number(scene.materials.items[scene.objects.items[0].material].shininess, 7);
+    scene_free(&scene);
+}
+
+static void test_warnings(void **state)
+{
+    (void)state;
+    assert_messages("s.yaml", LIT SPHERE, "");
+    assert_messages("s.yaml", CAMERA SPHERE, "warning: s.yaml: no lights\n");
+    assert_messages("s.yaml", LIT, "warning: s.yaml: no objects\n");
+    assert_messages("s.yaml", LIT "objects:\n  - triangle: {vertices: [[0, 0, 0], [1, 1, 1], [2, 2, 2]]}\n",
+                    "5:15: warning: a triangle without area is never hit\n");
+}
+
+static void test_a_failed_scene_is_empty(void **state)
+{
+    (void)state;
+    Text text = {0};
+    text_appendf(&text, LIT SPHERE "purple: 1\n");
+    MessageList messages = {0};
+    Scene scene;
+    assert_false(scene_read_text(&scene, "s.yaml", &text, false, &messages));
+    assert_null(scene.objects.items);
+    assert_null(scene.lights.items);
+    assert_int_equal(scene.objects.count, 0);
+    assert_string_equal(messages.items[0].file, "s.yaml");
+    assert_string_equal(messages.items[0].source_line, "purple: 1");
+    text_free(&text);
+    message_list_free(&messages);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_scene_keys),
+        cmocka_unit_test(test_lights),
+        cmocka_unit_test(test_materials),
+        cmocka_unit_test(test_round_shapes),
+        cmocka_unit_test(test_cylinders),
+        cmocka_unit_test(test_cones),
+        cmocka_unit_test(test_flat_shapes),
+        cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_focal_length),
+        cmocka_unit_test(test_block_style_and_number_forms),
+        cmocka_unit_test(test_tiny_numbers_are_zero),
+        cmocka_unit_test(test_materials_may_follow_objects),
+        cmocka_unit_test(test_warnings),
+        cmocka_unit_test(test_a_failed_scene_is_empty),
+    };
+    return cmocka_run_group_tests(tests, complete_open, complete_close);
+}

@@ -1,0 +1,233 @@
+// Every shape at every precision against the reference: hit or miss, distance and normal.
+#include "tests/probe.h"
+#include "tests/reference.h"
+#include "tests/specimen.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+enum { SPECIMENS_OF_A_KIND = 3, RAYS_PER_SPECIMEN = 2000, CROWD = 40, CROWD_COUNT = 3 };
+
+static const uint32_t lane_counts[] = {1, 4, 8, 16};
+
+typedef struct {
+    Vector3 center;
+    double reach;
+    ProbeRay rays[RAYS_PER_SPECIMEN];
+    ReferenceHit hits[RAYS_PER_SPECIMEN];
+} Trial;
+
+// What a precision owes, with u its unit roundoff, S the distance from the ray's origin to the far side of
+// the object.
+typedef struct {
+    double ulps;  // of t
+    double slack; // of t, over the cosine; in u S, or in u size where the forms are compensated
+    double band;  // of a margin within which hit or miss is open; in the same
+    double turn;  // of the normal, in u S over cosine and radius of curvature
+    bool compensated;
+} Tolerance;
+
+// Those of `single` and `strict` are the tiers B and C of the hard cases, with the slack at every angle,
+// since near a surface no ulp of a small t can be owed after a subtraction of larger numbers; those of `fast`
+// are twice `single`'s.
+static const Tolerance tolerances[PRECISION_COUNT] = {
+    [PRECISION_FAST] = {16, 32, 8, 32, false},
+    [PRECISION_SINGLE] = {8, 16, 4, 16, false},
+    [PRECISION_STRICT] = {4, 4, 16, 16, true},
+    [PRECISION_DOUBLE] = {4, 4, 16, 16, true},
+};
+
+typedef struct {
+    size_t compared, wrong;
+    double t, normal, length; // the largest errors as parts of what is owed
+} Tally;
+
+static Scene scene_of(Object *objects, size_t count, Material *material)
+{
+    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
+    *material = (Material){.color = {1, 1, 1}, .diffuse = {1, 1, 1}};
+    scene.objects.items = objects;
+    scene.objects.count = count;
+    scene.materials.items = material;
+    scene.materials.count = 1;
+    return scene;
+}
+
+static int bits_of(Precision precision)
+{
+    return precision == PRECISION_DOUBLE ? 53 : 24;
+}
+
+static Vector3 vector_from(const double parts[3])
+{
+    return (Vector3){parts[0], parts[1], parts[2]};
+}
+
+static void compare(const Trial *trial, size_t index, const ProbeHit *hit, Precision precision, Tally *tally)
+{
+    const ReferenceHit *expected = &trial->hits[index];
+    const ProbeRay *ray = &trial->rays[index];
+    const Tolerance *owed = &tolerances[precision];
+    const int bits = bits_of(precision);
+    const double u = ldexp(1, -bits);
+    Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
+    double distance = vector_length(vector_subtract(origin, trial->center)) + trial->reach;
+    double scale = u * (owed->compensated ? trial->reach : distance);
+    // Flat shapes have no compensated edges.
+    double band = fmax(owed->band * scale, 4 * u * distance);
+    if (expected->margin <= band) return;
+
+    tally->compared++;
+    if (hit->object != expected->object) {
+        tally->wrong++;
+        return;
+    }
+    if (!expected->found) return;
+
+    double cosine = (double)expected->cosine;
+    double t_owed = owed->ulps * reference_ulp(expected->t, bits);
+    t_owed += owed->slack * scale / (cosine * vector_length(direction));
+    tally->t = fmax(tally->t, (double)((hit->t - expected->t) / t_owed));
+    tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_owed));
+
+    Vector3 normal = vector_from(hit->normal);
+    double normal_owed = 8 * u + owed->turn * u * distance / (cosine * (double)expected->bend);
+    tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_owed);
+    tally->length = fmax(tally->length, fabs(vector_length(normal) - 1) / (4 * u));
+    if (vector_dot(normal, direction) > 0) tally->wrong++;
+}
+
+// Rays and what they should hit; `wide`: taken in double, else what a float holds of them.
+static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size_t aim_count, bool wide,
+                    Random *random)
+{
+    for (size_t i = 0; !wide && i < scene->objects.count; i++)
+        scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
+    for (size_t i = 0; i < RAYS_PER_SPECIMEN; i++) {
+        SpecimenRay given = specimen_ray(&aims[i % aim_count], random);
+        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
+                                : reference_ray_rounded(given.origin, given.direction);
+        trial->rays[i] = (ProbeRay){
+            {(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
+            {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
+            (double)ray.tmin,
+            (double)ray.tmax,
+        };
+        trial->hits[i] = reference_hit(scene, &ray);
+    }
+}
+
+static void hold_at(const Trial *trial, const Scene *scene, Precision precision, uint32_t lanes,
+                    const char *what)
+{
+    static ProbeHit hits[RAYS_PER_SPECIMEN];
+    if (!probe_has(precision)) return;
+    assert_true(probe_trace(scene, precision, lanes, trial->rays, RAYS_PER_SPECIMEN, hits));
+    Tally tally = {0};
+    for (size_t i = 0; i < RAYS_PER_SPECIMEN; i++)
+        compare(trial, i, &hits[i], precision, &tally);
+    bool right = tally.wrong == 0 && tally.t <= 1 && tally.normal <= 1 && tally.length <= 1;
+    if (!right)
+        print_message(
+            "%s, %s, lanes %u: %zu of %zu wrong; of what is owed: t %.2f, normal %.2f, its length %.2f\n",
+            what, precision_names[precision], lanes, tally.wrong, tally.compared, tally.t, tally.normal,
+            tally.length);
+    assert_true(tally.compared > RAYS_PER_SPECIMEN / 2);
+    assert_true(right);
+}
+
+static void hold(const Specimen *specimens, size_t count, Vector3 center, double reach, const char *what,
+                 Random *random)
+{
+    static Trial trial;
+    Object objects[CROWD];
+    Material material;
+    Scene scene = scene_of(objects, count, &material);
+    trial.center = center;
+    trial.reach = reach;
+    for (int wide = 0; wide < 2; wide++) {
+        for (size_t i = 0; i < count; i++)
+            objects[i] = specimens[i].object;
+        prepare(&trial, &scene, specimens, count, wide, random);
+        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+            if (wide != (precision == PRECISION_DOUBLE)) continue;
+            hold_at(&trial, &scene, precision, 1, what);
+            hold_at(&trial, &scene, precision, 0, what);
+        }
+    }
+}
+
+static void hits_each_shape(void **state)
+{
+    const SpecimenKind kind = *(const SpecimenKind *)*state;
+    Random random = {kind};
+    for (int i = 0; i < SPECIMENS_OF_A_KIND; i++) {
+        Specimen specimen = specimen_make(kind, &random);
+        hold(&specimen, 1, specimen.center, specimen.reach, specimen_names[kind], &random);
+    }
+}
+
+static void hits_the_nearest_of_a_crowd(void **state)
+{
+    (void)state;
+    Random random = {SPECIMEN_COUNT};
+    for (int crowd = 0; crowd < CROWD_COUNT; crowd++) {
+        Specimen specimens[CROWD];
+        double reach = 0;
+        for (int i = 0; i < CROWD; i++) {
+            specimens[i] = specimen_make((SpecimenKind)(i % SPECIMEN_COUNT), &random);
+            reach = fmax(reach, vector_length(specimens[i].center) + specimens[i].reach);
+        }
+        hold(specimens, CROWD, (Vector3){0, 0, 0}, reach, "crowd", &random);
+    }
+}
+
+static bool same_bits(const ProbeHit *a, const ProbeHit *b)
+{
+    return a->object == b->object &&
+           (a->object == UINT32_MAX ||
+            (memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0));
+}
+
+static void gives_the_same_bits_at_every_width(void **state)
+{
+    (void)state;
+    static Trial trial;
+    static ProbeHit hits[2][RAYS_PER_SPECIMEN];
+    Random random = {SPECIMEN_COUNT + 1};
+    Specimen specimens[SPECIMEN_COUNT];
+    Object objects[SPECIMEN_COUNT];
+    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
+        specimens[kind] = specimen_make(kind, &random);
+        objects[kind] = specimens[kind].object;
+    }
+    Material material;
+    Scene scene = scene_of(objects, SPECIMEN_COUNT, &material);
+    prepare(&trial, &scene, specimens, SPECIMEN_COUNT, false, &random);
+    for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
+        for (size_t width = 0; width < sizeof lane_counts / sizeof *lane_counts; width++) {
+            ProbeHit *seen = hits[width > 0];
+            assert_true(
+                probe_trace(&scene, precision, lane_counts[width], trial.rays, RAYS_PER_SPECIMEN, seen));
+            for (size_t i = 0; width > 0 && i < RAYS_PER_SPECIMEN; i++)
+                if (!same_bits(&hits[0][i], &seen[i]))
+                    fail_msg("%s: ray %zu differs between 1 and %u lanes", precision_names[precision], i,
+                             lane_counts[width]);
+        }
+    }
+}
+
+int main(void)
+{
+    SpecimenKind kinds[SPECIMEN_COUNT];
+    struct CMUnitTest tests[SPECIMEN_COUNT + 2];
+    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
+        kinds[kind] = kind;
+        tests[kind] = (struct CMUnitTest){specimen_names[kind], hits_each_shape, NULL, NULL, &kinds[kind]};
+    }
+    tests[SPECIMEN_COUNT] = (struct CMUnitTest)cmocka_unit_test(hits_the_nearest_of_a_crowd);
+    tests[SPECIMEN_COUNT + 1] = (struct CMUnitTest)cmocka_unit_test(gives_the_same_bits_at_every_width);
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}

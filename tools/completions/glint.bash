@@ -1,0 +1,42 @@
+# Completion of glint for bash; the options of each subcommand are held to its --help by tests/man_options.sh.
+
+_glint_options() {
+    case ${1-} in
+    render) echo "-o --output --size --samples --region --device --precision --lanes --aov --timing --transfer" \
+        "--bits --no-cache --lenient --quiet -h --help" ;;
+    trace) echo "--rays -o --output --device --precision --lanes --no-cache --lenient -h --help" ;;
+    check) echo "--json --lenient -h --help" ;;
+    devices) echo "--json -h --help" ;;
+    *) echo "--version --help" ;;
+    esac
+}
+
+_glint() {
+    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
+    COMPREPLY=()
+    if [ "$COMP_CWORD" -eq 1 ]; then
+        mapfile -t COMPREPLY < <(compgen -W "render trace check devices $(_glint_options)" -- "$word")
+        return
+    fi
+    # bash splits --option=value into three words.
+    if [ "$word" = = ]; then word=; elif [ "$before" = = ]; then before=${COMP_WORDS[COMP_CWORD - 2]}; fi
+    case $before in
+    --precision) words="fast single strict double" ;;
+    --lanes) words="1 4 8 16" ;;
+    --bits) words="8 16" ;;
+    --transfer) words="srgb none" ;;
+    --device) words="cpu gpu" ;;
+    --aov) words="t normal position object shadow color" ;;
+    --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
+    --size | --samples | --region) return ;;
+    esac
+    [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
+    if [ -n "$words" ]; then
+        mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+    else
+        compopt -o filenames 2>/dev/null
+        mapfile -t COMPREPLY < <(compgen -f -- "$word")
+    fi
+}
+
+complete -F _glint glint

@@ -1,0 +1,68 @@
+#compdef glint
+# Completion of glint for zsh; the options of each subcommand are held to its --help by tests/man_options.sh.
+
+_glint_render() {
+    _arguments \
+        '(-o --output)'{-o,--output}'[where the picture goes]:picture:_files -g "*.(png|ppm|exr|npy)"' \
+        '--size[width and height in pixels]:WxH:' \
+        '--samples[rays for each pixel]:number:' \
+        '--region[pixels of the whole picture to render]:X,Y,W,H:' \
+        '--device[device to render on]:device:(cpu gpu)' \
+        '--precision[how exactly to compute]:precision:(fast single strict double)' \
+        '--lanes[pixels a work-item carries]:lanes:(1 4 8 16)' \
+        '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow color' \
+        '--timing=-[how long each stage took]::form:(json)' \
+        '--transfer[curve from linear light to display values]:curve:(srgb none)' \
+        '--bits[bits a channel]:bits:(8 16)' \
+        '--no-cache[build the kernel anew]' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '--quiet[no progress]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg)"'
+}
+
+_glint_trace() {
+    _arguments \
+        '--rays[file of rays]:rays:_files' \
+        '(-o --output)'{-o,--output}'[where the CSV goes]:file:_files' \
+        '--device[device to trace on]:device:(cpu gpu)' \
+        '--precision[how exactly to compute]:precision:(fast single strict double)' \
+        '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
+        '--no-cache[build the kernel anew]' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg)"'
+}
+
+_glint_check() {
+    _arguments \
+        '--json[for programs]' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg)"'
+}
+
+_glint_devices() {
+    _arguments \
+        '--json[for programs]' \
+        '(- *)'{-h,--help}'[list the options]'
+}
+
+_glint() {
+    local -a subcommands=(
+        'render:render a picture'
+        'trace:shoot explicit rays'
+        'check:read a scene without rendering it'
+        'devices:list the OpenCL devices'
+    )
+    if ((CURRENT == 2)); then
+        _describe -o option "('--version:print the version' '--help:list the subcommands')"
+        _describe subcommand subcommands
+    elif ((${+functions[_glint_$words[2]]})); then
+        shift words
+        ((CURRENT--))
+        "_glint_$words[1]"
+    fi
+}
+
+_glint "$@"
