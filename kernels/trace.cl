@@ -1,7 +1,7 @@
 // Explicit rays, each with its closest hit. Scene and rays are taken as they are.
 #include "surface.h"
 
-// rays: origin, direction, tmin, tmax of each. results: t and the shading normal, facing the ray.
+// rays: origin, direction, tmin, tmax of each. results: t and the geometric normal, facing the ray.
 kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, global scalar *results,
                   global int *objects_hit)
 {
@@ -22,7 +22,7 @@ kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, gl
     Surface surface = surface_at(&scene, &ray, &hit);
 
     RealLanes t = {hit.t};
-    RealLanes x = {surface.shading_normal.x}, y = {surface.shading_normal.y}, z = {surface.shading_normal.z};
+    RealLanes x = {surface.normal.x}, y = {surface.normal.y}, z = {surface.normal.z};
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {
         size_t index = first + lane;
