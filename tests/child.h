@@ -11,6 +11,7 @@ typedef struct {
 // Runs `work` on a copy of `result` and copies back what it left there.
 ChildEnd child_run(void (*work)(void *result), void *result, size_t size);
 
-// An empty folder for this test, also given out as XDG_CACHE_HOME, POCL_CACHE_DIR and TMPDIR; and its removal.
+// An empty folder for this test, also given out as XDG_CACHE_HOME, POCL_CACHE_DIR and TMPDIR; and its
+// removal.
 char *scratch_open(void);
 void scratch_close(char *folder);

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -39,7 +40,8 @@ static int folder_remove(void **state)
 {
     (void)state;
     DIR *entries = opendir(folder);
-    for (const struct dirent *entry; entries && (entry = readdir(entries));)
+    if (!entries) return -1;
+    for (const struct dirent *entry; (entry = readdir(entries));)
         unlink(entry->d_name);
     closedir(entries);
     return chdir("/") == 0 && rmdir(folder) == 0 ? 0 : -1;
@@ -147,6 +149,18 @@ static void test_float_formats(void **state)
     check_float_round_trip("a.npy", 1);
     check_float_round_trip("a.npy", 3);
     check_float_round_trip("a.npy", 5);
+}
+
+// The library reads ahead of a header: a file shorter than that is whole all the same.
+static void test_small_exr(void **state)
+{
+    (void)state;
+    const float value = 0.375F;
+    ImageHeader header = {IMAGE_EXR, 1, 1, 1, TRANSFER_SRGB, 8, 'f', NULL};
+    picture_write("small.exr", &header, &value, sizeof value);
+    Image image = picture_read("small.exr");
+    assert_true(image.width == 1 && image.height == 1 && image.channels == 1 && image.values[0] == value);
+    image_free(&image);
 }
 
 static void test_npy_types(void **state)
@@ -362,7 +376,27 @@ static void test_bad_files(void **state)
                   "NPY: the array must have 2 or 3 dimensions");
     CHECK_REFUSED("\x89PNG", "PNG: the file ends too early");
     CHECK_REFUSED("\x89PNGxxxxxxxxxxxxxxx", "PNG: PNG file corrupted by ASCII conversion");
-    CHECK_REFUSED("\x76\x2F\x31\x01", "EXR: the file ends too early");
+    CHECK_REFUSED("\x76\x2F\x31\x01", "EXR: Unable to read magic and version flags");
+}
+
+static long peak_kibibytes(void)
+{
+    struct rusage usage;
+    assert_int_equal(getrusage(RUSAGE_SELF, &usage), 0);
+    return usage.ru_maxrss;
+}
+
+// Refused before anything of the declared size is made: one of its rows alone would be 300 MB.
+static void test_png_that_declares_too_much(void **state)
+{
+    (void)state;
+    long before = peak_kibibytes();
+    CHECK_REFUSED("\x89PNG\r\n\x1A\n\0\0\0\x0D"
+                  "\x49\x48\x44\x52\x02\xFA\xF0\x80\x7F\xFF\xFF\xFF\x10\x02\x00\x00\x00"
+                  "\x3A\xFA\x01\x4B"
+                  "\0\0\0\0IDAT\x35\xAF\x06\x1E",
+                  "the file is too short for its picture");
+    assert_true(peak_kibibytes() - before < 64 * 1024);
 }
 
 static void test_text_pixmap(void **state)
@@ -383,6 +417,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_display_formats),
         cmocka_unit_test(test_float_formats),
+        cmocka_unit_test(test_small_exr),
         cmocka_unit_test(test_npy_types),
         cmocka_unit_test(test_npy_bytes),
         cmocka_unit_test(test_png_notes),
@@ -392,6 +427,7 @@ int main(void)
         cmocka_unit_test(test_folder_that_is_not_there),
         cmocka_unit_test(test_format_by_ending),
         cmocka_unit_test(test_bad_files),
+        cmocka_unit_test(test_png_that_declares_too_much),
         cmocka_unit_test(test_text_pixmap),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);

@@ -64,8 +64,10 @@ static void check_thresholds(Transfer transfer, unsigned bits)
         float value = (float)linear;
         for (int step = 0; step < 3; step++)
             value = nextafterf(value, 0);
-        for (int step = -3; step <= 3; step++, value = nextafterf(value, 2))
+        for (int step = -3; step <= 3; step++) {
             check_value(value, transfer, bits);
+            value = nextafterf(value, 2);
+        }
     }
 }
 

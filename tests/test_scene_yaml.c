@@ -215,6 +215,27 @@ static void test_block_style_and_number_forms(void **state)
     scene_free(&scene);
 }
 
+static void test_names_in_every_style(void **state)
+{
+    (void)state;
+    char name[400 + 1] = {0}; // longer than one read of a scalar
+    memset(name, 'n', sizeof name - 1);
+    Text text = {0};
+    text_appendf(&text,
+                 CAMERA
+                 "materials:\n  two words: {}\n  'it''s': {}\n  \"caf\\u00e9\\t\\\"x\\\"\": {}\n  %s: {}\n"
+                 "  ? 'it''s\n    folded'\n  : {}\n",
+                 name);
+    Scene scene = scene_of_text("s.yaml", text_c(&text));
+    assert_string_equal(scene.material_names.items[0], "two words");
+    assert_string_equal(scene.material_names.items[1], "it's");
+    assert_string_equal(scene.material_names.items[2], "caf\xC3\xA9\t\"x\"");
+    assert_string_equal(scene.material_names.items[3], name);
+    assert_string_equal(scene.material_names.items[4], "it's folded");
+    scene_free(&scene);
+    text_free(&text);
+}
+
 static void test_tiny_numbers_are_zero(void **state)
 {
     (void)state;
@@ -273,6 +294,7 @@ int main(void)
         cmocka_unit_test(test_defaults),
         cmocka_unit_test(test_focal_length),
         cmocka_unit_test(test_block_style_and_number_forms),
+        cmocka_unit_test(test_names_in_every_style),
         cmocka_unit_test(test_tiny_numbers_are_zero),
         cmocka_unit_test(test_materials_may_follow_objects),
         cmocka_unit_test(test_warnings),

@@ -53,13 +53,13 @@ static void png_note(PngState *state, const ImageNote *note)
     bool is_ascii = true;
     for (const char *at = note->value; *at; at++)
         is_ascii = is_ascii && (unsigned char)*at < 0x80;
-    char *key = memory_copy_text(note->key), *value = memory_copy_text(note->value);
-    png_text text = {.compression = is_ascii ? PNG_TEXT_COMPRESSION_NONE : PNG_ITXT_COMPRESSION_NONE,
-                     .key = key,
-                     .text = value};
-    png_set_text(state->png, state->info, &text, 1);
+    char *key = memory_copy_text(note->key), *content = memory_copy_text(note->value);
+    png_text chunk = {.compression = is_ascii ? PNG_TEXT_COMPRESSION_NONE : PNG_ITXT_COMPRESSION_NONE,
+                      .key = key,
+                      .text = content};
+    png_set_text(state->png, state->info, &chunk, 1);
     free(key);
-    free(value);
+    free(content);
 }
 
 static bool png_begin(ImageWriter *writer, MessageList *messages)
@@ -147,13 +147,14 @@ static bool png_prepare(PngReader *reader, Image *image)
         png_set_expand_gray_1_2_4_to_8(png);
     png_set_strip_alpha(png);
     png_set_interlace_handling(png);
-    png_read_update_info(png, info);
 
     // Deflate makes at most 1032 bytes of one (zlib, technical details); a byte holds at most 8 pixels of a
-    // palette.
+    // palette. Checked before libpng makes room for a row of the declared width.
     if (!image_allocate(image, reader->file, png_get_image_width(png, info), png_get_image_height(png, info),
-                        png_get_channels(png, info), UINT64_C(1032) * 8 * 3 * sizeof *image->values))
+                        png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR ? 3 : 1,
+                        UINT64_C(1032) * 8 * 3 * sizeof *image->values))
         return false;
+    png_read_update_info(png, info);
     reader->state.bytes = calloc(image->height, png_get_rowbytes(png, info));
     return reader->state.bytes || image_refuse(reader->file, "the picture does not fit into memory");
 }

@@ -190,12 +190,12 @@ static bool device_fits(const Device *device, const char *wish)
     return strcasestr(device->name, wish) || strcasestr(device->platform_name, wish);
 }
 
-// The device a wish of digits alone numbers, or NULL: "3090" may still be a part of a name.
-static const Device *device_numbered(const DeviceList *list, const char *wish)
+// Whether the wish is the index of a device: "3090" may still be a part of a name.
+static bool wish_is_index(const DeviceList *list, const char *wish, size_t *index)
 {
-    if (!wish || wish[0] == '\0' || wish[strspn(wish, "0123456789")] != '\0') return NULL;
-    unsigned long index = strtoul(wish, NULL, 10);
-    return index < list->count ? &list->items[index] : NULL;
+    if (!wish || wish[0] == '\0' || wish[strspn(wish, "0123456789")] != '\0') return false;
+    *index = strtoul(wish, NULL, 10);
+    return *index < list->count;
 }
 
 static void complain(const DeviceList *list, const char *wish, MessageList *messages)
@@ -227,15 +227,13 @@ static void complain(const DeviceList *list, const char *wish, MessageList *mess
 const Device *device_choose(const DeviceList *list, const char *wish, MessageList *messages)
 {
     const Device *best = NULL;
-    const Device *numbered = device_numbered(list, wish);
-    if (numbered) {
-        if (device_usable(numbered, NULL)) best = numbered;
-    } else {
-        for (size_t i = 0; i < list->count; i++) {
-            const Device *device = &list->items[i];
-            if (!device_usable(device, NULL) || !device_fits(device, wish)) continue;
-            if (!best || device_rank(device) > device_rank(best)) best = device;
-        }
+    size_t index = 0;
+    bool is_index = wish_is_index(list, wish, &index);
+    for (size_t i = 0; i < list->count; i++) {
+        const Device *device = &list->items[i];
+        if (is_index ? i != index : !device_fits(device, wish)) continue;
+        if (!device_usable(device, NULL)) continue;
+        if (!best || device_rank(device) > device_rank(best)) best = device;
     }
     if (!best) complain(list, wish, messages);
     return best;

@@ -43,25 +43,34 @@ static void node_append(TreeBuilder *builder, YamlNode node)
     parent->last_child = index;
 }
 
-static const char *token_text(struct fy_token *token, size_t *length)
+// Chunk by chunk: libfyaml 0.7's fy_token_get_text loses memory on some quoted texts of several lines, and
+// its fy_token_iter_read mixes up the chunks.
+static bool token_append_text(Text *text, struct fy_token *token)
 {
-    const char *text = fy_token_get_text(token, length);
-    if (!text) fault("libfyaml: out of memory");
-    return text;
+    struct fy_token_iter *iterator = fy_token_iter_create(token);
+    if (!iterator) fault("libfyaml: out of memory");
+    const struct fy_iter_chunk *chunk = NULL;
+    int error = 0;
+    while ((chunk = fy_token_iter_chunk_next(iterator, chunk, &error)))
+        text_append(text, chunk->str, chunk->len);
+    fy_token_iter_destroy(iterator);
+    return !error;
 }
 
 static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode node)
 {
-    size_t length = 0;
-    const char *text = token ? token_text(token, &length) : "";
-    if (memchr(text, '\0', length)) {
+    Text *texts = &builder->tree->texts;
+    node.kind = YAML_SCALAR;
+    node.text = texts->count;
+    if (token && !token_append_text(texts, token)) {
+        report_error(builder->report, node.offset, "not well-formed YAML");
+        return false;
+    }
+    text_append(texts, "", 1);
+    if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1)) {
         report_error(builder->report, node.offset, "a text with a NUL character in it");
         return false;
     }
-    node.kind = YAML_SCALAR;
-    node.text = builder->tree->texts.count;
-    text_append(&builder->tree->texts, text, length);
-    text_append(&builder->tree->texts, "", 1);
     node_append(builder, node);
     return true;
 }
@@ -148,7 +157,7 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
         return scalar_append(builder, event->scalar.value, node);
     case FYET_ALIAS: {
         size_t length;
-        const char *name = token_text(event->alias.anchor, &length);
+        const char *name = fy_token_get_text(event->alias.anchor, &length);
         return alias_append(builder, name, length, node.offset - strlen("*"));
     }
     case FYET_SEQUENCE_START:

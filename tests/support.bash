@@ -1,0 +1,55 @@
+# What the shell tests share, to be sourced first. GLINT is the program under test, BUILD the folder it was built in.
+# Kernel caches, glint's own and the drivers', start empty; $scratch is removed in the end.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
+GLINT=$(realpath "${GLINT:-build/glint}") || exit 1
+[ -x "$GLINT" ] || { echo "there is no program $GLINT: make, or set GLINT"; exit 1; }
+export LC_ALL=C
+unset GLINT_DEVICE
+
+scratch=$(mktemp -d) || exit 1
+trap 'rm -rf "$scratch"' EXIT
+export XDG_CACHE_HOME=$scratch/cache TMPDIR=$scratch
+mkdir "$XDG_CACHE_HOME"
+
+passed=0 failed=0
+
+pass() { passed=$((passed + 1)); }
+fail() {
+    failed=$((failed + 1))
+    printf 'FAILED: %s\n' "$*"
+}
+# check WHAT COMMAND…: passes if the command does.
+check() {
+    local what=$1
+    shift
+    if "$@" >"$scratch/check.log" 2>&1; then
+        pass
+    else
+        fail "$what"
+        sed 's/^/    /' "$scratch/check.log" | head -20
+    fi
+}
+# Ends the test: with 1 if a check failed or none was made.
+finish() {
+    echo "$passed checks passed, $failed failed"
+    [ $failed = 0 ] && [ $passed -gt 0 ]
+    exit
+}
+skip_all() {
+    echo "skipped: $*"
+    exit 77
+}
+is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
+
+# npy_same A B WIDTH: both hold the same bytes, else says at which of their pixels (three floats each) they differ first.
+npy_same() {
+    local offset header=128 pixel
+    cmp -s "$1" "$2" && return
+    [ "$(stat -c %s "$1")" = "$(stat -c %s "$2")" ] || { echo "$1 and $2 differ in size"; return 1; }
+    offset=$(cmp "$1" "$2" | sed -n 's/.*byte \([0-9]*\),.*/\1/p')
+    pixel=$(((offset - 1 - header) / 12))
+    echo "$(($(cmp -l "$1" "$2" | awk -v h=$header '{ print int(($1 - 1 - h) / 12) }' | uniq | wc -l))) pixels differ," \
+        "first at $((pixel % $3)),$((pixel / $3)), channel $(((offset - 1 - header) / 4 % 3))"
+    return 1
+}

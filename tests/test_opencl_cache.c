@@ -1,0 +1,231 @@
+// The kernel cache on disk; no device is needed.
+#include "host/opencl/cache.h"
+#include "host/opencl/compose.h"
+#include "tests/child.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+static const char key[] = "device x\ntext y";
+static const char machine_code[] = "machine\0code\xff\n";
+enum { CODE_LENGTH = sizeof machine_code };
+
+static char *folder;
+
+static int set_up(void **state)
+{
+    (void)state;
+    folder = scratch_open();
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scratch_close(folder);
+    return 0;
+}
+
+static void store(const char *entry_key)
+{
+    Text binary = {0};
+    text_append(&binary, machine_code, CODE_LENGTH);
+    cache_store(entry_key, &binary);
+    text_free(&binary);
+}
+
+static bool loads(const char *entry_key)
+{
+    Text binary = {0};
+    bool found = cache_load(entry_key, &binary);
+    if (found) {
+        assert_int_equal(binary.count, CODE_LENGTH);
+        assert_memory_equal(binary.items, machine_code, CODE_LENGTH);
+    } else {
+        assert_int_equal(binary.count, 0);
+    }
+    text_free(&binary);
+    return found;
+}
+
+static void file_write(const char *path, const void *bytes, size_t length)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, length, file), length);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void test_store_and_load(void **state)
+{
+    (void)state;
+    assert_false(loads(key));
+    store(key);
+    assert_true(loads(key));
+    assert_false(loads("device x\ntext z"));
+    assert_false(loads(""));
+
+    Text path = {0};
+    text_appendf(&path, "%s/glint", folder);
+    struct stat status;
+    assert_int_equal(stat(text_c(&path), &status), 0);
+    assert_int_equal(status.st_mode & 0777, 0700);
+    text_free(&path);
+}
+
+// Each byte changed, each shorter length, one byte more; then repaired by storing again.
+static void test_damage(void **state)
+{
+    (void)state;
+    store(key);
+    char *path = cache_entry_path(key);
+    MessageList messages = {0};
+    Text entry = {0};
+    assert_true(text_read_file(&entry, path, &messages));
+    assert_true(entry.count > strlen(key) + CODE_LENGTH);
+    for (size_t i = 0; i < entry.count; i++) {
+        entry.items[i] ^= 0x10;
+        file_write(path, entry.items, entry.count);
+        assert_false(loads(key));
+        entry.items[i] ^= 0x10;
+    }
+    for (size_t length = 0; length < entry.count; length++) {
+        file_write(path, entry.items, length);
+        assert_false(loads(key));
+    }
+    file_write(path, entry.items, entry.count);
+    assert_true(loads(key));
+    text_append(&entry, "", 1);
+    file_write(path, entry.items, entry.count);
+    assert_false(loads(key));
+
+    store(key);
+    assert_true(loads(key));
+    text_free(&entry);
+    free(path);
+}
+
+// As if two keys had one hash: the entry of the one lies where the other is looked for.
+static void test_entry_of_another_key(void **state)
+{
+    (void)state;
+    store("another key");
+    store(key);
+    char *from = cache_entry_path("another key"), *to = cache_entry_path(key);
+    assert_int_equal(rename(from, to), 0);
+    assert_false(loads(key));
+    free(from);
+    free(to);
+}
+
+static void test_entry_without_rights(void **state)
+{
+    (void)state;
+    store(key);
+    char *path = cache_entry_path(key);
+    assert_int_equal(chmod(path, 0), 0);
+    if (geteuid() != 0) assert_false(loads(key));
+    store(key);
+    assert_true(loads(key));
+    free(path);
+}
+
+static void test_no_place(void **state)
+{
+    (void)state;
+    const char *before = getenv("HOME");
+    char *home = before ? strdup(before) : NULL;
+    unsetenv("HOME");
+    unsetenv("XDG_CACHE_HOME");
+    assert_null(cache_entry_path(key));
+    store(key);
+    assert_false(loads(key));
+    setenv("XDG_CACHE_HOME", "relative", 1);
+    assert_null(cache_entry_path(key));
+    store(key);
+    assert_int_not_equal(access("relative", F_OK), 0);
+
+    setenv("HOME", folder, 1);
+    char *path = cache_entry_path(key), *expected = NULL;
+    assert_true(asprintf(&expected, "%s/.cache/glint/", folder) > 0);
+    assert_memory_equal(path, expected, strlen(expected));
+    store(key);
+    assert_true(loads(key));
+    free(path);
+    free(expected);
+    if (home)
+        setenv("HOME", home, 1);
+    else
+        unsetenv("HOME");
+    free(home);
+}
+
+// A file where the folder should be stops root, too.
+static void test_unwritable(void **state)
+{
+    (void)state;
+    char *path = NULL;
+    assert_true(asprintf(&path, "%s/glint", folder) > 0);
+    file_write(path, "in the way", 10);
+    store(key);
+    assert_false(loads(key));
+    free(path);
+}
+
+static void test_folder_in_place_of_entry(void **state)
+{
+    (void)state;
+    store(key);
+    char *path = cache_entry_path(key);
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(mkdir(path, 0700), 0);
+    assert_false(loads(key));
+    store(key);
+    assert_false(loads(key));
+    free(path);
+}
+
+// While two processes replace the entry, a reader always finds it whole.
+static void test_many_processes(void **state)
+{
+    (void)state;
+    store(key);
+    pid_t writers[2];
+    for (int i = 0; i < 2; i++) {
+        writers[i] = fork();
+        if (writers[i] == 0) {
+            for (int j = 0; j < 500; j++)
+                store(key);
+            _exit(0);
+        }
+    }
+    for (int i = 0; i < 1000; i++)
+        assert_true(loads(key));
+    for (int i = 0; i < 2; i++) {
+        int status;
+        assert_int_equal(waitpid(writers[i], &status, 0), writers[i]);
+        assert_int_equal(status, 0);
+    }
+    assert_true(loads(key));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_store_and_load, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_of_another_key, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_without_rights, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_no_place, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_unwritable, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_folder_in_place_of_entry, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_many_processes, set_up, tear_down),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,410 @@
+// Programs on the device of this machine: built, launched, cached. Each step is a process of its own, as
+// users run them: what the first one leaves, the next one finds.
+#include "host/opencl/cache.h"
+#include "host/opencl/compose.h"
+#include "tests/child.h"
+#include <ftw.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+static char *folder;
+
+static int set_up(void **state)
+{
+    (void)state;
+    folder = scratch_open();
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scratch_close(folder);
+    return 0;
+}
+
+// features.h has nothing for the device: the prelude is the kernel.
+static const char triple[] =
+    "kernel void triple(global uint *values) { values[get_global_id(0)] = 3 * get_global_id(0); }\n";
+
+typedef struct {
+    DeviceList list;
+    Compute compute;
+} Opened;
+
+static void opened_open(Opened *opened)
+{
+    MessageList messages = {0};
+    device_list_open(&opened->list);
+    const Device *device = device_choose(&opened->list, device_wish(NULL), &messages);
+    message_list_print(&messages, stderr);
+    if (!device) _exit(77);
+    compute_open(&opened->compute, device);
+}
+
+static void opened_close(Opened *opened)
+{
+    compute_close(&opened->compute);
+    compute_close(&opened->compute);
+    device_list_close(&opened->list);
+}
+
+// Shared objects in the folder: PoCL's finished machine code. Other runtimes have none.
+static size_t shared_object_count;
+
+static int count_one(const char *path, const struct stat *status, int kind, struct FTW *place)
+{
+    (void)status, (void)kind, (void)place;
+    size_t length = strlen(path);
+    shared_object_count += length > 3 && strcmp(path + length - 3, ".so") == 0;
+    return 0;
+}
+
+static size_t count_shared_objects(void)
+{
+    shared_object_count = 0;
+    const char *drivers_cache = getenv("POCL_CACHE_DIR");
+    if (drivers_cache) nftw(drivers_cache, count_one, 16, FTW_PHYS);
+    return shared_object_count;
+}
+
+typedef struct {
+    ProgramRequest request;
+    bool from_cache, is_pocl, times_sound;
+    uint64_t text_hash;
+    cl_uint values[16];
+    size_t compiled_before_launch, compiled_after_launch;
+} Run;
+
+static void run_triple(void *result)
+{
+    Run *run = result;
+    Opened opened;
+    opened_open(&opened);
+    Compute *compute = &opened.compute;
+    Program program;
+    program_build(compute, &run->request, &program);
+    run->from_cache = program.from_cache;
+    run->text_hash = program.text_hash;
+    run->is_pocl = strstr(compute->device->platform_name, "Portable Computing Language") != NULL;
+    run->compiled_before_launch = count_shared_objects();
+
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program.program, "triple", &status);
+    cl_check(status, "clCreateKernel");
+    cl_mem buffer = buffer_create(compute, sizeof run->values, NULL, CL_MEM_READ_WRITE);
+    kernel_argument(kernel, 0, sizeof buffer, &buffer);
+    LaunchTime time = kernel_launch(compute, kernel, 1, (const size_t[]){16}, (const size_t[]){8});
+    run->times_sound = time.host_seconds > 0 && (!time.trusted || time.event_seconds > 0);
+    run->compiled_after_launch = count_shared_objects();
+    cl_must(clEnqueueReadBuffer(compute->queue, buffer, CL_TRUE, 0, sizeof run->values, run->values, 0, NULL,
+                                NULL));
+
+    program_store(compute, &run->request, &program);
+    cl_must(clReleaseMemObject(buffer));
+    cl_must(clReleaseKernel(kernel));
+    program_close(&program);
+    program_close(&program);
+    opened_close(&opened);
+}
+
+static Run run_in_child(ProgramRequest request)
+{
+    Run run = {.request = request};
+    ChildEnd end = child_run(run_triple, &run, sizeof run);
+    if (end.status != 0) print_error("%s\n", end.errors);
+    assert_int_equal(end.status, 0);
+    assert_true(run.times_sound);
+    for (cl_uint i = 0; i < 16; i++)
+        assert_int_equal(run.values[i], 3 * i);
+    return run;
+}
+
+static ProgramRequest triple_request(void)
+{
+    return (ProgramRequest){.root = "features.h", .prelude = triple, .launch = "triple 8"};
+}
+
+static void drivers_own_cache_empty(void)
+{
+    char *empty = NULL;
+    assert_true(asprintf(&empty, "%s/driver-XXXXXX", folder) > 0);
+    assert_non_null(mkdtemp(empty));
+    setenv("POCL_CACHE_DIR", empty, 1);
+    free(empty);
+}
+
+static void test_cold_and_warm(void **state)
+{
+    (void)state;
+    Run cold = run_in_child(triple_request());
+    assert_false(cold.from_cache);
+    drivers_own_cache_empty();
+    Run warm = run_in_child(triple_request());
+    assert_true(warm.from_cache);
+    assert_true(warm.text_hash == cold.text_hash);
+    // What the cache gave is machine code for this very launch.
+    assert_int_equal(warm.compiled_before_launch, warm.compiled_after_launch);
+    if (warm.is_pocl) assert_true(warm.compiled_before_launch > 0);
+}
+
+static void test_what_the_key_holds(void **state)
+{
+    (void)state;
+    ProgramRequest request = triple_request();
+    run_in_child(request);
+    assert_true(run_in_child(request).from_cache);
+    request.options = "-cl-fast-relaxed-math";
+    assert_false(run_in_child(request).from_cache);
+    assert_true(run_in_child(request).from_cache);
+    request.launch = "triple 16";
+    assert_false(run_in_child(request).from_cache);
+    char *other = NULL;
+    assert_true(asprintf(&other, "%s\n", triple) > 0);
+    request = triple_request();
+    request.prelude = other;
+    assert_false(run_in_child(request).from_cache);
+    free(other);
+}
+
+static void test_no_cache(void **state)
+{
+    (void)state;
+    ProgramRequest request = triple_request();
+    run_in_child(request);
+    request.no_cache = true;
+    for (int i = 0; i < 2; i++) {
+        Run run = run_in_child(request);
+        assert_false(run.from_cache);
+        // PoCL did not find what it had built before.
+        if (run.is_pocl) assert_true(run.compiled_after_launch > run.compiled_before_launch);
+    }
+}
+
+static char *entry_path_found;
+
+static int find_entry(const char *path, const struct stat *status, int kind, struct FTW *place)
+{
+    (void)status, (void)kind, (void)place;
+    if (!strstr(path, "/glint/") || !strstr(path, ".bin")) return 0;
+    entry_path_found = strdup(path);
+    return 1;
+}
+
+// The one entry of the cache; `key` gets its key, which lies behind a header of 40 bytes with its length
+// at 16.
+static Text the_entry(char **key)
+{
+    entry_path_found = NULL;
+    nftw(folder, find_entry, 16, FTW_PHYS);
+    assert_non_null(entry_path_found);
+    Text entry = {0};
+    MessageList messages = {0};
+    assert_true(text_read_file(&entry, entry_path_found, &messages));
+    uint64_t key_length;
+    memcpy(&key_length, entry.items + 16, sizeof key_length);
+    *key = strndup(entry.items + 40, key_length);
+    return entry;
+}
+
+static void test_damaged_entry_is_replaced(void **state)
+{
+    (void)state;
+    run_in_child(triple_request());
+    char *key;
+    Text entry = the_entry(&key);
+    FILE *file = fopen(entry_path_found, "r+b");
+    assert_non_null(file);
+    assert_int_equal(fseek(file, -1, SEEK_END), 0);
+    assert_int_equal(fputc(entry.items[entry.count - 1] ^ 1, file),
+                     (unsigned char)(entry.items[entry.count - 1] ^ 1));
+    assert_int_equal(fclose(file), 0);
+    assert_false(run_in_child(triple_request()).from_cache);
+    assert_true(run_in_child(triple_request()).from_cache);
+    free(entry_path_found);
+    free(key);
+    text_free(&entry);
+}
+
+// A whole entry whose binary the driver cannot use.
+static void test_refused_binary_is_replaced(void **state)
+{
+    (void)state;
+    run_in_child(triple_request());
+    char *key;
+    Text entry = the_entry(&key), nonsense = {0};
+    assert_string_equal(key + strlen(key) - strlen("#endif\n"), "#endif\n");
+    text_appendf(&nonsense, "no binary of any driver");
+    cache_store(key, &nonsense);
+    assert_false(run_in_child(triple_request()).from_cache);
+    assert_true(run_in_child(triple_request()).from_cache);
+    free(entry_path_found);
+    free(key);
+    text_free(&entry);
+    text_free(&nonsense);
+}
+
+static void test_two_processes_at_once(void **state)
+{
+    (void)state;
+    pid_t children[2];
+    for (int i = 0; i < 2; i++) {
+        children[i] = fork();
+        if (children[i] == 0) {
+            Run run = {.request = triple_request()};
+            run_triple(&run);
+            _exit(run.values[5] == 15 ? 0 : 1);
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        int status;
+        assert_int_equal(waitpid(children[i], &status, 0), children[i]);
+        assert_int_equal(status, 0);
+    }
+    assert_true(run_in_child(triple_request()).from_cache);
+}
+
+static void test_unwritable_cache(void **state)
+{
+    (void)state;
+    setenv("XDG_CACHE_HOME", "/dev/null", 1);
+    assert_false(run_in_child(triple_request()).from_cache);
+    assert_false(run_in_child(triple_request()).from_cache);
+}
+
+static void test_text_that_does_not_compile(void **state)
+{
+    (void)state;
+    Run run = {.request = {.root = "features.h",
+                           .prelude = "// one\nkernel void triple(global uint *v) { v[0] = x; }"}};
+    ChildEnd end = child_run(run_triple, &run, sizeof run);
+    assert_int_equal(end.status, 2);
+    assert_non_null(strstr(end.errors, "CL_BUILD_PROGRAM_FAILURE"));
+    assert_non_null(strstr(end.errors, "prelude:2"));
+    char *saved = strstr(end.errors, folder);
+    assert_non_null(saved);
+    saved[strcspn(saved, "\n")] = '\0';
+    Text text = {0};
+    MessageList messages = {0};
+    assert_true(text_read_file(&text, saved, &messages));
+    assert_non_null(strstr(text_c(&text), "#line 1 \"features.h\""));
+    text_free(&text);
+}
+
+static void test_missing_root(void **state)
+{
+    (void)state;
+    Run run = {.request = {.root = "absent.cl", .prelude = ""}};
+    ChildEnd end = child_run(run_triple, &run, sizeof run);
+    assert_int_equal(end.status, 2);
+    assert_non_null(strstr(end.errors, "absent.cl"));
+}
+
+static const KernelFile broken_files[] = {
+    {"root.cl", "// one\n#include \"good.h\"\n#include \"broken.h\"\n"},
+    {"good.h", "// a\n// b\n// c\n"},
+    {"broken.h", "// one\n#include \"good.h\"\n#include \"inner.h\"\nint broken = missing_name;\n"},
+    {"inner.h", "// one\n// two\n"},
+    {NULL, NULL},
+};
+
+typedef struct {
+    char log[4096];
+} BuildLog;
+
+static void build_broken(void *result)
+{
+    Opened opened;
+    opened_open(&opened);
+    char *text = kernel_compose(broken_files, "root.cl", "", NULL);
+    cl_int status;
+    cl_program program =
+        clCreateProgramWithSource(opened.compute.context, 1, (const char *[]){text}, NULL, &status);
+    cl_check(status, "clCreateProgramWithSource");
+    cl_device_id id = opened.compute.device->id;
+    if (clBuildProgram(program, 1, &id, "", NULL, NULL) == CL_SUCCESS) _exit(1);
+    char log[4096] = "";
+    clGetProgramBuildInfo(program, id, CL_PROGRAM_BUILD_LOG, sizeof log, log, NULL);
+    memcpy(((BuildLog *)result)->log, log, sizeof log);
+    free(text);
+    clReleaseProgram(program);
+    opened_close(&opened);
+}
+
+static void test_place_of_a_compile_error(void **state)
+{
+    (void)state;
+    BuildLog log = {0};
+    assert_int_equal(child_run(build_broken, &log, sizeof log).status, 0);
+    if (!strstr(log.log, "broken.h:4")) print_error("%s\n", log.log);
+    assert_non_null(strstr(log.log, "broken.h:4"));
+}
+
+static void ask_for_too_much(void *result)
+{
+    (void)result;
+    Opened opened;
+    opened_open(&opened);
+    buffer_create(&opened.compute, SIZE_MAX / 2, NULL, CL_MEM_READ_WRITE);
+}
+
+static void use_an_absent_argument(void *result)
+{
+    Run *run = result;
+    Opened opened;
+    opened_open(&opened);
+    Program program;
+    program_build(&opened.compute, &run->request, &program);
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program.program, "triple", &status);
+    cl_check(status, "clCreateKernel");
+    kernel_argument(kernel, 7, sizeof status, &status);
+}
+
+static void make_empty_buffers(void *result)
+{
+    (void)result;
+    Opened opened;
+    opened_open(&opened);
+    cl_must(clReleaseMemObject(buffer_create(&opened.compute, 0, NULL, CL_MEM_READ_ONLY)));
+    cl_must(clReleaseMemObject(buffer_create(&opened.compute, 0, "", CL_MEM_READ_ONLY)));
+    opened_close(&opened);
+}
+
+static void test_faults(void **state)
+{
+    (void)state;
+    Run run = {.request = triple_request()};
+    ChildEnd end = child_run(ask_for_too_much, &run, sizeof run);
+    assert_int_equal(end.status, 2);
+    assert_non_null(strstr(end.errors, "MiB asked for"));
+    end = child_run(use_an_absent_argument, &run, sizeof run);
+    assert_int_equal(end.status, 2);
+    assert_non_null(strstr(end.errors, "argument 7 of triple"));
+    assert_non_null(strstr(end.errors, "CL_INVALID_ARG_INDEX"));
+    assert_int_equal(child_run(make_empty_buffers, &run, sizeof run).status, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_cold_and_warm, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_what_the_key_holds, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_no_cache, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_damaged_entry_is_replaced, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_refused_binary_is_replaced, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_two_processes_at_once, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_unwritable_cache, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_text_that_does_not_compile, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_missing_root, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_place_of_a_compile_error, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_faults, set_up, tear_down),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,465 @@
+// Pictures whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard cases.
+#include "host/render/camera_basis.h"
+#include "tests/frame.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+static Scene scene_of(const char *format, ...) __attribute__((format(printf, 1, 2)));
+static Scene scene_of(const char *format, ...)
+{
+    char text[2048];
+    va_list arguments;
+    va_start(arguments, format);
+    int length = vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    assert_in_range(length, 1, sizeof text - 1);
+    MessageList messages = {0};
+    Source source = {"picture.yaml", text, (size_t)length};
+    Scene scene;
+    bool read = scene_read_yaml(&scene, &source, &messages);
+    if (!read) message_list_print(&messages, stderr);
+    message_list_free(&messages); // warnings are not the point here
+    assert_true(read);
+    return scene;
+}
+
+// The case that a failing check belongs to.
+static char place[160];
+
+#define check(condition)                                                                                           \
+    do {                                                                                                           \
+        if (!(condition)) fail_msg("%s: not so: %s (line %d)", place, #condition, __LINE__);                       \
+    } while (0)
+
+static Frame render(const Scene *scene, uint32_t width, uint32_t height, Precision precision, unsigned aovs)
+{
+    RenderSettings settings = frame_settings(width, height, precision);
+    settings.extra_features = FEATURE_ALL; // one build for all of this file's scenes
+    Frame frame = frame_render(&probe_compute, scene, &settings, aovs);
+    check(frame_count_faulty(&frame) == 0);
+    return frame;
+}
+
+// Runs a check at every precision the device has.
+static void at_each_precision(void (*run)(Precision precision))
+{
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        if (!probe_has(precision)) continue;
+        snprintf(place, sizeof place, "%s", precision_names[precision]);
+        run(precision);
+    }
+}
+
+static bool near(double value, double expected, double tolerance)
+{
+    return fabs(value - expected) <= tolerance;
+}
+
+// The world's place behind a pixel.
+static Vector3 frame_place(const Frame *frame, const Scene *scene, size_t pixel)
+{
+    const double *p = frame->position + 3 * pixel;
+    return vector_add((Vector3){p[0], p[1], p[2]}, scene->camera.position);
+}
+
+// Numbers that float holds exactly: the answer is exact at every precision.
+static void background_and_ambient_at(Precision precision)
+{
+    Scene scene = scene_of("camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 90}\n"
+                           "background: [0.125, 0.25, 2]\nambient: [0.5, 0.25, 1]\n"
+                           "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {color: [0.5, 1, 0.25], "
+                           "ambient: 0.75}}}]\n");
+    Frame frame = render(&scene, 31, 31, precision, AOV_OBJECT | AOV_T);
+    size_t seen = 0;
+    for (size_t i = 0; i < (size_t)31 * 31; i++) {
+        const double *color = frame.colors + 3 * i;
+        if (frame.object[i] == UINT32_MAX) {
+            check(isinf(frame.t[i]));
+            check(color[0] == 0.125 && color[1] == 0.25 && color[2] == 2);
+        } else {
+            seen++;
+            check(frame.object[i] == 0);
+            check(color[0] == 0.5 * 0.75 * 0.5 && color[1] == 0.25 * 0.75 && color[2] == 0.75 * 0.25);
+        }
+    }
+    // the sphere's outline has the half-angle asin(1/4): a circle of radius 15.5 tan(asin(1/4)) pixels
+    double radius = 15.5 * 0.25 / sqrt(15.0 / 16);
+    check(near((double)seen, M_PI * radius * radius, 4));
+    frame_free(&frame);
+    scene_free(&scene);
+}
+
+static void background_and_ambient(void **state)
+{
+    (void)state;
+    at_each_precision(background_and_ambient_at);
+}
+
+// A light straight above a plane, seen from above: kd C I N.L, and with ks the whole highlight in the middle.
+static void light_above_plane_at(Precision precision)
+{
+    Scene scene = scene_of("camera: {position: [0, 2, 0], look_at: [0, 0, 0], up: [0, 0, 1], fov: 90}\n"
+                           "lights: [{point: {position: [0, 4, 0], color: [1, 0.5, 0.25], intensity: 0.5}}]\n"
+                           "objects: [{plane: {point: [0, 0, 0], normal: [0, 3, 0], material: {color: [0.5, 1, 0.5], "
+                           "diffuse: [0.5, 0.25, 1]}}}]\n");
+    Frame frame = render(&scene, 33, 33, precision, AOV_POSITION);
+    double tolerance = precision == PRECISION_FAST ? 1e-5 : precision == PRECISION_DOUBLE ? 1e-14 : 3e-7;
+    for (size_t i = 0; i < (size_t)33 * 33; i++) {
+        Vector3 p = frame_place(&frame, &scene, i);
+        // one pixel spans 4/33 on the plane
+        check(near(fabs(p.x), fabs((double)(i % 33) - 16) * 4 / 33, 1e-5));
+        check(near(p.y, 0, 1e-6));
+        double facing = 4 / sqrt(16 + p.x * p.x + p.z * p.z);
+        check(near(frame.colors[3 * i], 0.125 * facing, tolerance));
+        check(near(frame.colors[3 * i + 1], 0.0625 * facing, tolerance));
+        check(near(frame.colors[3 * i + 2], 0.0625 * facing, tolerance));
+    }
+    size_t middle = 16 * 33 + 16;
+    if (precision != PRECISION_FAST) check(frame.colors[3 * middle] == 0.125);
+    frame_free(&frame);
+
+    scene.materials.items[scene.objects.items[0].material].specular = 0.75;
+    Frame shiny = render(&scene, 33, 33, precision, 0);
+    check(near(shiny.colors[3 * middle], 0.125 + 0.5 * 0.75, tolerance));
+    check(near(shiny.colors[3 * middle + 1], 0.0625 + 0.25 * 0.75, tolerance));
+    frame_free(&shiny);
+    scene_free(&scene);
+}
+
+static void light_above_plane(void **state)
+{
+    (void)state;
+    at_each_precision(light_above_plane_at);
+}
+
+// R1: a sphere standing on a plane, a light above: the shadow's radius is 10 / sqrt(80), and it reaches the contact.
+static void contact_shadow_at(Precision precision)
+{
+    Scene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
+                           "lights: [{point: {position: [0, 10, 0]}}]\n"
+                           "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                           "  - sphere: {center: [0, 1, 0], radius: 1}\n");
+    Frame frame = render(&scene, 480, 360, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW);
+    const double edge = 10 / sqrt(80.0);
+    size_t dark = 0, bright = 0;
+    for (size_t i = 0; i < (size_t)480 * 360; i++) {
+        if (frame.object[i] == UINT32_MAX) continue;
+        Vector3 p = frame_place(&frame, &scene, i);
+        bool lit = frame.shadow[i] == 0;
+        check(lit == (frame.colors[3 * i] > 0));
+        if (frame.object[i] == 0) {
+            double distance = hypot(p.x, p.z);
+            if (distance < edge * (1 - 1e-5)) check(!lit);
+            if (distance > edge * (1 + 1e-5)) check(lit);
+        } else {
+            Vector3 to_light = vector_normalize(vector_subtract((Vector3){0, 10, 0}, p));
+            double facing = vector_dot((Vector3){p.x, p.y - 1, p.z}, to_light);
+            if (fabs(facing) > 1e-5) check(lit == (facing > 0));
+        }
+        *(lit ? &bright : &dark) += 1;
+    }
+    check(dark > 1000 && bright > 10000);
+    frame_free(&frame);
+    scene_free(&scene);
+}
+
+static void contact_shadow(void **state)
+{
+    (void)state;
+    at_each_precision(contact_shadow_at);
+}
+
+// A spot straight down on a plane from height 5: the cone of 30 degrees meets it in a circle of radius 5 tan 30, full
+// within 5 tan 20 where the penumbra is 10 degrees wide.
+static void spot_cone_at(Precision precision)
+{
+    Scene scene = scene_of("camera: {position: [0.3, 6, -0.4], look_at: [0.2, 0, 0.1], up: [0, 0, 1], fov: 70}\n"
+                           "lights: [{spot: {position: [0, 5, 0], look_at: [0, 0, 0], angle: 30, penumbra: 10}}]\n"
+                           "objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}}]\n");
+    const double outer = 5 * tan(M_PI / 6), inner = 5 * tan(M_PI / 9);
+    const double versine_outer = 1 - cos(M_PI / 6), versine_inner = 1 - cos(M_PI / 9);
+    Frame soft = render(&scene, 160, 160, precision, AOV_POSITION);
+    scene.lights.items[0].penumbra = 0;
+    Frame hard = render(&scene, 160, 160, precision, AOV_POSITION);
+    size_t between = 0;
+    for (size_t i = 0; i < (size_t)160 * 160; i++) {
+        Vector3 p = frame_place(&soft, &scene, i);
+        double distance = hypot(p.x, p.z), facing = 5 / hypot(5, distance);
+        double x = (versine_outer - (1 - facing)) / (versine_outer - versine_inner);
+        double strength = x <= 0 ? 0 : x >= 1 ? 1 : x * x * (3 - 2 * x);
+        check(near(soft.colors[3 * i], facing * strength, 2e-5));
+        if (distance < inner * (1 - 1e-5)) check(near(soft.colors[3 * i], facing, 1e-5));
+        if (distance < outer * (1 - 1e-5)) check(near(hard.colors[3 * i], facing, 1e-5));
+        if (distance > outer * (1 + 1e-5)) check(soft.colors[3 * i] == 0 && hard.colors[3 * i] == 0);
+        between += strength > 0 && strength < 1;
+    }
+    check(between > 1000);
+    frame_free(&soft);
+    frame_free(&hard);
+    scene_free(&scene);
+}
+
+static void spot_cone(void **state)
+{
+    (void)state;
+    at_each_precision(spot_cone_at);
+}
+
+// What Phong's term is at the surface that the frame says lies behind a pixel.
+static long double highlight_of(const Frame *frame, const Scene *scene, size_t pixel, double shininess)
+{
+    const double *p = frame->position + 3 * pixel, *n = frame->normal + 3 * pixel;
+    Vector3 eye = scene->camera.position, light = scene->lights.items[0].position;
+    long double to_light[3] = {light.x - eye.x - p[0], light.y - eye.y - p[1], light.z - eye.z - p[2]};
+    long double to_eye[3] = {-p[0], -p[1], -p[2]};
+    long double facing = 0, squared_light = 0, squared_eye = 0, squared_normal = 0;
+    for (size_t k = 0; k < 3; k++) {
+        facing += n[k] * to_light[k];
+        squared_light += to_light[k] * to_light[k];
+        squared_eye += to_eye[k] * to_eye[k];
+        squared_normal += (long double)n[k] * n[k];
+    }
+    if (facing <= 0) return 0;
+    long double squared_difference = 0;
+    for (size_t k = 0; k < 3; k++) {
+        long double reflected = 2 * facing / squared_normal * n[k] - to_light[k];
+        long double difference = reflected / sqrtl(squared_light) - to_eye[k] / sqrtl(squared_eye);
+        squared_difference += difference * difference;
+    }
+    long double s = squared_difference / 2;
+    if (shininess == 0) return 1;
+    return s >= 1 ? 0 : expl((long double)shininess * log1pl(-s));
+}
+
+// R5: highlights of every sharpness on a sphere; never below 0 nor above ks, nor NaN. Light and eye are as far from the
+// center, so that the peak lies halfway between; the field of view narrows with the highlight.
+static void highlight_at(Precision precision)
+{
+    static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
+    Scene scene = scene_of("camera: {position: [0.5, 0.25, 4], look_at: [0, 0, 1], fov: 32}\n"
+                           "lights: [{point: {position: [-0.25, 0.5, 4]}}]\n"
+                           "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {diffuse: 0, specular: 1}}}]\n");
+    scene.camera.look_at = vector_normalize(vector_add(scene.camera.position, scene.lights.items[0].position));
+    for (size_t e = 0; e < sizeof exponents / sizeof *exponents; e++) {
+        snprintf(place, sizeof place, "%s, shininess %g", precision_names[precision], exponents[e]);
+        scene.camera.half_tangent = fmin(0.3, 0.6 / sqrt(fmax(exponents[e], 1)));
+        scene.materials.items[scene.objects.items[0].material].shininess = exponents[e];
+        // `single` is held to 1e4 only: beyond, the normal's own rounding shows
+        double tolerance = precision == PRECISION_DOUBLE   ? 1e-8
+                           : precision == PRECISION_STRICT ? 1e-4
+                           : precision == PRECISION_SINGLE && exponents[e] <= 1e4 ? 2e-3
+                                                                                   : 2;
+        Frame frame = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
+        double brightest = 0;
+        for (size_t i = 0; i < (size_t)201 * 201; i++) {
+            double value = frame.colors[3 * i];
+            check(value >= 0 && value <= 1 + 0x1p-20);
+            brightest = fmax(brightest, value);
+            if (frame.object[i] == UINT32_MAX) continue;
+            double expected = (double)highlight_of(&frame, &scene, i, exponents[e]);
+            // where the light only grazes, its own sign is a matter of rounding
+            if (exponents[e] >= 1 || value != 0) check(near(value, expected, tolerance));
+        }
+        if (precision != PRECISION_FAST) check(brightest > 1 - 1e-3);
+        frame_free(&frame);
+    }
+    scene_free(&scene);
+}
+
+static void highlight(void **state)
+{
+    (void)state;
+    at_each_precision(highlight_at);
+}
+
+// P2: a tilted plane of size S at distance O from the world's origin, under a low sun: not one pixel shadows itself.
+static void tilted_plane_at(Precision precision)
+{
+    static const double pairs[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
+    static const double elevations[] = {0.01, 1, 45};
+    const Vector3 n = vector_normalize((Vector3){1, 2, 3});
+    const Vector3 e = vector_normalize(vector_cross(n, (Vector3){1, 0, 0}));
+    Scene scene = scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\n"
+                           "lights: [{directional: {direction: [0, 0, 1]}}]\n"
+                           "objects: [{plane: {point: [0, 0, 0], normal: [1, 2, 3], material: {diffuse: 0.75}}}]\n");
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        double size = pairs[i][0], offset = pairs[i][1];
+        Vector3 p = {0.3 * size + offset, -0.2 * size - 2 * offset, 0.5 * size + 0.5 * offset};
+        scene.objects.items[0].as.plane.point = p;
+        scene.camera.look_at = p;
+        scene.camera.position =
+            vector_add(p, vector_add(vector_scale(n, 3 * size), vector_scale(e, 0.5 * size)));
+        for (size_t k = 0; k < sizeof elevations / sizeof *elevations; k++) {
+            snprintf(place, sizeof place, "%s, S %g, O %g, sun at %g degrees", precision_names[precision], size, offset,
+                     elevations[k]);
+            double angle = elevations[k] * M_PI / 180;
+            scene.lights.items[0].direction =
+                vector_add(vector_scale(n, -sin(angle)), vector_scale(e, -cos(angle)));
+            Frame frame = render(&scene, 128, 128, precision, AOV_SHADOW | AOV_OBJECT);
+            for (size_t pixel = 0; pixel < (size_t)128 * 128; pixel++) {
+                check(frame.object[pixel] == 0);
+                check(frame.shadow[pixel] == 0);
+                check(frame.colors[3 * pixel] == frame.colors[0]);
+            }
+            check(frame.colors[0] > 0);
+            check(near(frame.colors[0], 0.75 * sin(angle), precision == PRECISION_DOUBLE ? 1e-15 : 2e-7));
+            frame_free(&frame);
+        }
+    }
+    scene_free(&scene);
+}
+
+static void tilted_plane(void **state)
+{
+    (void)state;
+    at_each_precision(tilted_plane_at);
+}
+
+// The eye and a light inside a closed shape: all of it is seen and lit.
+static void inside_at(Precision precision)
+{
+    static const char *const shapes[] = {
+        "sphere: {center: [0, 0, 0], radius: 2}",
+        "box: {min: [-1.5, -1, -2], max: [1, 1.25, 1.5]}",
+        "cylinder: {from: [-0.3, -2, 0.2], to: [0.4, 2, 0], radius: 1.5}",
+        "cylinder: {point: [0, 0, 0], axis: [0.2, 1, 0.1], radius: 1.5}",
+        "cone: {from: [0, -2, 0], to: [0.1, 3, 0.2], radius: [2, 0]}",
+        "cone: {from: [0, -2, 0], to: [0.1, 3, 0.2], radius: [2, 1.5]}",
+    };
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        snprintf(place, sizeof place, "%s, inside %s", precision_names[precision], shapes[i]);
+        Scene scene = scene_of("camera: {position: [0.1, 0.2, 0.3], look_at: [1, -0.4, 0.5], fov: 100}\n"
+                               "lights: [{point: {position: [-0.2, 0.1, -0.1]}}]\nobjects: [{%s}]\n",
+                               shapes[i]);
+        Frame frame = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
+        for (size_t pixel = 0; pixel < (size_t)96 * 96; pixel++) {
+            check(frame.object[pixel] == 0);
+            check(frame.shadow[pixel] == 0);
+            check(frame.colors[3 * pixel] > 0);
+        }
+        frame_free(&frame);
+        scene_free(&scene);
+    }
+}
+
+static void inside(void **state)
+{
+    (void)state;
+    at_each_precision(inside_at);
+}
+
+static double basis_error(const Camera *camera)
+{
+    CameraBasis basis = camera_basis(camera, 200, 100);
+    Vector3 axes[3] = {vector_normalize(basis.right), vector_normalize(basis.up), basis.forward};
+    double error = fabs(vector_length(basis.right) - vector_length(basis.up)) / vector_length(basis.up);
+    for (size_t i = 0; i < 3; i++)
+        for (size_t k = 0; k < 3; k++)
+            error = fmax(error, fabs(vector_dot(axes[i], axes[k]) - (i == k)));
+    return error;
+}
+
+// R8: cameras that leave the basis open, or nearly so, still have one, and the same on every device.
+static void degenerate_cameras(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        Vector3 look_at, up;
+    } cameras[] = {
+        {"up parallel", {0, 0, 3}, {0, 0, 1}},        {"up antiparallel", {0, 0, 3}, {0, 0, -5}},
+        {"up zero", {0, 0, 3}, {0, 0, 0}},            {"up nearly parallel", {0, 0, 3}, {1e-7, 0, 1}},
+        {"straight down", {0, -1, 0}, {0, 1, 0}},     {"straight up", {0, 1, 0}, {0, 1, 0}},
+        {"tilted, up parallel", {1, 2, 3}, {1, 2, 3}}, {"huge up", {0, 0, 3}, {0, 1e300, 0}},
+        {"tiny up", {0, 0, 3}, {0, 1e-300, 0}},
+    };
+    Frame unrolled = {0};
+    for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
+        snprintf(place, sizeof place, "%s", cameras[i].name);
+        Scene scene = scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\nambient: [1, 1, 1]\n"
+                               "objects: [{box: {min: [-4, -4, -4], max: [4, 4, 4], material: {checker: {colors: "
+                               "[[1, 1, 1], [0.5, 0, 0]], size: 1.1}}}}]\n");
+        scene.camera.look_at = cameras[i].look_at;
+        scene.camera.up = cameras[i].up;
+        check(basis_error(&scene.camera) <= 1e-6);
+        Frame frame = render(&scene, 41, 31, PRECISION_SINGLE, AOV_OBJECT);
+        for (size_t pixel = 0; pixel < (size_t)41 * 31; pixel++)
+            check(frame.object[pixel] == 0);
+        // one fallback for the three that leave the roll open
+        if (i == 0)
+            unrolled = frame;
+        else if (i <= 2)
+            frame_assert_same(&frame, &unrolled, place);
+        if (i > 0) frame_free(&frame);
+        scene_free(&scene);
+    }
+    frame_free(&unrolled);
+}
+
+// R8: a single pixel looks along the view; extreme fields of view stay finite.
+static void single_pixel_and_extreme_fields(void **state)
+{
+    (void)state;
+    Scene scene = scene_of("camera: {position: [1, 2, -7], look_at: [0, 0, 0], fov: 50}\n"
+                           "ambient: [1, 1, 1]\nobjects: [{sphere: {center: [0, 0, 0], radius: 0.001}}]\n");
+    static const double fields[] = {1e-3, 50, 179.9};
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(place, sizeof place, "fov %g", fields[i]);
+        scene.camera.half_tangent = tan(fields[i] * M_PI / 360);
+        Frame frame = render(&scene, 1, 1, PRECISION_SINGLE, AOV_OBJECT | AOV_T);
+        check(frame.object[0] == 0 && frame.colors[0] == 1);
+        check(near(frame.t[0], sqrt(54) - 0.001, 1e-5));
+        frame_free(&frame);
+        Frame wide = render(&scene, 51, 33, PRECISION_SINGLE, AOV_OBJECT);
+        check(wide.object[16 * 51 + 25] == 0);
+        check((wide.object[0] == 0) == (fields[i] == 1e-3));
+        frame_free(&wide);
+    }
+    scene_free(&scene);
+}
+
+// The eye is the origin: the same scene 2^23 away has the same bits.
+static void distance_from_origin_changes_nothing(void **state)
+{
+    (void)state;
+    Frame frames[2];
+    for (size_t i = 0; i < 2; i++) {
+        double far = i == 0 ? 0 : 0x1p23;
+        snprintf(place, sizeof place, "moved by %g", far);
+        Scene scene = scene_of("camera: {position: [%.17g, 1.5, -4], look_at: [%.17g, 0.5, 0], fov: 45}\n"
+                               "lights: [{point: {position: [%.17g, 5, -3]}}]\n"
+                               "objects:\n  - sphere: {center: [%.17g, 0.75, 0.5], radius: 0.75}\n"
+                               "  - plane: {point: [%.17g, 0, 0], normal: [0, 1, 0], material: {checker: {colors: "
+                               "[[1, 1, 1], [0, 0, 0]], size: 0.5}}}\n",
+                               far + 0.25, far + 0.25, far + 2, far + 0.5, far);
+        frames[i] = render(&scene, 64, 48, PRECISION_SINGLE, AOV_T | AOV_SHADOW | AOV_OBJECT);
+        scene_free(&scene);
+    }
+    frame_assert_same(&frames[1], &frames[0], "2^23 from the origin");
+    frame_free(&frames[0]);
+    frame_free(&frames[1]);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(background_and_ambient),
+        cmocka_unit_test(light_above_plane),
+        cmocka_unit_test(contact_shadow),
+        cmocka_unit_test(spot_cone),
+        cmocka_unit_test(highlight),
+        cmocka_unit_test(tilted_plane),
+        cmocka_unit_test(inside),
+        cmocka_unit_test(degenerate_cameras),
+        cmocka_unit_test(single_pixel_and_extreme_fields),
+        cmocka_unit_test(distance_from_origin_changes_nothing),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}

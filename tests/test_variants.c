@@ -1,0 +1,384 @@
+// What must not change a picture, bit for bit: lanes, features built in without need, bands, the region, a repeated run;
+// and what must change it in a known way: the scene's scale, its mirror image.
+#include "tests/frame.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+// Neither is a whole number of tiles of any width.
+enum { WIDTH = 71, HEIGHT = 41 };
+
+static const uint32_t lane_counts[] = {1, 4, 8, 16};
+enum { LANE_CHOICES = sizeof lane_counts / sizeof *lane_counts };
+
+static const Precision exact_precisions[] = {PRECISION_SINGLE, PRECISION_STRICT};
+
+static Scene every_shape;
+
+static int variants_open(void **state)
+{
+    every_shape = scene_of_file("tests/scenes/every_shape.yaml");
+    return probe_open(state);
+}
+
+static int variants_close(void **state)
+{
+    scene_free(&every_shape);
+    return probe_close(state);
+}
+
+// A picture with the settings' features as they are.
+static Frame picture(const Scene *scene, const RenderSettings *settings)
+{
+    return frame_render(&probe_compute, scene, settings, 0);
+}
+
+static void same_and_freed(Frame *frame, const Frame *expected, const char *what)
+{
+    frame_assert_same(frame, expected, what);
+    frame_free(frame);
+}
+
+static void scene_has_every_feature(void **state)
+{
+    (void)state;
+    assert_int_equal(features_of(&every_shape), FEATURE_ALL);
+}
+
+static void lanes_agree(void **state)
+{
+    (void)state;
+    for (size_t p = 0; p < 2; p++) {
+        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        Frame expected = {0};
+        for (size_t i = 0; i < LANE_CHOICES; i++) {
+            settings.lanes = lane_counts[i];
+            char what[64];
+            snprintf(what, sizeof what, "%s, %u lanes", precision_names[settings.precision], settings.lanes);
+            Frame frame = picture(&every_shape, &settings);
+            assert_int_equal(frame_count_faulty(&frame), 0);
+            if (i == 0)
+                expected = frame;
+            else
+                same_and_freed(&frame, &expected, what);
+        }
+        frame_free(&expected);
+    }
+}
+
+static void lanes_agree_behind_the_picture(void **state)
+{
+    (void)state;
+    const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW;
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_STRICT);
+    settings.lanes = 1;
+    Frame expected = frame_render(&probe_compute, &every_shape, &settings, aovs);
+    settings.lanes = 16;
+    Frame frame = frame_render(&probe_compute, &every_shape, &settings, aovs);
+    assert_int_equal(frame_count_faulty(&expected), 0);
+    same_and_freed(&frame, &expected, "1 and 16 lanes");
+    frame_free(&expected);
+}
+
+#define SCENE_HEAD                                                                                                 \
+    "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], fov: 40}\n"                                          \
+    "background: [0.1, 0.2, 0.4]\nambient: [0.5, 0.5, 0.5]\n"
+#define BALL "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1}}]\n"
+
+// For each feature a scene that needs it and as little else as can be.
+static const struct {
+    FeatureSet features;
+    const char *text;
+} feature_scenes[] = {
+    {0, SCENE_HEAD},
+    {FEATURE_SPHERES, SCENE_HEAD BALL},
+    {FEATURE_PLANES, SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0]}}]\n"},
+    {FEATURE_DISCS, SCENE_HEAD "objects: [{disc: {center: [0, 1, 0], normal: [0.2, 0.4, -1], radius: 1}}]\n"},
+    {FEATURE_BOXES, SCENE_HEAD "objects: [{box: {min: [-1, 0, -0.5], max: [0.5, 1, 1]}}]\n"},
+    {FEATURE_CYLINDERS, SCENE_HEAD "objects: [{cylinder: {from: [-1, 0, 0], to: [1, 1, 0.3], radius: 0.4}}]\n"},
+    {FEATURE_CONES, SCENE_HEAD "objects: [{cone: {from: [-1, 0, 0], to: [1, 1, 0.3], radius: [0.7, 0.1]}}]\n"},
+    {FEATURE_TRIANGLES, SCENE_HEAD "objects: [{triangle: {vertices: [[-1, 0, 0], [1, 0.2, 0], [0, 1.5, 0.4]]}}]\n"},
+    {FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n"},
+    {FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n"},
+    {FEATURE_SPOT_LIGHTS, SCENE_HEAD "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0, 0], angle: 20}}]\n"},
+    {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" BALL},
+    {FEATURE_SPHERES | FEATURE_DIRECTIONAL_LIGHTS,
+     SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" BALL},
+    {FEATURE_SPHERES | FEATURE_SPOT_LIGHTS,
+     SCENE_HEAD "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0.5, 0], angle: 12, penumbra: 5}}]\n" BALL},
+    {FEATURE_SPHERES | FEATURE_CHECKERS,
+     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
+                "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
+    {FEATURE_PLANES | FEATURE_CHECKERS,
+     SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0],\n"
+                "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
+};
+
+static Scene scene_with_warnings(const char *text)
+{
+    MessageList messages = {0};
+    Source source = {"feature.yaml", text, strlen(text)};
+    Scene scene;
+    assert_true(scene_read_yaml(&scene, &source, &messages));
+    message_list_free(&messages);
+    return scene;
+}
+
+// Each build there is for one feature alone, and some for two, against the one build with all.
+static void features_alone_and_all_together_agree(void **state)
+{
+    (void)state;
+    FeatureSet seen = 0;
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    for (size_t i = 0; i < sizeof feature_scenes / sizeof *feature_scenes; i++) {
+        Scene scene = scene_with_warnings(feature_scenes[i].text);
+        assert_int_equal(features_of(&scene), feature_scenes[i].features);
+        seen |= feature_scenes[i].features;
+
+        settings.extra_features = 0;
+        Frame specialised = picture(&scene, &settings);
+        settings.extra_features = FEATURE_ALL;
+        Frame general = picture(&scene, &settings);
+        same_and_freed(&specialised, &general, feature_scenes[i].text);
+        frame_free(&general);
+        scene_free(&scene);
+    }
+    assert_int_equal(seen, FEATURE_ALL);
+
+    // No scene needs checkers alone: built in without need, on an empty scene.
+    Scene empty = scene_with_warnings(SCENE_HEAD);
+    settings.extra_features = FEATURE_CHECKERS;
+    Frame checkers = picture(&empty, &settings);
+    settings.extra_features = FEATURE_ALL;
+    Frame general = picture(&empty, &settings);
+    same_and_freed(&checkers, &general, "checkers alone");
+    frame_free(&general);
+    scene_free(&empty);
+}
+
+static void bands_agree(void **state)
+{
+    (void)state;
+    static const uint32_t band_rows[] = {1, 7, 32};
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    Frame expected = picture(&every_shape, &settings);
+    for (size_t i = 0; i < 3; i++) {
+        settings.band_rows = band_rows[i];
+        char what[32];
+        snprintf(what, sizeof what, "bands of %u rows", band_rows[i]);
+        Frame frame = picture(&every_shape, &settings);
+        same_and_freed(&frame, &expected, what);
+    }
+    settings.band_rows = 0;
+    settings.band_seconds = 1e-9;
+    Frame shortest = picture(&every_shape, &settings);
+    same_and_freed(&shortest, &expected, "the shortest bands by time");
+    frame_free(&expected);
+}
+
+// With bands as short as they get, each sample of a pixel has a launch of its own.
+static void launches_of_samples_agree(void **state)
+{
+    (void)state;
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    Frame one = picture(&every_shape, &settings);
+    settings.sample_count = 5;
+    settings.band_seconds = 100;
+    Frame expected = picture(&every_shape, &settings);
+    settings.band_seconds = 1e-9;
+    Frame apart = picture(&every_shape, &settings);
+    same_and_freed(&apart, &expected, "5 samples in launches apart");
+    settings.band_rows = 7;
+    settings.lanes = 1;
+    Frame scalar = picture(&every_shape, &settings);
+    same_and_freed(&scalar, &expected, "5 samples, bands of 7 rows, 1 lane");
+
+    // The samples do something, and no more than soften edges.
+    double difference = 0;
+    for (size_t i = 0; i < (size_t)3 * WIDTH * HEIGHT; i++)
+        difference += fabs(one.colors[i] - expected.colors[i]) / (3 * WIDTH * HEIGHT);
+    assert_true(difference > 1e-4 && difference < 0.1);
+    frame_free(&one);
+    frame_free(&expected);
+}
+
+static void regions_are_cuts_of_the_whole(void **state)
+{
+    (void)state;
+    static const uint32_t regions[][4] = {
+        {0, 0, 1, 1}, {WIDTH - 1, HEIGHT - 1, 1, 1}, {3, 5, 37, 19}, {WIDTH - 18, 0, 18, HEIGHT}, {0, 13, WIDTH, 1},
+    };
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    Frame whole = picture(&every_shape, &settings);
+    for (size_t i = 0; i < sizeof regions / sizeof *regions; i++) {
+        const uint32_t *r = regions[i];
+        settings.region_x = r[0];
+        settings.region_y = r[1];
+        settings.region_width = r[2];
+        settings.region_height = r[3];
+        char what[64];
+        snprintf(what, sizeof what, "region %u,%u,%u,%u", r[0], r[1], r[2], r[3]);
+        Frame part = picture(&every_shape, &settings), expected = frame_cut(&whole, r[0], r[1], r[2], r[3]);
+        same_and_freed(&part, &expected, what);
+        frame_free(&expected);
+    }
+    frame_free(&whole);
+}
+
+static void runs_repeat(void **state)
+{
+    (void)state;
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_FAST);
+    Frame first = picture(&every_shape, &settings);
+    for (unsigned run = 0; run < 5; run++) {
+        Frame frame = picture(&every_shape, &settings);
+        same_and_freed(&frame, &first, "repeated at fast");
+    }
+    frame_free(&first);
+}
+
+// Every vector that is a place or reaches from one to another.
+static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
+{
+    change(&scene->camera.position, factor);
+    change(&scene->camera.look_at, factor);
+    change(&scene->camera.up, factor);
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        change(&scene->lights.items[i].position, factor);
+        change(&scene->lights.items[i].direction, factor);
+    }
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        // all shapes but the sphere and the triangle have two vectors, in this order
+        Vector3 *vectors = &object->as.plane.point;
+        size_t count = object->kind == SHAPE_SPHERE ? 1 : object->kind == SHAPE_TRIANGLE ? 6 : 2;
+        for (size_t k = 0; k < count; k++)
+            change(&vectors[k], factor);
+    }
+}
+
+static void vector_grow(Vector3 *vector, double factor)
+{
+    *vector = vector_scale(*vector, factor);
+}
+
+static void scene_scale(Scene *scene, double factor)
+{
+    scene_for_each_vector(scene, vector_grow, factor);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        if (object->kind == SHAPE_SPHERE) object->as.sphere.radius *= factor;
+        if (object->kind == SHAPE_DISC) object->as.disc.radius *= factor;
+        if (object->kind == SHAPE_CYLINDER) object->as.cylinder.radius *= factor;
+        if (object->kind == SHAPE_CONE) object->as.cone.radius[0] *= factor;
+        if (object->kind == SHAPE_CONE) object->as.cone.radius[1] *= factor;
+    }
+    for (size_t i = 0; i < scene->materials.count; i++)
+        scene->materials.items[i].checker_size *= factor;
+}
+
+// HARDCASES R6: nothing in the kernels has a length of its own.
+static void scale_changes_nothing(void **state)
+{
+    (void)state;
+    static const int exponents[] = {-20, -10, -3, 3, 10, 20};
+    for (size_t p = 0; p < 2; p++) {
+        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        Frame expected = picture(&every_shape, &settings);
+        for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
+            Scene scene = scene_of_file("tests/scenes/every_shape.yaml");
+            scene_scale(&scene, ldexp(1, exponents[i]));
+            char what[64];
+            snprintf(what, sizeof what, "%s, scaled by 2^%d", precision_names[settings.precision], exponents[i]);
+            Frame frame = picture(&scene, &settings);
+            same_and_freed(&frame, &expected, what);
+            scene_free(&scene);
+        }
+        frame_free(&expected);
+    }
+}
+
+static void vector_mirror(Vector3 *vector, double factor)
+{
+    vector->x *= factor;
+}
+
+// x becomes -x. A checker's squares lie at floor(x / size), which mirrors an even one to an odd one.
+static void scene_mirror(Scene *scene)
+{
+    scene_for_each_vector(scene, vector_mirror, -1);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        if (object->kind != SHAPE_BOX) continue;
+        double low = object->as.box.max.x;
+        object->as.box.max.x = object->as.box.min.x;
+        object->as.box.min.x = low;
+    }
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        Color *colors = scene->materials.items[i].checker_colors, first = colors[0];
+        colors[0] = colors[1];
+        colors[1] = first;
+    }
+}
+
+// HARDCASES R7.
+static void mirror_gives_the_mirrored_picture(void **state)
+{
+    (void)state;
+    Scene mirrored = scene_of_file("tests/scenes/every_shape.yaml");
+    scene_mirror(&mirrored);
+    for (size_t p = 0; p < 2; p++) {
+        for (uint32_t width = WIDTH; width <= WIDTH + 1; width++) {
+            RenderSettings settings = frame_settings(width, HEIGHT, exact_precisions[p]);
+            Frame frame = picture(&every_shape, &settings), flipped = frame_flipped(&frame);
+            Frame mirror = picture(&mirrored, &settings);
+            char what[64];
+            snprintf(what, sizeof what, "%s, mirrored, %u wide", precision_names[settings.precision], width);
+            same_and_freed(&mirror, &flipped, what);
+            frame_free(&flipped);
+            frame_free(&frame);
+        }
+    }
+    scene_free(&mirrored);
+}
+
+// Objects that touch and pierce each other, in another order. (Of surfaces that coincide the earlier is seen.)
+static void order_of_objects_changes_nothing(void **state)
+{
+    (void)state;
+    Scene reversed = scene_of_file("tests/scenes/every_shape.yaml");
+    for (size_t i = 0; i < reversed.objects.count / 2; i++) {
+        Object *a = &reversed.objects.items[i], *b = &reversed.objects.items[reversed.objects.count - 1 - i];
+        Object first = *a;
+        *a = *b;
+        *b = first;
+    }
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_STRICT);
+    Frame expected = picture(&every_shape, &settings), frame = picture(&reversed, &settings);
+    same_and_freed(&frame, &expected, "objects in reverse");
+    frame_free(&expected);
+    scene_free(&reversed);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scene_has_every_feature),
+        cmocka_unit_test(lanes_agree),
+        cmocka_unit_test(lanes_agree_behind_the_picture),
+        cmocka_unit_test(features_alone_and_all_together_agree),
+        cmocka_unit_test(bands_agree),
+        cmocka_unit_test(launches_of_samples_agree),
+        cmocka_unit_test(regions_are_cuts_of_the_whole),
+        cmocka_unit_test(runs_repeat),
+        cmocka_unit_test(scale_changes_nothing),
+        cmocka_unit_test(mirror_gives_the_mirrored_picture),
+        cmocka_unit_test(order_of_objects_changes_nothing),
+    };
+    return cmocka_run_group_tests(tests, variants_open, variants_close);
+}
