@@ -23,6 +23,7 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global sc
     for (uint i = 0; i < light_count; i++) {
         mask shadowed;
         phong_light(&scene, &surface, &ray, i, &shadowed);
-        film_store_integer(shadows, &tile, light_count, i, lanes_select(shadowed, (integer)(1), (integer)(0)));
+        film_store_integer(shadows, &tile, light_count, i,
+                           lanes_select(shadowed, (integer)(1), (integer)(0)));
     }
 }

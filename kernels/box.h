@@ -4,8 +4,8 @@
 
 #include "quadratic.h"
 
-// Where the ray is between low and high on one axis. A direction of exactly 0 (of either sign) is always or never
-// between: decided by comparison, since 0 times infinity is no number.
+// Where the ray is between low and high on one axis. A direction of exactly 0 (of either sign) is always or
+// never between: decided by comparison, since 0 times infinity is no number.
 static inline Roots slab_crossings(real low, real high, real origin, real direction, real inverse)
 {
     mask parallel = direction == (real)(0);
@@ -68,9 +68,12 @@ static inline Patch box_patch(const Box *box, const Ray *ray, real t)
 
     Vector position = ray_point(ray, t);
     const real zero = (real)(0), one = (real)(1);
-    position.x = lanes_select(on_x, lanes_select(low_x, low.x, high.x), slab_clamp(position.x, low.x, high.x));
-    position.y = lanes_select(on_y, lanes_select(low_y, low.y, high.y), slab_clamp(position.y, low.y, high.y));
-    position.z = lanes_select(on_z, lanes_select(low_z, low.z, high.z), slab_clamp(position.z, low.z, high.z));
+    position.x =
+        lanes_select(on_x, lanes_select(low_x, low.x, high.x), slab_clamp(position.x, low.x, high.x));
+    position.y =
+        lanes_select(on_y, lanes_select(low_y, low.y, high.y), slab_clamp(position.y, low.y, high.y));
+    position.z =
+        lanes_select(on_z, lanes_select(low_z, low.z, high.z), slab_clamp(position.z, low.z, high.z));
     Vector normal = {lanes_select(on_x, lanes_select(low_x, -one, one), zero),
                      lanes_select(on_y, lanes_select(low_y, -one, one), zero),
                      lanes_select(on_z, lanes_select(low_z, -one, one), zero)};

@@ -17,13 +17,20 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     Vector moment;
     if (IS_COMPENSATED) {
         along = pair_vector_dot_vector(pair_vector_of(normal), ray->direction).high;
-        moment = pair_vector_high(pair_vector_cross(pair_vector_difference(ray->origin, center), ray->direction));
+        moment =
+            pair_vector_high(pair_vector_cross(pair_vector_difference(ray->origin, center), ray->direction));
     } else {
         moment = vector_cross(vector_subtract(ray->origin, center), ray->direction);
     }
     Vector across = vector_cross(normal, moment);
-    real reach = (real)(disc->center_radius.w) * along;
-    return hit & (vector_dot(across, across) <= reach * reach);
+    real radius = (real)(disc->center_radius.w);
+    // nearly in the disc's plane n . d says little about t, but it lies no farther from the center than the
+    // rim
+    real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
+    real half_chord = radius * real_sqrt(ray->inverse_squared);
+    *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
+    real reach = radius * along;
+    return hit & (vector_dot(across, across) <= reach * reach) & (*t > ray->near);
 }
 
 static inline Patch disc_patch(const Disc *disc, const Ray *ray, real t)

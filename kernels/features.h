@@ -12,10 +12,14 @@
     FEATURE(CYLINDERS)        \
     FEATURE(CONES)            \
     FEATURE(TRIANGLES)        \
+    FEATURE(TORI)             \
     FEATURE(POINT_LIGHTS)     \
     FEATURE(DIRECTIONAL_LIGHTS) \
     FEATURE(SPOT_LIGHTS)      \
-    FEATURE(CHECKERS)
+    FEATURE(CHECKERS)         \
+    FEATURE(REFLECTION)       \
+    FEATURE(TRANSMISSION)     \
+    FEATURE(BVH)
 // clang-format on
 
 #endif

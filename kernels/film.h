@@ -19,7 +19,8 @@ static inline Tile band_tile(const Band *band)
     Tile tile;
     integer x = (integer)((scalar_integer)(get_global_id(0) * TILE_WIDTH)) + LANE_X;
     integer y = (integer)((scalar_integer)(get_global_id(1) * TILE_HEIGHT)) + LANE_Y;
-    tile.inside = (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
+    tile.inside =
+        (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
     tile.index = y * (integer)((scalar_integer)band->width) + x;
     tile.pixels.x = x + (integer)((scalar_integer)band->first_x);
     tile.pixels.y = y + (integer)((scalar_integer)band->first_y);
@@ -35,7 +36,8 @@ static inline void film_store(global scalar *film, const Tile *tile, uint stride
         if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = values.each[lane];
 }
 
-static inline void film_store_integer(global int *film, const Tile *tile, uint stride, uint channel, integer value)
+static inline void film_store_integer(global int *film, const Tile *tile, uint stride, uint channel,
+                                      integer value)
 {
     IntegerLanes values = {value}, inside = {tile->inside}, index = {tile->index};
     for (uint lane = 0; lane < LANES; lane++)

@@ -12,65 +12,69 @@
 typedef double scalar;
 typedef double4 scalar4;
 typedef long scalar_integer;
-#define REAL_BASE double
-#define INTEGER_BASE long
-#define UNIT_ROUNDOFF 0x1p-53
-#define LARGEST DBL_MAX
+#define REAL_BASE      double
+#define INTEGER_BASE   long
+#define UNIT_ROUNDOFF  0x1p-53
+#define LARGEST        DBL_MAX
 #define SMALLEST_RATIO 0x1p-1000
 #else
 typedef float scalar;
 typedef float4 scalar4;
 typedef int scalar_integer;
-#define REAL_BASE float
-#define INTEGER_BASE int
-#define UNIT_ROUNDOFF 0x1p-24f
-#define LARGEST FLT_MAX
+#define REAL_BASE      float
+#define INTEGER_BASE   int
+#define UNIT_ROUNDOFF  0x1p-24f
+#define LARGEST        FLT_MAX
 #define SMALLEST_RATIO 0x1p-120f
 #endif
 
+// For a large function that is called from several places with little in hand: inlined, each copy would be
+// compiled.
+#define OUT_OF_LINE __attribute__((noinline))
+
 #define JOIN_TOKENS(a, b) a##b
-#define JOIN(a, b) JOIN_TOKENS(a, b)
+#define JOIN(a, b)        JOIN_TOKENS(a, b)
 
 #if LANES == 1
 typedef scalar real;
 typedef scalar_integer integer;
 #define LANES_CONVERT(base) JOIN(convert_, base)
-#define LANES_AS(base) JOIN(as_, base)
+#define LANES_AS(base)      JOIN(as_, base)
 #else
 typedef JOIN(REAL_BASE, LANES) real;
 typedef JOIN(INTEGER_BASE, LANES) integer;
 #define LANES_CONVERT(base) JOIN(JOIN(convert_, base), LANES)
-#define LANES_AS(base) JOIN(JOIN(as_, base), LANES)
+#define LANES_AS(base)      JOIN(JOIN(as_, base), LANES)
 #endif
 
 typedef integer mask;
 
 #define real_from_integer LANES_CONVERT(REAL_BASE)
 #define integer_from_real LANES_CONVERT(INTEGER_BASE)
-#define real_from_bits LANES_AS(REAL_BASE)
-#define bits_from_real LANES_AS(INTEGER_BASE)
+#define real_from_bits    LANES_AS(REAL_BASE)
+#define bits_from_real    LANES_AS(INTEGER_BASE)
 
 // The tile of neighboring pixels that one work-item carries, and each lane's place in it.
 #if LANES == 1
-#define TILE_WIDTH 1
+#define TILE_WIDTH  1
 #define TILE_HEIGHT 1
-#define LANE_X ((integer)(0))
-#define LANE_Y ((integer)(0))
+#define LANE_X      ((integer)(0))
+#define LANE_Y      ((integer)(0))
 #elif LANES == 4
-#define TILE_WIDTH 2
+#define TILE_WIDTH  2
 #define TILE_HEIGHT 2
-#define LANE_X ((integer)(0, 1, 0, 1))
-#define LANE_Y ((integer)(0, 0, 1, 1))
+#define LANE_X      ((integer)(0, 1, 0, 1))
+#define LANE_Y      ((integer)(0, 0, 1, 1))
 #elif LANES == 8
-#define TILE_WIDTH 4
+#define TILE_WIDTH  4
 #define TILE_HEIGHT 2
-#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
-#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
+#define LANE_X      ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y      ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
 #elif LANES == 16
-#define TILE_WIDTH 4
+#define TILE_WIDTH  4
 #define TILE_HEIGHT 4
-#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
-#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
+#define LANE_X      ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y      ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
 #endif
 
 #define lanes_select(condition, yes, no) ((condition) ? (yes) : (no))

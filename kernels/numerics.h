@@ -10,10 +10,10 @@
 // Whether intersections use the compensated forms.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
 
-// Correctly rounded at `strict` on every device. Where the device promises only 2.5 ulp (REPAIRS_DIVIDE), one Newton
-// step on the reciprocal and a last step on the quotient's exact remainder make it so (Markstein, Computation of elementary
-// functions on the IBM RISC System/6000 processor, 1990, section 3). A quotient of 0 or beyond the range is
-// left as the device gives it.
+// Correctly rounded at `strict` on every device. Where the device promises only 2.5 ulp (REPAIRS_DIVIDE), one
+// Newton step on the reciprocal and a last step on the quotient's exact remainder make it so (Markstein,
+// Computation of elementary functions on the IBM RISC System/6000 processor, 1990, section 3). A quotient of
+// 0 or beyond the range is left as the device gives it.
 static inline real real_divide(real a, real b)
 {
     real quotient = a / b;
@@ -53,9 +53,9 @@ static inline real product_difference(real a, real b, real c, real d)
 }
 
 // The unevaluated sum high + low, |low| at most half an ulp of high: about 2 x 24 or 2 x 53 bits.
-// Sums and products follow Joldes, Muller, Popescu, Tight and rigorous error bounds for basic building blocks of
-// double-word arithmetic, ACM TOMS 44(2), 2017: the sum is algorithm 6, the product algorithm 11, with error
-// bounds of 3 u^2 and 5 u^2.
+// Sums and products follow Joldes, Muller, Popescu, Tight and rigorous error bounds for basic building blocks
+// of double-word arithmetic, ACM TOMS 44(2), 2017: the sum is algorithm 6, the product algorithm 11, with
+// error bounds of 3 u^2 and 5 u^2.
 typedef struct {
     real high, low;
 } Pair;
@@ -156,8 +156,8 @@ static inline real real_log_complement(real s)
     return fma(k, ln2_high, fma(k, ln2_low, log_m));
 }
 
-// e^x for x <= 0: 2^k times the Taylor series of the rest, |rest| <= ln(2)/2 (Abramowitz, Stegun, 4.2.1). 0 where
-// the result would be subnormal.
+// e^x for x <= 0: 2^k times the Taylor series of the rest, |rest| <= ln(2)/2 (Abramowitz, Stegun, 4.2.1). 0
+// where the result would be subnormal.
 static inline real real_exp_negative(real x)
 {
 #if IS_DOUBLE

@@ -10,8 +10,8 @@ typedef struct {
     Ray shadow_ray;   // meets what stands between; its end is the light
 } LightRay;
 
-// 1 in a spot's full cone, 0 outside it, smooth between. The angle is measured as s = 1 - cos = |l - axis|^2 / 2, which
-// keeps its bits for narrow cones where the cosine itself has none left.
+// 1 in a spot's full cone, 0 outside it, smooth between. The angle is measured as s = 1 - cos = |l - axis|^2
+// / 2, which keeps its bits for narrow cones where the cosine itself has none left.
 static inline real spot_strength(const Light *light, Vector from_light)
 {
     Vector difference = vector_subtract(from_light, vector_of(light->direction));
@@ -27,12 +27,11 @@ static inline real spot_strength(const Light *light, Vector from_light)
 static inline LightRay light_ray(const Light *light, const Surface *surface)
 {
     LightRay to_light;
-    Vector start = surface_leave(surface);
+    Vector start = surface_leave(surface, false);
     to_light.strength = (real)(1);
     if (HAS_DIRECTIONAL_LIGHTS && light->kind.x == LIGHT_KIND_DIRECTIONAL) {
         to_light.direction = vector_negate(vector_of(light->direction));
-        to_light.shadow_ray =
-            ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface->found);
+        to_light.shadow_ray = ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface->found);
         return to_light;
     }
     Vector position = vector_of(light->position);
@@ -44,8 +43,8 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     return to_light;
 }
 
-// max(0, cos)^shininess for the angle between two unit vectors. Near the highlight's center the cosine has no bits
-// left for a high power; its complement s = |a - b|^2 / 2 has. A power of 0 gives 1.
+// max(0, cos)^shininess for the angle between two unit vectors. Near the highlight's center the cosine has no
+// bits left for a high power; its complement s = |a - b|^2 / 2 has. A power of 0 gives 1.
 static inline real phong_highlight(Vector reflected, Vector to_eye, real shininess)
 {
     Vector difference = vector_subtract(reflected, to_eye);
@@ -56,8 +55,8 @@ static inline real phong_highlight(Vector reflected, Vector to_eye, real shinine
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 
-// The light that reaches the eye from one light, black where the surface turns away from it or lies in its shadow;
-// *shadowed tells which lanes do.
+// The light that reaches the eye from one light, black where the surface turns away from it or lies in its
+// shadow; *shadowed tells which lanes do.
 static inline Color3 phong_light(const Scene *scene, const Surface *surface, const Ray *eye_ray, uint index,
                                  mask *shadowed)
 {
@@ -70,22 +69,22 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, con
     if (!lanes_any(lit)) return black;
 
     to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
-    lit = lit & !occluded(scene, &to_light.shadow_ray);
+    rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
+    real passing = light_passing(scene, &to_light.shadow_ray);
+    lit = lit & (passing > (real)(0));
     *shadowed = surface->found & !lit;
     if (!lanes_any(lit)) return black;
 
-    Color3 reached = vector_scale(vector_of(light.color), to_light.strength);
-    Color3 color = {surface->diffuse.x * surface->color.x, surface->diffuse.y * surface->color.y,
-                    surface->diffuse.z * surface->color.z};
-    color = vector_scale(color, facing);
+    Color3 reached = vector_scale(vector_of(light.color), to_light.strength * passing);
+    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), facing);
     if (lanes_any(lit & (surface->specular > (real)(0)))) {
-        Vector reflected = vector_fma(surface->shading_normal, facing + facing, vector_negate(to_light.direction));
+        Vector reflected =
+            vector_fma(surface->shading_normal, facing + facing, vector_negate(to_light.direction));
         Vector to_eye = vector_negate(vector_scale(eye_ray->direction, real_sqrt(eye_ray->inverse_squared)));
         real highlight = surface->specular * phong_highlight(reflected, to_eye, surface->shininess);
         color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
     }
-    color = (Color3){color.x * reached.x, color.y * reached.y, color.z * reached.z};
-    return vector_select(lit, color, black);
+    return vector_select(lit, color_multiply(color, reached), black);
 }
 
 #endif

@@ -12,7 +12,8 @@ static inline mask plane_quotient(real height, real along, const Ray *ray, real 
     return hit & (*t > ray->near);
 }
 
-// t = n . (p - o) / n . d, the difference taken first. Only n . d = 0 is no hit: a threshold would cut the horizon.
+// t = n . (p - o) / n . d, the difference taken first. Only n . d = 0 is no hit: a threshold would cut the
+// horizon.
 static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, real *t)
 {
     real along;
@@ -38,7 +39,8 @@ static inline Patch plane_crossing_patch(Vector point, Vector normal, const Ray 
     Vector unit = vector_normalize(normal);
     Vector from_point = ray_point_from(ray, point, t);
     from_point = vector_fma(unit, -vector_dot(unit, from_point), from_point);
-    return patch_make(vector_add(from_point, point), unit, vector_magnitude(from_point) + vector_magnitude(point));
+    return patch_make(vector_add(from_point, point), unit,
+                      vector_magnitude(from_point) + vector_magnitude(point));
 }
 
 static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)

@@ -8,8 +8,8 @@ typedef struct {
     real near, far; // near <= far
 } Roots;
 
-// Without cancellation: q = -(b + sign(b) sqrt d), roots c / q and q / a (Press et al., Numerical Recipes, 5.6; here
-// with half of b). For a > 0; d < 0 counts as 0.
+// Without cancellation: q = -(b + sign(b) sqrt d), roots c / q and q / a (Press et al., Numerical
+// Recipes, 5.6; here with half of b). For a > 0; d < 0 counts as 0.
 static inline Roots quadratic_roots(real a, real b, real c, real d)
 {
     real root = real_sqrt(real_max(d, (real)(0)));

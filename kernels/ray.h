@@ -12,8 +12,10 @@ typedef struct {
     real inverse_squared;
     real near, far; // hits lie strictly between
     mask active;    // the lanes that carry a ray at all
-    // for boxes: 1 / direction; 0 where the component is 0
+    // for boxes: 1 / direction; huge where the component is 0
     Vector inverse;
+    // for the hierarchy: the origin moved both ways along each axis by what hits may be off
+    Vector origin_up, origin_down;
     // for triangles: unit vectors across the direction, and along it
     Vector across_u, across_v, along;
 } Ray;
@@ -23,8 +25,8 @@ typedef struct {
     integer object; // its id; -1: nothing hit
 } Hit;
 
-// A point of a surface. `size` is the magnitude of the numbers the point was computed from: its distance from the
-// true surface is below 16 u size + 4 u |position|.
+// A point of a surface. `size` is the magnitude of the numbers the point was computed from: its distance from
+// the true surface is below 16 u size + 4 u |position|.
 typedef struct {
     Vector position;
     Vector normal;         // unit, of the geometry, either side
@@ -38,8 +40,16 @@ static inline real real_inverse_or_zero(real a)
     return lanes_select(zero, (real)(0), real_divide((real)(1), lanes_select(zero, (real)(1), a)));
 }
 
-// A frame across a unit vector without a branch (Duff et al., Building an orthonormal basis, revisited, JCGT 6(1),
-// 2017, listing 3).
+// 1 / a, huge for 0: the product with a distance then tells its sign.
+static inline real real_inverse_or_huge(real a)
+{
+    mask zero = a == (real)(0);
+    return lanes_select(zero, (real)(1 / SMALLEST_RATIO),
+                        real_divide((real)(1), lanes_select(zero, (real)(1), a)));
+}
+
+// A frame across a unit vector without a branch (Duff et al., Building an orthonormal basis, revisited, JCGT
+// 6(1), 2017, listing 3).
 static inline void frame_across(Vector unit, Vector *u, Vector *v)
 {
     real side = lanes_select(unit.z >= (real)(0), (real)(1), (real)(-1));
@@ -59,9 +69,9 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     ray.near = near;
     ray.far = far;
     ray.active = active & (ray.squared > (real)(0));
-    if (HAS_BOXES)
-        ray.inverse = (Vector){real_inverse_or_zero(direction.x), real_inverse_or_zero(direction.y),
-                               real_inverse_or_zero(direction.z)};
+    if (HAS_BOXES || HAS_BVH)
+        ray.inverse = (Vector){real_inverse_or_huge(direction.x), real_inverse_or_huge(direction.y),
+                               real_inverse_or_huge(direction.z)};
     if (HAS_TRIANGLES) {
         ray.along = vector_normalize(direction);
         frame_across(ray.along, &ray.across_u, &ray.across_v);
@@ -69,7 +79,8 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     return ray;
 }
 
-// The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies before it.
+// The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies
+// before it.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {
     return lanes_select(near_t > ray->near, near_t, far_t);

@@ -2,8 +2,8 @@
 //
 // Along a ray p = f + t d, with q = d x w, m = f x w, g = R + k f . w and h = k d . w:
 //     a = q . q - h^2,   b = m . q - g h,   c = m . m - g^2,
-// and by Lagrange's identity b^2 - a c = |g q - h m|^2 - |w|^2 (w . E)^2 with the moment E = f x d, a difference of two
-// numbers near a r^2 whatever the distance, where b^2 - a c itself cancels.
+// and by Lagrange's identity b^2 - a c = |g q - h m|^2 - |w|^2 (w . E)^2 with the moment E = f x d, a
+// difference of two numbers near a r^2 whatever the distance, where b^2 - a c itself cancels.
 #ifndef REVOLUTION_H
 #define REVOLUTION_H
 
@@ -75,8 +75,8 @@ static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool
     return quadric;
 }
 
-// Two Newton steps on |m + t q| - |g + t h|, which does not cancel as a, b and c do for a cone seen along its side or from
-// far away: there the plain roots are off by up to 700 ulp at 2500 sizes.
+// Two Newton steps on |m + t q| - |g + t h|, which does not cancel as a, b and c do for a cone seen along its
+// side or from far away: there the plain roots are off by up to 700 ulp at 2500 sizes.
 static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 {
     for (uint i = 0; i < 2; i++) {
@@ -93,14 +93,15 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 }
 
 typedef struct {
-    Roots side; // where the ray is inside the endless surface: between the roots, or, if `outer`, outside them
+    Roots
+        side; // where the ray is inside the endless surface: between the roots, or, if `outer`, outside them
     mask outer;
     mask real_roots;
     Roots slab; // where it is between the ends
 } RevolutionCrossings;
 
-// A root is taken as q / a only where that is below the largest number; a = 0 is a ray along the side, which has one
-// root, c / q, and one infinitely far.
+// A root is taken as q / a only where that is below the largest number; a = 0 is a ray along the side, which
+// has one root, c / q, and one infinitely far.
 static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray)
 {
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
@@ -154,8 +155,9 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     return crossings;
 }
 
-// A capped solid is hit where the ray is inside the side and between the ends at once: one comparison decides both
-// surfaces, so that no ray passes between side and cap. An open or endless one is hit at a root between the ends.
+// A capped solid is hit where the ray is inside the side and between the ends at once: one comparison decides
+// both surfaces, so that no ray passes between side and cap. An open or endless one is hit at a root between
+// the ends.
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
     RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray);
@@ -167,7 +169,9 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
         *t = ray_first(ray, near, far);
         hit = hit & (near <= far);
     } else {
-        mask near_counts = (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
+        mask seen = shape->id.y & ONLY_INSIDE ? mask_none() : mask_all();
+        mask near_counts =
+            seen & (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
         *t = lanes_select(near_counts, side.near, side.far);
         hit = hit & (*t >= slab.near) & (*t <= slab.far);
     }

@@ -4,11 +4,11 @@
 
 #include "quadratic.h"
 
-// The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4 u rho r
-// at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere intersection, Ray
-// Tracing Gems, 2019, chapter 7). The compensated form takes the discriminant from the line's moment E = f x d,
-// a r^2 - |E|^2 by Lagrange's identity, in pairs: its error does not grow with the distance. It first asks the cheap
-// form, whose bound rejects most rays.
+// The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4
+// u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
+// intersection, Ray Tracing Gems, 2019, chapter 7). The compensated form takes the discriminant from the
+// line's moment E = f x d, a r^2 - |E|^2 by Lagrange's identity, in pairs: its error does not grow with the
+// distance. It first asks the cheap form, whose bound rejects most rays.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -21,7 +21,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real doubt = (real)(0);
     if (IS_COMPENSATED) {
         // both l and f are off by a few u |f|; |l| is about the radius where it matters
-        real reach = vector_magnitude(f) + fabs(radius) + vector_magnitude(ray->origin) + vector_magnitude(center);
+        real reach =
+            vector_magnitude(f) + fabs(radius) + vector_magnitude(ray->origin) + vector_magnitude(center);
         doubt = (real)(16 * UNIT_ROUNDOFF) * reach * (radius + (real)(16 * UNIT_ROUNDOFF) * reach);
     }
     mask hit = ray->active & (half_chord_squared >= -doubt);
@@ -42,12 +43,12 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         real c = fma(-radius, radius, vector_dot(f, f));
         roots = quadratic_roots(ray->squared, b, c, ray->squared * half_chord_squared);
     }
-    *t = ray_first(ray, roots.near, roots.far);
+    *t = sphere->id.y & ONLY_INSIDE ? roots.far : ray_first(ray, roots.near, roots.far);
     return hit & (*t > ray->near);
 }
 
-// The compensated normal is built from the moment as well, n = (l -+ h d) / r with l = d x E / a, so that it does not
-// lose bits with the distance; the point is the center plus r n.
+// The compensated normal is built from the moment as well, n = (l -+ h d) / r with l = d x E / a, so that it
+// does not lose bits with the distance; the point is the center plus r n.
 static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);

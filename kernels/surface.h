@@ -6,6 +6,17 @@
 
 typedef Vector Color3;
 
+static inline Color3 color_multiply(Color3 a, Color3 b)
+{
+    return (Color3){a.x * b.x, a.y * b.y, a.z * b.z};
+}
+
+static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
+{
+    return (Color3){fma(weight.x, color.x, sum.x), fma(weight.y, color.y, sum.y),
+                    fma(weight.z, color.z, sum.z)};
+}
+
 typedef struct {
     mask found;
     Vector position;
@@ -14,22 +25,24 @@ typedef struct {
     real error;            // the position is at most this far from the true surface
     Color3 color, diffuse;
     real ambient, specular, shininess;
+    real reflection, transmission, ior;
+    mask entering; // the ray runs into the solid, against its outward normal
 } Surface;
 
 static inline Patch shape_patch(const Scene *scene, uint kind, uint index, const Ray *ray, real t)
 {
-#define PATCH_OF_SHAPE(feature, Type, name)                                                                  \
+#define PATCH_OF_SHAPE(feature, Type, name, names)                                                           \
     if (HAS_##feature && kind == KIND_##feature) {                                                           \
-        Type shape = scene->name##s[index];                                                                  \
+        Type shape = scene->names[index];                                                                    \
         return name##_patch(&shape, ray, t);                                                                 \
     }
     SHAPE_LIST(PATCH_OF_SHAPE)
     return patch_make(ray->origin, ray->direction, (real)(0));
 }
 
-// The checker's square at each point: even or odd. On a plane or disc squares lie in the surface; elsewhere they are
-// cubes in space, looked up a 1024th of a cube behind the surface, so that a face lying on the border between cubes
-// has one color.
+// The checker's square at each point: even or odd. On a plane or disc squares lie in the surface; elsewhere
+// they are cubes in space, looked up a 1024th of a cube behind the surface, so that a face lying on the
+// border between cubes has one color.
 static inline mask checker_odd(const Scene *scene, uint kind, uint index, const Patch *patch, Vector inward,
                                scalar4 grid)
 {
@@ -51,7 +64,8 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
     return floor(halved) != halved;
 }
 
-// Rays of one tile mostly meet one or two objects: each object among the hits is looked up once, for all its lanes.
+// Rays of one tile mostly meet one or two objects: each object among the hits is looked up once, for all its
+// lanes.
 static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *hit)
 {
     Surface surface;
@@ -59,6 +73,8 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
     Patch patch = patch_make(ray->origin, ray->direction, (real)(0));
     surface.color = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
     surface.ambient = surface.specular = surface.shininess = (real)(0);
+    surface.reflection = surface.transmission = (real)(0);
+    surface.ior = (real)(1);
 
     const integer settled = (integer)(INT_MAX);
     integer pending = lanes_select(surface.found, hit->object, settled);
@@ -85,23 +101,30 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
         surface.ambient = lanes_select(same, (real)(material.color.w), surface.ambient);
         surface.specular = lanes_select(same, (real)(material.diffuse.w), surface.specular);
         surface.shininess = lanes_select(same, (real)(material.other_color.w), surface.shininess);
+        surface.reflection = lanes_select(same, (real)(material.mirror_glass.x), surface.reflection);
+        surface.transmission = lanes_select(same, (real)(material.mirror_glass.y), surface.transmission);
+        surface.ior = lanes_select(same, (real)(material.mirror_glass.z), surface.ior);
     }
 
     surface.position = patch.position;
     mask away = vector_dot(patch.normal, ray->direction) > (real)(0);
+    surface.entering = !away;
     surface.normal = vector_select(away, vector_negate(patch.normal), patch.normal);
     mask shading_away = vector_dot(patch.shading_normal, surface.normal) < (real)(0);
     surface.shading_normal =
         vector_select(shading_away, vector_negate(patch.shading_normal), patch.shading_normal);
-    surface.error = (real)(UNIT_ROUNDOFF) * fma((real)(16), patch.size, (real)(4) * vector_magnitude(patch.position));
+    surface.error =
+        (real)(UNIT_ROUNDOFF)*fma((real)(16), patch.size, (real)(4) * vector_magnitude(patch.position));
     return surface;
 }
 
-// Where a ray that leaves the surface on the normal's side starts: off it by twice the bound on the position's
-// error, once for that error and once for the new ray's own test of the same surface.
-static inline Vector surface_leave(const Surface *surface)
+// Where a ray that leaves the surface starts, on the side the ray came from or, `through` it, on the other:
+// off it by twice the bound on the position's error, once for that error and once for the new ray's own test
+// of the surface.
+static inline Vector surface_leave(const Surface *surface, bool through)
 {
-    return vector_fma(surface->normal, surface->error + surface->error, surface->position);
+    real distance_ = surface->error + surface->error;
+    return vector_fma(surface->normal, through ? -distance_ : distance_, surface->position);
 }
 
 #endif

@@ -1,17 +1,18 @@
 // Triangle, watertight: a ray that meets an edge or a vertex shared by triangles meets one of them.
 //
-// Vertices are taken from the ray's start and turned into a frame whose third axis is the ray; the same vertex gives
-// the same numbers in every triangle. There the signs of three edge functions decide, and product_difference has
-// the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection, JCGT 2(1), 2013; they shear along
-// the direction's largest axis and fall back to double precision where an edge function is 0).
+// Vertices are taken from the ray's start and turned into a frame whose third axis is the ray; the same
+// vertex gives the same numbers in every triangle. There the signs of three edge functions decide, and
+// product_difference has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
+// JCGT 2(1), 2013; they shear along the direction's largest axis and fall back to double precision where an
+// edge function is 0).
 #ifndef TRIANGLE_H
 #define TRIANGLE_H
 
 #include "plane.h"
 
 typedef struct {
-    real u, v, w;     // edge functions opposite a, b, c; all of one sign inside, edges included
-    real determinant; // their sum
+    real u, v, w;                   // edge functions opposite a, b, c; all of one sign inside, edges included
+    real determinant;               // their sum
     real a_depth, b_depth, c_depth; // of the vertices, along the ray
 } TriangleEdges;
 
@@ -50,7 +51,8 @@ static inline real triangle_plane_depth(const Triangle *triangle, const Ray *ray
     return lanes_select(crosses, depth, otherwise);
 }
 
-// The depth is held between those of the vertices: a sliver seen edge-on would else be hit far outside itself.
+// The depth is held between those of the vertices: a sliver seen edge-on would else be hit far outside
+// itself.
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
     TriangleEdges edges = triangle_edges(triangle, ray);
@@ -84,9 +86,9 @@ static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, rea
     real size = real_max(real_max(vector_magnitude(a), vector_magnitude(b)), vector_magnitude(c));
     Patch patch = patch_make(position, normal, size);
     if (triangle->id.y) {
-        Vector smooth_ = vector_fma(vector_of(triangle->normal_a), u,
-                                    vector_fma(vector_of(triangle->normal_b), v,
-                                               vector_scale(vector_of(triangle->normal_c), w)));
+        Vector smooth_ = vector_fma(
+            vector_of(triangle->normal_a), u,
+            vector_fma(vector_of(triangle->normal_b), v, vector_scale(vector_of(triangle->normal_c), w)));
         mask vanishes = vector_dot(smooth_, smooth_) == (real)(0);
         patch.shading_normal = vector_select(vanishes, normal, vector_normalize(smooth_));
     }

@@ -25,8 +25,11 @@ typedef struct {
 
 typedef struct {
     scalar4 center_radius; // xyz center, w radius
-    uint4 id;              // x: the object's id
+    uint4 id;              // x: the object's id, y: ONLY_INSIDE
 } Sphere;
+
+// In a shape's id.y: rays that come from outside pass through its near side unseen.
+enum { ONLY_INSIDE = 8 };
 
 typedef struct {
     scalar4 point;
@@ -47,13 +50,13 @@ typedef struct {
     uint4 id;
 } Box;
 
-// Cylinder and cone: the points with |p x axis| = radius + slope (p . axis), p from the base. Radius and slope
-// are in units of |axis|, so that the axis need not be unit.
+// Cylinder and cone: the points with |p x axis| = radius + slope (p . axis), p from the base. Radius and
+// slope are in units of |axis|, so that the axis need not be unit.
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
     scalar4 axis_slope;  // xyz axis, w slope
     scalar4 range;       // x: p . axis runs from 0 to this where finite; y: |axis|; z: |axis|^2
-    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED
+    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | ONLY_INSIDE
 } Revolution;
 
 enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2 };
@@ -62,25 +65,43 @@ typedef Revolution Cylinder; // slope 0
 typedef Revolution Cone;
 
 typedef struct {
+    scalar4 center_major; // w: radius of the circle
+    scalar4 axis_minor;   // unit; w: radius of the tube
+    uint4 id;
+} Torus;
+
+typedef struct {
     scalar4 a, b, c;
     scalar4 normal_a, normal_b, normal_c; // unit, where smooth
     uint4 id;                             // y: 1 where smooth
 } Triangle;
 
-// Every shape: its feature, its struct, its name. Adding one begins here: docs/adding-a-shape.md.
+// Every shape: its feature, its struct, its name and its array's. Adding one begins here:
+// docs/adding-a-shape.md.
 // clang-format off
-#define SHAPE_LIST(SHAPE)                \
-    SHAPE(SPHERES,   Sphere,   sphere)   \
-    SHAPE(PLANES,    Plane,    plane)    \
-    SHAPE(DISCS,     Disc,     disc)     \
-    SHAPE(BOXES,     Box,      box)      \
-    SHAPE(CYLINDERS, Cylinder, cylinder) \
-    SHAPE(CONES,     Cone,     cone)     \
-    SHAPE(TRIANGLES, Triangle, triangle)
+#define SHAPE_LIST(SHAPE)                           \
+    SHAPE(SPHERES,   Sphere,   sphere,   spheres)   \
+    SHAPE(PLANES,    Plane,    plane,    planes)    \
+    SHAPE(DISCS,     Disc,     disc,     discs)     \
+    SHAPE(BOXES,     Box,      box,      boxes)     \
+    SHAPE(CYLINDERS, Cylinder, cylinder, cylinders) \
+    SHAPE(CONES,     Cone,     cone,     cones)     \
+    SHAPE(TRIANGLES, Triangle, triangle, triangles) \
+    SHAPE(TORI,      Torus,    torus,    tori)
 // clang-format on
 
-#define SHAPE_KIND(feature, Type, name) KIND_##feature,
+#define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
 enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
+
+// A node of the bounding volume hierarchy holds its two children's boxes. A child is another node, or the
+// primitives first .. first + count of one kind.
+typedef struct {
+    scalar4 low_0, high_0, low_1, high_1;
+    uint4 children; // x: first child's node or first primitive, y: BVH_NODE or count << 8 | kind; z, w: the
+                    // second's
+} BvhNode;
+
+enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 
 // Where an object's id leads.
 typedef struct {
@@ -88,11 +109,21 @@ typedef struct {
 } ObjectEntry;
 
 typedef struct {
-    scalar4 color;          // rgb, w: ka
-    scalar4 diffuse;        // kd rgb, w: ks
-    scalar4 other_color;    // the checker's second color, w: shininess
-    scalar4 grid;           // xyz: where the eye stands among the checker's cells, w: cells per unit; 0: plain
+    scalar4 color;        // rgb, w: ka
+    scalar4 diffuse;      // kd rgb, w: ks
+    scalar4 other_color;  // the checker's second color, w: shininess
+    scalar4 grid;         // xyz: where the eye stands among the checker's cells, w: cells per unit; 0: plain
+    scalar4 mirror_glass; // x: reflection, y: transmission, z: index of refraction
+    // How much light a shadow ray loses here, as -log2(transmission) in whole steps, whose sum does not
+    // depend on the order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of
+    // 2^-48, for double.
+    uint4 opacity;
 } Material;
+
+enum { OPAQUE = 0x7fffffff }; // in x: no light passes
+
+// What a counting build counts.
+enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
 
 enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
 
@@ -100,16 +131,20 @@ typedef struct {
     scalar4 color;
     scalar4 position;  // from the eye; point and spot
     scalar4 direction; // unit, the way the light travels; directional and spot
-    scalar4 cone;      // spot: x: 1 - cos(half-angle), y: 1 - cos(angle - penumbra), z: 1 / (x - y), 0 for a hard edge
-    uint4 kind;        // x: LIGHT_KIND_…
+    scalar4
+        cone; // spot: x: 1 - cos(half-angle), y: 1 - cos(angle - penumbra), z: 1 / (x - y), 0 for a hard edge
+    uint4 kind; // x: LIGHT_KIND_…
 } Light;
 
 typedef struct {
     scalar4 background, ambient;
     // A picture's ray: forward + x right + y up, x and y in half pixels from the picture's center.
     scalar4 forward, right, up;
-    uint4 picture;   // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 counts[2]; // of each KIND_…, in its order
+    scalar4 extent;          // x: no coordinate of a bounded primitive is larger
+    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;           // x: of a ray, at most
+    uint4 counts[2];         // of each KIND_…, in its order
+    uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
 } SceneHeader;
 
 #endif

@@ -20,7 +20,8 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint check SCENE [OPTIONS]\n\n"
-    "Says how many objects, lights and materials a scene has, where it lies, which parts of the kernel it needs,\n"
+    "Says how many objects, lights and materials a scene has, where it lies, which parts of the kernel it "
+    "needs,\n"
     "and what was tolerated in it.\n\n"
     "      --json            for programs\n"
     "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
@@ -64,7 +65,8 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf("%s%zu %s", separator, facts->shapes[kind], shape_names[kind]);
         separator = ", ";
     }
-    printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count, scene->materials.count);
+    printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count,
+           scene->materials.count);
     Vector3 low = facts->bounds.min, high = facts->bounds.max;
     if (bounds_are_empty(&facts->bounds))
         printf("none");

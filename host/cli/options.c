@@ -8,9 +8,12 @@
 #include <strings.h>
 
 const char common_options_help[] =
-    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
+    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
+    "else a CPU)\n"
     "      --precision P     fast, single, strict or double (default: single)\n"
     "      --lanes N         rays a work-item carries: 1, 4, 8 or 16 (default: the device's own)\n"
+    "      --bvh B           auto, on or off: rays through a hierarchy; the picture is the same (default: "
+    "auto)\n"
     "      --no-cache        build the kernels anew and keep nothing\n"
     "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
 
@@ -25,13 +28,14 @@ static bool digits_read(const char *value, const char **end, uint64_t *result)
     return at > value;
 }
 
-bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest, uint32_t *result)
+bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
+                  uint32_t *result)
 {
     const char *end;
     uint64_t number;
     if (!digits_read(value, &end, &number) || *end != '\0' || number < smallest || number > largest) {
-        fprintf(stderr, "glint: --%s: expected a whole number from %u to %u, not \"%s\"\n", option, smallest, largest,
-                value);
+        fprintf(stderr, "glint: --%s: expected a whole number from %u to %u, not \"%s\"\n", option, smallest,
+                largest, value);
         return false;
     }
     *result = (uint32_t)number;
@@ -43,10 +47,11 @@ bool option_size(const char *option, const char *value, uint32_t *width, uint32_
     const uint64_t largest = 1u << 20;
     const char *at;
     uint64_t w, h;
-    if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) || *at != '\0' ||
-        w < 1 || h < 1 || w > largest || h > largest) {
-        fprintf(stderr, "glint: --%s: expected WIDTHxHEIGHT, such as 1280x720, each from 1 to %u, not \"%s\"\n", option,
-                (unsigned)largest, value);
+    if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||
+        *at != '\0' || w < 1 || h < 1 || w > largest || h > largest) {
+        fprintf(stderr,
+                "glint: --%s: expected WIDTHxHEIGHT, such as 1280x720, each from 1 to %u, not \"%s\"\n",
+                option, (unsigned)largest, value);
         return false;
     }
     *width = (uint32_t)w;
@@ -64,7 +69,8 @@ static void choices_tell(const char *const *names, size_t count, const char *val
     fputc('\n', stderr);
 }
 
-bool option_choice(const char *option, const char *value, const char *const *names, size_t count, unsigned *result)
+bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
+                   unsigned *result)
 {
     for (size_t i = 0; i < count; i++)
         if (strcmp(value, names[i]) == 0) {
@@ -76,7 +82,8 @@ bool option_choice(const char *option, const char *value, const char *const *nam
     return false;
 }
 
-bool option_set(const char *option, const char *value, const char *const *names, size_t count, unsigned *result)
+bool option_set(const char *option, const char *value, const char *const *names, size_t count,
+                unsigned *result)
 {
     *result = 0;
     for (const char *at = value;; at++) {
@@ -116,6 +123,10 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
         common->lanes = lanes[choice];
         return true;
     }
+    case OPTION_BVH:
+        *valid = option_choice("bvh", value, bvh_choice_names, BVH_CHOICE_COUNT, &choice);
+        common->bvh = (BvhChoice)choice;
+        return true;
     case OPTION_NO_CACHE:
         common->no_cache = true;
         return true;

@@ -13,26 +13,43 @@ typedef struct {
     const char *device;
     Precision precision;
     uint32_t lanes; // 0: the device's own
+    BvhChoice bvh;
     bool no_cache, lenient;
 } CommonOptions;
 
 // Values of getopt_long beyond the letters; each subcommand's own start at OPTION_OWN.
-enum { OPTION_DEVICE = 256, OPTION_PRECISION, OPTION_LANES, OPTION_NO_CACHE, OPTION_LENIENT, OPTION_OWN };
+enum {
+    OPTION_DEVICE = 256,
+    OPTION_PRECISION,
+    OPTION_LANES,
+    OPTION_BVH,
+    OPTION_NO_CACHE,
+    OPTION_LENIENT,
+    OPTION_OWN
+};
 
 #define COMMON_LONG_OPTIONS                                                                                  \
-    {"device", required_argument, NULL, OPTION_DEVICE}, {"precision", required_argument, NULL, OPTION_PRECISION}, \
-        {"lanes", required_argument, NULL, OPTION_LANES}, {"no-cache", no_argument, NULL, OPTION_NO_CACHE},  \
-        {"lenient", no_argument, NULL, OPTION_LENIENT}
+    {"device", required_argument, NULL, OPTION_DEVICE},                                                      \
+        {"precision", required_argument, NULL, OPTION_PRECISION},                                            \
+        {"lanes", required_argument, NULL, OPTION_LANES}, {"bvh", required_argument, NULL, OPTION_BVH},      \
+        {"no-cache", no_argument, NULL, OPTION_NO_CACHE},                                                    \
+    {                                                                                                        \
+        "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
+    }
 
 extern const char common_options_help[];
 
 // Each reads one value; on a fault it tells the user what is wrong with `option` and returns false.
-bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest, uint32_t *result);
+bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
+                  uint32_t *result);
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // WxH
-bool option_choice(const char *option, const char *value, const char *const *names, size_t count, unsigned *result);
+bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
+                   unsigned *result);
 // Comma-separated names; the result has a bit for each.
-bool option_set(const char *option, const char *value, const char *const *names, size_t count, unsigned *result);
-// Takes a common option; *valid tells whether its value was one. False if `option` is none of the common ones.
+bool option_set(const char *option, const char *value, const char *const *names, size_t count,
+                unsigned *result);
+// Takes a common option; *valid tells whether its value was one. False if `option` is none of the common
+// ones.
 bool option_common(CommonOptions *common, int option, const char *value, bool *valid);
 
 // Says that the command line of a subcommand is wrong in general, pointing to its help; returns EXIT_USER.

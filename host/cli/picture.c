@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const picture_aov_names[PICTURE_AOV_COUNT] = {"t", "normal", "position", "object", "shadow", "color"};
+const char *const picture_aov_names[PICTURE_AOV_COUNT] = {"t",      "normal", "position",
+                                                          "object", "shadow", "color"};
 
 enum { AOV_COLOR = 1 << 5, NOTE_COUNT_LARGEST = 16 };
 
@@ -82,7 +83,8 @@ static void notes_write(Notes *notes, const Picture *picture)
     const RenderReport *report = renderer_report(picture->renderer);
     const char *slash = strrchr(picture->scene_path, '/');
     Text value = {0};
-#define NOTE(key, ...) (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
+#define NOTE(key, ...)                                                                                       \
+    (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
     NOTE("Software", "glint %s", glint_version());
     NOTE("Scene", "%s", slash ? slash + 1 : picture->scene_path);
     NOTE("Device", "%s", picture->device->name);
@@ -139,8 +141,10 @@ static bool files_open(Picture *picture, MessageList *messages)
     bool opened = picture->color != NULL;
 
     const ImageHeader aov_headers[PICTURE_AOV_COUNT] = {
-        header_of(picture, 1, real_type, NULL), header_of(picture, 3, real_type, NULL),
-        header_of(picture, 3, 'd', NULL),       header_of(picture, 1, 'u', NULL),
+        header_of(picture, 1, real_type, NULL),
+        header_of(picture, 3, real_type, NULL),
+        header_of(picture, 3, 'd', NULL),
+        header_of(picture, 1, 'u', NULL),
         header_of(picture, (uint32_t)picture->scene->lights.count, 'u', NULL),
         header_of(picture, 3, real_type, NULL),
     };
@@ -184,7 +188,8 @@ static const double *positions_in_world(Picture *picture, const Band *band, size
     Vector3 eye = picture->scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
     for (size_t i = 0; i < 3 * pixels; i++)
-        world[i] = (wide ? ((const double *)band->position)[i] : (double)((const float *)band->position)[i]) + axes[i % 3];
+        world[i] = (wide ? ((const double *)band->position)[i] : (double)((const float *)band->position)[i]) +
+                   axes[i % 3];
     return world;
 }
 
@@ -198,7 +203,8 @@ bool picture_write(Picture *picture, const Band *band, MessageList *messages)
         colors = narrowed(picture, colors, 3 * pixels);
     if (!image_writer_rows(picture->color, colors, band->row_count, messages)) return false;
 
-    const void *values[PICTURE_AOV_COUNT] = {band->t, band->normal, NULL, band->object, band->shadow, band->colors};
+    const void *values[PICTURE_AOV_COUNT] = {band->t,      band->normal, NULL,
+                                             band->object, band->shadow, band->colors};
     if (band->position) values[2] = positions_in_world(picture, band, pixels);
     for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
         if (picture->aovs[i] && !image_writer_rows(picture->aovs[i], values[i], band->row_count, messages))

@@ -6,7 +6,8 @@
 #include "host/render/renderer.h"
 
 enum { PICTURE_AOV_COUNT = 6 };
-extern const char *const picture_aov_names[PICTURE_AOV_COUNT]; // the first ones are the bits AOV_…, then "color"
+extern const char
+    *const picture_aov_names[PICTURE_AOV_COUNT]; // the first ones are the bits AOV_…, then "color"
 
 typedef struct {
     const char *path;
@@ -17,8 +18,9 @@ typedef struct {
 
 typedef struct Picture Picture;
 
-char *picture_default_path(const char *scene_path); // the scene's name with .png, in this folder; caller frees
-bool picture_path_known(const char *path);          // false: told the user which endings there are
+char *
+picture_default_path(const char *scene_path); // the scene's name with .png, in this folder; caller frees
+bool picture_path_known(const char *path);    // false: told the user which endings there are
 unsigned picture_renderer_aovs(const PictureOptions *options);
 
 // Files are opened with the first band, when the kernels' hash is known.

@@ -17,7 +17,8 @@ static void interrupt_note(int signal_number)
 void progress_open(Progress *progress, bool quiet)
 {
     double now = clock_seconds();
-    *progress = (Progress){.visible = !quiet && isatty(STDERR_FILENO), .start_seconds = now, .shown_seconds = now};
+    *progress =
+        (Progress){.visible = !quiet && isatty(STDERR_FILENO), .start_seconds = now, .shown_seconds = now};
     struct sigaction action = {.sa_handler = interrupt_note, .sa_flags = (int)SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);

@@ -20,6 +20,7 @@ enum {
     OPTION_TIMING,
     OPTION_TRANSFER,
     OPTION_BITS,
+    OPTION_BOUNCES,
     OPTION_QUIET
 };
 
@@ -32,6 +33,7 @@ static const struct option long_options[] = {
     {"timing", optional_argument, NULL, OPTION_TIMING},
     {"transfer", required_argument, NULL, OPTION_TRANSFER},
     {"bits", required_argument, NULL, OPTION_BITS},
+    {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
@@ -48,6 +50,7 @@ static const char help_text[] =
     "      --timing[=json]   tell the time of every stage and launch\n"
     "      --transfer T      srgb or none (default: srgb; none for .rt and .cfg)\n"
     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
+    "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
     "      --quiet           no progress\n";
 
 typedef struct {
@@ -55,7 +58,7 @@ typedef struct {
     const char *scene;
     PictureOptions picture;
     uint32_t width, height; // 0: not given
-    uint32_t sample_count;
+    uint32_t sample_count, bounce_count;
     uint32_t region[4]; // x, y, width, height
     bool has_region, has_transfer, quiet;
     TimingStyle timing;
@@ -68,7 +71,8 @@ static bool region_read(const char *value, uint32_t region[4])
         sscanf(value, "%9u,%9u,%9u,%9u%n", &region[0], &region[1], &region[2], &region[3], &end) == 4 &&
         value[end] == '\0' && region[2] > 0 && region[3] > 0)
         return true;
-    fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n", value);
+    fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n",
+            value);
     return false;
 }
 
@@ -102,6 +106,8 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         if (!option_choice("bits", value, (const char *const[]){"8", "16"}, 2, &choice)) return false;
         options->picture.bits = choice == 0 ? 8 : 16;
         return true;
+    case OPTION_BOUNCES:
+        return option_count("bounces", value, 0, 16, &options->bounce_count);
     case OPTION_QUIET:
         options->quiet = true;
         return true;
@@ -113,7 +119,8 @@ static bool option_take(RenderOptions *options, int option, const char *value)
 // EXIT_DONE: go on. *helped: the help was printed, stop.
 static int options_read(RenderOptions *options, int argument_count, char **arguments, bool *helped)
 {
-    *options = (RenderOptions){.common.precision = PRECISION_SINGLE, .sample_count = 1, .picture.bits = 8};
+    *options = (RenderOptions){
+        .common.precision = PRECISION_SINGLE, .sample_count = 1, .bounce_count = 5, .picture.bits = 8};
     int option;
     while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
         if (option == 'h') {
@@ -124,7 +131,8 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
     if (optind + 1 != argument_count)
-        return option_usage_fault("render", optind == argument_count ? "which scene?" : "one scene at a time");
+        return option_usage_fault("render",
+                                  optind == argument_count ? "which scene?" : "one scene at a time");
     options->scene = arguments[optind];
     return EXIT_DONE;
 }
@@ -148,8 +156,8 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
     }
     const uint32_t *region = options->region;
     if (region[0] + region[2] > options->width || region[1] + region[3] > options->height) {
-        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the picture of %ux%u pixels\n", region[0],
-                region[1], region[2], region[3], options->width, options->height);
+        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the picture of %ux%u pixels\n",
+                region[0], region[1], region[2], region[3], options->width, options->height);
         return false;
     }
     *settings = (RenderSettings){
@@ -162,6 +170,8 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
         .sample_count = options->sample_count,
         .precision = options->common.precision,
         .lanes = options->common.lanes,
+        .bvh = options->common.bvh,
+        .bounce_count = options->bounce_count,
         .shift_to_eye = true,
         .no_cache = options->common.no_cache,
     };
@@ -200,7 +210,8 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     }
     Progress progress;
     progress_open(&progress, options->quiet);
-    Picture *picture = picture_open(&options->picture, options->scene, scene, &settings, renderer, compute->device);
+    Picture *picture =
+        picture_open(&options->picture, options->scene, scene, &settings, renderer, compute->device);
     BandContext context = {picture, &progress, &messages, 0};
     bool whole = renderer_render(renderer, picture_renderer_aovs(&options->picture), band_take, &context);
     double start = clock_seconds();
@@ -214,7 +225,8 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     messages_tell(&messages, NULL);
     int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
     if (status == EXIT_INTERRUPTED)
-        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n", options->picture.path);
+        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
+                options->picture.path);
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderer_report(renderer), compute->device, &settings,
                      &(HostTimes){parse_seconds, context.encode_seconds});

@@ -43,6 +43,13 @@ static const char *launch_doubt(const LaunchTime *time)
     return "the event is longer than the host waited for it";
 }
 
+// A command that waited this long before it ran: the driver was doing something else, such as compiling.
+static double launch_delay(const LaunchTime *time)
+{
+    double delay = time->trusted ? time->host_seconds - time->event_seconds : 0;
+    return delay > 0.02 && delay > time->event_seconds ? delay : 0;
+}
+
 static void line_print(const char *what, double seconds, const char *remark)
 {
     fprintf(stderr, "  %-10s %10.3f ms  %s\n", what, 1e3 * seconds, remark);
@@ -53,30 +60,38 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     enum { SHOWN_LARGEST = 12 };
     LaunchSum sum = launches_sum(launches, count);
     char remark[160];
-    snprintf(remark, sizeof remark, "%zu %s; %.3f ms by the host's clock", count, count == 1 ? "command" : "commands",
-             1e3 * sum.host_seconds);
+    snprintf(remark, sizeof remark, "%zu %s; %.3f ms by the host's clock", count,
+             count == 1 ? "command" : "commands", 1e3 * sum.host_seconds);
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
     for (size_t i = 0; i < count && i < SHOWN_LARGEST; i++) {
         const LaunchTime *time = &launches[i].time;
         const char *doubt = launch_doubt(time);
         fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms%s%s\n", launches[i].name, 1e3 * time->event_seconds,
                 1e3 * time->host_seconds, doubt ? "; not trusted: " : "", doubt ? doubt : "");
+        if (launch_delay(time) > 0)
+            fprintf(stderr, "              %.3f ms passed before it ran: the driver %s\n",
+                    1e3 * launch_delay(time),
+                    i == 0 ? "finishes its build at the first launch" : "or another program kept the device");
     }
     if (count > SHOWN_LARGEST) fprintf(stderr, "    … and %zu more\n", count - SHOWN_LARGEST);
     if (sum.untrusted_count)
-        fprintf(stderr, "    the events' own times disagree with the host's clock in %zu of %zu; the host's are used\n",
-                sum.untrusted_count, count);
+        fprintf(
+            stderr,
+            "    the events' own times disagree with the host's clock in %zu of %zu; the host's are used\n",
+            sum.untrusted_count, count);
 }
 
 static void text_print(const RenderReport *report, const Device *device, const RenderSettings *settings,
                        const HostTimes *host)
 {
-    fprintf(stderr, "%ux%u, %u %s per pixel, precision %s, %u %s, on %s (kernel %016llx)\n", settings->region_width,
-            settings->region_height, settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
-            precision_names[settings->precision], report->lanes, report->lanes == 1 ? "lane" : "lanes", device->name,
+    fprintf(stderr, "%ux%u, %u %s per pixel, precision %s, %u %s, on %s (kernel %016llx)\n",
+            settings->region_width, settings->region_height, settings->sample_count,
+            settings->sample_count == 1 ? "sample" : "samples", precision_names[settings->precision],
+            report->lanes, report->lanes == 1 ? "lane" : "lanes", device->name,
             (unsigned long long)report->kernel_hash);
     line_print("parse", host->parse_seconds, "");
     line_print("flatten", report->flatten_seconds, "");
+    if (report->features & FEATURE_BVH) line_print("bvh", report->bvh_seconds, "");
     line_print("build", report->build_seconds, report->build_from_cache ? "from the cache" : "compiled");
     line_print("upload", report->upload_seconds, "");
     launches_print("launches", report->launches.items, report->launches.count);
@@ -125,6 +140,10 @@ static void json_report(const RenderReport *report, const Device *device, const 
     json_text(json, "kernel", hash);
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
+    if (report->features & FEATURE_BVH)
+        json_number(json, "bvh_ms", 1e3 * report->bvh_seconds);
+    else
+        json_null(json, "bvh_ms");
     json_number(json, "build_ms", 1e3 * report->build_seconds);
     json_boolean(json, "build_from_cache", report->build_from_cache);
     json_number(json, "upload_ms", 1e3 * report->upload_seconds);
@@ -134,8 +153,8 @@ static void json_report(const RenderReport *report, const Device *device, const 
     json_print(json, stdout);
 }
 
-void timing_print(TimingStyle style, const RenderReport *report, const Device *device, const RenderSettings *settings,
-                  const HostTimes *host)
+void timing_print(TimingStyle style, const RenderReport *report, const Device *device,
+                  const RenderSettings *settings, const HostTimes *host)
 {
     if (style == TIMING_JSON)
         json_report(report, device, settings, host);

@@ -13,5 +13,5 @@ typedef struct {
 } HostTimes;
 
 // Text goes to stderr, JSON to stdout.
-void timing_print(TimingStyle style, const RenderReport *report, const Device *device, const RenderSettings *settings,
-                  const HostTimes *host);
+void timing_print(TimingStyle style, const RenderReport *report, const Device *device,
+                  const RenderSettings *settings, const HostTimes *host);

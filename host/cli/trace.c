@@ -22,13 +22,14 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] =
-    "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
-    "Writes object,t,nx,ny,nz for each ray; an empty object is a miss. Scene and rays are taken as they are,\n"
-    "each number rounded once to the precision.\n\n"
-    "      --rays FILE       one ray a line: ox oy oz dx dy dz [tmin tmax], decimal or C's hexadecimal; - is the\n"
-    "                        standard input; # begins a comment\n"
-    "  -o, --output FILE     the CSV (default: the standard output)\n";
+static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+                                "Writes object,t,nx,ny,nz for each ray; an empty object is a miss. Scene and "
+                                "rays are taken as they are,\n"
+                                "each number rounded once to the precision.\n\n"
+                                "      --rays FILE       one ray a line: ox oy oz dx dy dz [tmin tmax], "
+                                "decimal or C's hexadecimal; - is the\n"
+                                "                        standard input; # begins a comment\n"
+                                "  -o, --output FILE     the CSV (default: the standard output)\n";
 
 typedef struct {
     CommonOptions common;
@@ -41,7 +42,8 @@ typedef struct {
 } RayList;
 
 // The numbers of one line, at most eight; the count, or -1 where something is no finite number.
-static int line_numbers(const Source *source, size_t start, size_t end, double numbers[8], MessageList *messages)
+static int line_numbers(const Source *source, size_t start, size_t end, double numbers[8],
+                        MessageList *messages)
 {
     int count = 0;
     const char *at = source->bytes + start, *stop = source->bytes + end;
@@ -84,7 +86,8 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
             }
         }
         if (count > 0) {
-            ProbeRay ray = {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
+            ProbeRay ray = {
+                {n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
             array_push(*rays, ray);
         }
         start = end + 1;
@@ -119,8 +122,8 @@ static bool hits_write(const char *path, const ProbeHit *hits, size_t count, boo
             if (hit->object == UINT32_MAX)
                 fputs(",,,,\n", output.file);
             else
-                fprintf(output.file, "%u,%.*g,%.*g,%.*g,%.*g\n", hit->object, digits, hit->t, digits, hit->normal[0],
-                        digits, hit->normal[1], digits, hit->normal[2]);
+                fprintf(output.file, "%u,%.*g,%.*g,%.*g,%.*g\n", hit->object, digits, hit->t, digits,
+                        hit->normal[0], digits, hit->normal[1], digits, hit->normal[2]);
         }
         written = output_commit(&output, &messages);
     }
@@ -138,6 +141,7 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
         .sample_count = 1,
         .precision = options->common.precision,
         .lanes = options->common.lanes,
+        .bvh = options->common.bvh,
         .no_cache = options->common.no_cache,
     };
     MessageList messages = {0};

@@ -1,5 +1,5 @@
-// Rendering the region band by band: each launch short enough for a desktop to stay usable and for an interrupt to be
-// heard, memory that of a band.
+// Rendering the region band by band: each launch short enough for a desktop to stay usable and for an
+// interrupt to be heard, memory that of a band.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/render/renderer_state.h"
@@ -38,7 +38,7 @@ static TileShape tile_shape(uint32_t lanes)
 // The buffers that a band is rendered into, sized for `rows`.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, colors, t, normal, position, object, shadow;
+    cl_mem offsets, ray_counts, colors, t, normal, position, object, shadow;
 } Film;
 
 typedef struct {
@@ -73,6 +73,7 @@ static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t ro
         film->object = film_buffer(renderer, pixels * sizeof(uint32_t));
         film->shadow = film_buffer(renderer, film_shadow_size(renderer, rows));
     }
+    film->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     void *offsets = sample_pattern(settings->sample_count, renderer->report.wide);
     film->offsets =
         buffer_create(renderer->compute, 2 * settings->sample_count * scalar, offsets, CL_MEM_READ_ONLY);
@@ -81,7 +82,8 @@ static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t ro
 
 static void film_close(Film *film)
 {
-    cl_mem buffers[] = {film->offsets, film->colors, film->t, film->normal, film->position, film->object, film->shadow};
+    cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->t,
+                        film->normal,  film->position,   film->object, film->shadow};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
         if (buffers[i]) cl_must(clReleaseMemObject(buffers[i]));
     *film = (Film){0};
@@ -106,8 +108,25 @@ static void band_launch_size(const Renderer *renderer, BandRows rows, size_t *gl
 static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint argument, BandRows rows)
 {
     const RenderSettings *settings = &renderer->settings;
-    cl_uint4 band = {{settings->region_x, settings->region_y + rows.first_row, settings->region_width, rows.row_count}};
+    cl_uint4 band = {
+        {settings->region_x, settings->region_y + rows.first_row, settings->region_width, rows.row_count}};
     kernel_argument(kernel, argument, sizeof band, &band);
+}
+
+static void ray_counts_clear(Renderer *renderer, const Film *film)
+{
+    const uint32_t zeros[RAYS_COUNT] = {0};
+    cl_must(clEnqueueWriteBuffer(renderer->compute->queue, film->ray_counts, CL_TRUE, 0, sizeof zeros, zeros,
+                                 0, NULL, NULL));
+}
+
+static void ray_counts_add(Renderer *renderer, const Film *film)
+{
+    uint32_t counts[RAYS_COUNT];
+    cl_must(clEnqueueReadBuffer(renderer->compute->queue, film->ray_counts, CL_TRUE, 0, sizeof counts, counts,
+                                0, NULL, NULL));
+    for (size_t i = 0; i < RAYS_COUNT; i++)
+        renderer->report.rays[i] += counts[i];
 }
 
 // One launch for samples first..last-1; returns its seconds, the event's where it can be trusted.
@@ -119,9 +138,12 @@ static double band_render(Renderer *renderer, const Film *film, BandRows rows, u
     band_set_place(renderer, kernel, FLAT_COUNT + 2, rows);
     kernel_argument(kernel, FLAT_COUNT + 3, sizeof first, &first);
     kernel_argument(kernel, FLAT_COUNT + 4, sizeof last, &last);
+    kernel_argument(kernel, FLAT_COUNT + 5, sizeof(cl_mem), &film->ray_counts);
+    if (renderer->settings.counting) ray_counts_clear(renderer, film);
     size_t global[2];
     band_launch_size(renderer, rows, global);
     LaunchTime time = renderer_launch(renderer, KERNEL_RENDER, 2, global, group_size);
+    if (renderer->settings.counting) ray_counts_add(renderer, film);
     return time.trusted ? time.event_seconds : time.host_seconds;
 }
 
@@ -159,7 +181,8 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
     for (size_t i = 0; i < PART_COUNT; i++)
         if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
             mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
-    Band band = {rows.first_row, rows.row_count, mapped[0], mapped[1], mapped[2], mapped[3], mapped[4], mapped[5]};
+    Band band = {rows.first_row, rows.row_count, mapped[0], mapped[1],
+                 mapped[2],      mapped[3],      mapped[4], mapped[5]};
     double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
     bool go_on = sink(context, &band, done);
     for (size_t i = 0; i < PART_COUNT; i++)
@@ -215,8 +238,11 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
         uint64_t pixels = film_pixels(renderer, rows.row_count);
         for (uint32_t first = 0; first < settings->sample_count;) {
             uint64_t samples = pace_samples(&pace) / pixels;
-            samples = samples < 1 ? 1 : samples > SAMPLES_OF_LAUNCH_LARGEST ? SAMPLES_OF_LAUNCH_LARGEST : samples;
-            uint32_t last = settings->sample_count - first < samples ? settings->sample_count : first + (uint32_t)samples;
+            samples = samples < 1                           ? 1
+                      : samples > SAMPLES_OF_LAUNCH_LARGEST ? SAMPLES_OF_LAUNCH_LARGEST
+                                                            : samples;
+            uint32_t last =
+                settings->sample_count - first < samples ? settings->sample_count : first + (uint32_t)samples;
             double seconds = band_render(renderer, &film, rows, first, last);
             pace.seconds_per_sample = seconds / (double)(pixels * (last - first));
             first = last;

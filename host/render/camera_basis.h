@@ -9,8 +9,8 @@ typedef struct {
     Vector3 right, up; // half a pixel along the picture's width and height, at distance 1
 } CameraBasis;
 
-// Where `up` is zero or parallel to the view, the world axis least aligned with the view stands in for it (the
-// first of x, y, z where several are).
+// Where `up` is zero or parallel to the view, the world axis least aligned with the view stands in for it
+// (the first of x, y, z where several are).
 CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height);
 
 // The world axis least aligned with a direction, the first of x, y, z where several are.

@@ -5,9 +5,9 @@ const char *const feature_names[FEATURE_COUNT] = {FEATURE_LIST(FEATURE_NAME)};
 #undef FEATURE_NAME
 
 static const FeatureSet shape_features[SHAPE_COUNT] = {
-    [SHAPE_SPHERE] = FEATURE_SPHERES,     [SHAPE_PLANE] = FEATURE_PLANES, [SHAPE_DISC] = FEATURE_DISCS,
-    [SHAPE_BOX] = FEATURE_BOXES,          [SHAPE_CYLINDER] = FEATURE_CYLINDERS,
-    [SHAPE_CONE] = FEATURE_CONES,         [SHAPE_TRIANGLE] = FEATURE_TRIANGLES,
+    [SHAPE_SPHERE] = FEATURE_SPHERES,     [SHAPE_PLANE] = FEATURE_PLANES,       [SHAPE_DISC] = FEATURE_DISCS,
+    [SHAPE_BOX] = FEATURE_BOXES,          [SHAPE_CYLINDER] = FEATURE_CYLINDERS, [SHAPE_CONE] = FEATURE_CONES,
+    [SHAPE_TRIANGLE] = FEATURE_TRIANGLES, [SHAPE_TORUS] = FEATURE_TORI,
 };
 
 static const FeatureSet light_features[] = {
@@ -21,7 +21,11 @@ FeatureSet features_of(const Scene *scene)
     FeatureSet set = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         set |= shape_features[scene->objects.items[i].kind];
-        if (scene->materials.items[scene->objects.items[i].material].checker) set |= FEATURE_CHECKERS;
+        const Material *material = &scene->materials.items[scene->objects.items[i].material];
+        if (material->checker) set |= FEATURE_CHECKERS;
+        if (material->reflection > 0) set |= FEATURE_REFLECTION;
+        // total reflection makes mirrors of glass
+        if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
     }
     for (size_t i = 0; i < scene->lights.count; i++)
         set |= light_features[scene->lights.items[i].kind];

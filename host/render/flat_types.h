@@ -1,5 +1,5 @@
-// kernels/types.h on the host. The kernels' Light and Material are FlatLight and FlatMaterial here, beside the
-// Scene's own.
+// kernels/types.h on the host. The kernels' Light and Material are FlatLight and FlatMaterial here, beside
+// the Scene's own.
 #pragma once
 
 #define Light    FlatLight

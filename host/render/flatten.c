@@ -8,20 +8,21 @@
 
 // clang-format off
 static const FlatLayout layouts[FLAT_COUNT] = {
-    [FLAT_HEADER] = {sizeof(SceneHeader), offsetof(SceneHeader, picture) / sizeof(scalar4), 3},
-#define SHAPE_LAYOUT(feature, Type, name) \
+    [FLAT_HEADER] = {sizeof(SceneHeader), offsetof(SceneHeader, picture) / sizeof(scalar4), 6},
+#define SHAPE_LAYOUT(feature, Type, name, names) \
     [FLAT_FIRST_SHAPE + KIND_##feature] = {sizeof(Type), offsetof(Type, id) / sizeof(scalar4), 1},
     SHAPE_LIST(SHAPE_LAYOUT)
+    [FLAT_NODES] = {sizeof(BvhNode), offsetof(BvhNode, children) / sizeof(scalar4), 1},
     [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
-    [FLAT_MATERIALS] = {sizeof(FlatMaterial), sizeof(FlatMaterial) / sizeof(scalar4), 0},
+    [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 1},
     [FLAT_LIGHTS] = {sizeof(FlatLight), offsetof(FlatLight, kind) / sizeof(scalar4), 1},
 };
 // clang-format on
 
 static const int kind_of_shape[SHAPE_COUNT] = {
-    [SHAPE_SPHERE] = KIND_SPHERES,     [SHAPE_PLANE] = KIND_PLANES, [SHAPE_DISC] = KIND_DISCS,
-    [SHAPE_BOX] = KIND_BOXES,          [SHAPE_CYLINDER] = KIND_CYLINDERS,
-    [SHAPE_CONE] = KIND_CONES,         [SHAPE_TRIANGLE] = KIND_TRIANGLES,
+    [SHAPE_SPHERE] = KIND_SPHERES,     [SHAPE_PLANE] = KIND_PLANES,       [SHAPE_DISC] = KIND_DISCS,
+    [SHAPE_BOX] = KIND_BOXES,          [SHAPE_CYLINDER] = KIND_CYLINDERS, [SHAPE_CONE] = KIND_CONES,
+    [SHAPE_TRIANGLE] = KIND_TRIANGLES, [SHAPE_TORUS] = KIND_TORI,
 };
 
 // What flattening one object needs to know.
@@ -30,7 +31,8 @@ typedef struct {
     bool wide;
 } Rounding;
 
-// The volatile keeps the rounding: gcc 12 at -O2 loses a conversion to float and back where stores are merged.
+// The volatile keeps the rounding: gcc 12 at -O2 loses a conversion to float and back where stores are
+// merged.
 static double rounded(const Rounding *rounding, double value)
 {
     if (rounding->wide) return value;
@@ -61,7 +63,8 @@ static Vector3 axis_scaled(Vector3 axis)
     return (Vector3){ldexp(axis.x, -exponent), ldexp(axis.y, -exponent), ldexp(axis.z, -exponent)};
 }
 
-// The first axis of the squares on a plane: the world axis least aligned with the normal, laid into the plane.
+// The first axis of the squares on a plane: the world axis least aligned with the normal, laid into the
+// plane.
 static Vector3 grid_axis(Vector3 unit_normal)
 {
     Vector3 axis = vector_least_aligned_axis(unit_normal);
@@ -69,15 +72,16 @@ static Vector3 grid_axis(Vector3 unit_normal)
     return vector_normalize(across);
 }
 
-// Squares along one direction: how many per unit, and where the eye stands among them. A whole number of pairs is
-// left out, which keeps the bits far from the origin.
+// Squares along one direction: how many per unit, and where the eye stands among them. A whole number of
+// pairs is left out, which keeps the bits far from the origin.
 static scalar4 grid_of(const Rounding *rounding, Vector3 direction, double size)
 {
     double phase = fmod(vector_dot(rounding->eye, direction) / size, 2);
     return scalar4_of(vector_scale(direction, 1 / size), phase);
 }
 
-static void grid_flatten(const Rounding *rounding, Vector3 normal, const Material *material, scalar4 *u, scalar4 *v)
+static void grid_flatten(const Rounding *rounding, Vector3 normal, const Material *material, scalar4 *u,
+                         scalar4 *v)
 {
     if (!material->checker) return;
     Vector3 unit = vector_normalize(normal);
@@ -86,8 +90,9 @@ static void grid_flatten(const Rounding *rounding, Vector3 normal, const Materia
     *v = grid_of(rounding, vector_cross(unit, across), material->checker_size);
 }
 
-static Revolution revolution_flatten(const Rounding *rounding, Vector3 from, Vector3 whole_axis, double radius_from,
-                                     double radius_to, double endless_slope, bool finite, bool caps)
+static Revolution revolution_flatten(const Rounding *rounding, Vector3 from, Vector3 whole_axis,
+                                     double radius_from, double radius_to, double endless_slope, bool finite,
+                                     bool caps)
 {
     Vector3 base = point_from_eye(rounding, from);
     Vector3 axis = whole_axis;
@@ -104,12 +109,14 @@ static Revolution revolution_flatten(const Rounding *rounding, Vector3 from, Vec
     };
 }
 
-static void object_flatten(const Rounding *rounding, const Object *object, const Material *material, void *target)
+static void object_flatten(const Rounding *rounding, const Object *object, const Material *material,
+                           void *target)
 {
     switch (object->kind) {
     case SHAPE_SPHERE:
-        *(Sphere *)target = (Sphere){.center_radius = scalar4_of(point_from_eye(rounding, object->as.sphere.center),
-                                                                 object->as.sphere.radius)};
+        *(Sphere *)target =
+            (Sphere){.center_radius = scalar4_of(point_from_eye(rounding, object->as.sphere.center),
+                                                 object->as.sphere.radius)};
         break;
     case SHAPE_PLANE: {
         Plane *plane = target;
@@ -131,15 +138,15 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
                                .high = scalar4_of(point_from_eye(rounding, object->as.box.max), 0)};
         break;
     case SHAPE_CYLINDER:
-        *(Cylinder *)target = revolution_flatten(
-            rounding, object->as.cylinder.from, object->as.cylinder.axis, object->as.cylinder.radius,
-            object->as.cylinder.radius, 0, object->as.cylinder.finite, object->as.cylinder.caps);
+        *(Cylinder *)target = revolution_flatten(rounding, object->as.cylinder.from, object->as.cylinder.axis,
+                                                 object->as.cylinder.radius, object->as.cylinder.radius, 0,
+                                                 object->as.cylinder.finite, object->as.cylinder.caps);
         break;
     case SHAPE_CONE:
-        *(Cone *)target =
-            revolution_flatten(rounding, object->as.cone.from, object->as.cone.axis,
-                               object->as.cone.finite ? object->as.cone.radius[0] : 0, object->as.cone.radius[1],
-                               object->as.cone.slope, object->as.cone.finite, object->as.cone.caps);
+        *(Cone *)target = revolution_flatten(rounding, object->as.cone.from, object->as.cone.axis,
+                                             object->as.cone.finite ? object->as.cone.radius[0] : 0,
+                                             object->as.cone.radius[1], object->as.cone.slope,
+                                             object->as.cone.finite, object->as.cone.caps);
         break;
     case SHAPE_TRIANGLE: {
         const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
@@ -154,29 +161,42 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
         };
         break;
     }
+    case SHAPE_TORUS:
+        *(Torus *)target = (Torus){
+            .center_major =
+                scalar4_of(point_from_eye(rounding, object->as.torus.center), object->as.torus.major),
+            .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
+        };
+        break;
     case SHAPE_COUNT:
         break;
     }
 }
 
-static void flat_array_open(FlatScene *flat, size_t kind, size_t count)
+FlatArray flat_array_make(size_t kind, size_t count)
 {
-    flat->arrays[kind] = (FlatArray){aligned_alloc(64, (count * layouts[kind].size + 63) / 64 * 64 + 64), count,
-                                     layouts[kind]};
-    if (!flat->arrays[kind].items) fault("out of memory for %zu flat structs", count);
-    memset(flat->arrays[kind].items, 0, count * layouts[kind].size);
+    size_t size = count * layouts[kind].size;
+    FlatArray array = {aligned_alloc(64, (size + 127) / 64 * 64), count, layouts[kind]};
+    if (!array.items) fault("out of memory for %zu flat structs", count);
+    memset(array.items, 0, size);
+    return array;
 }
 
-static void *flat_array_at(const FlatArray *array, size_t index)
+void *flat_array_at(const FlatArray *array, size_t index)
 {
     return (char *)array->items + index * array->layout.size;
 }
 
-// The shape's own struct has its id in its first uint4, right behind its scalar4 members.
-static void flat_set_id(const FlatArray *array, size_t index, uint32_t id)
+// A shape's struct has its id in its first uint4, right behind its scalar4 members.
+static uint32_t *flat_id_at(const FlatArray *array, size_t index)
 {
-    uint4 *ids = (uint4 *)(void *)((char *)flat_array_at(array, index) + array->layout.scalar4_count * sizeof(scalar4));
-    ids->x = id;
+    size_t offset = array->layout.scalar4_count * sizeof(scalar4);
+    return (uint32_t *)(void *)((char *)flat_array_at(array, index) + offset);
+}
+
+uint32_t flat_id(const FlatArray *array, size_t index)
+{
+    return *flat_id_at(array, index);
 }
 
 static void objects_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
@@ -185,34 +205,46 @@ static void objects_flatten(FlatScene *flat, const Scene *scene, const Rounding 
     for (size_t i = 0; i < scene->objects.count; i++)
         counts[kind_of_shape[scene->objects.items[i].kind]]++;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        flat_array_open(flat, FLAT_FIRST_SHAPE + kind, counts[kind]);
+        flat->arrays[FLAT_FIRST_SHAPE + kind] = flat_array_make(FLAT_FIRST_SHAPE + kind, counts[kind]);
         counts[kind] = 0;
     }
-    flat_array_open(flat, FLAT_OBJECTS, scene->objects.count);
+    flat->arrays[FLAT_OBJECTS] = flat_array_make(FLAT_OBJECTS, scene->objects.count);
     ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         int kind = kind_of_shape[object->kind];
         const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
         size_t index = counts[kind]++;
-        object_flatten(rounding, object, &scene->materials.items[object->material], flat_array_at(array, index));
-        flat_set_id(array, index, (uint32_t)i);
+        object_flatten(rounding, object, &scene->materials.items[object->material],
+                       flat_array_at(array, index));
+        *flat_id_at(array, index) = (uint32_t)i;
         entries[i].kind_index_material = (uint4){(uint32_t)kind, (uint32_t)index, object->material, 0};
     }
 }
 
+static uint4 opacity_of(double transmission)
+{
+    double log2_loss = transmission > 0 ? -log2(transmission) : INFINITY;
+    if (log2_loss >= 127) return (uint4){OPAQUE, 0, 0, 0};
+    uint64_t fine = (uint64_t)llround(ldexp(log2_loss, 48));
+    return (uint4){(uint32_t)llround(ldexp(log2_loss, 24)), (uint32_t)fine, (uint32_t)(fine >> 32), 0};
+}
+
 static void materials_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
 {
-    flat_array_open(flat, FLAT_MATERIALS, scene->materials.count);
+    flat->arrays[FLAT_MATERIALS] = flat_array_make(FLAT_MATERIALS, scene->materials.count);
     FlatMaterial *materials = flat->arrays[FLAT_MATERIALS].items;
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *material = &scene->materials.items[i];
         double size = material->checker_size;
         Vector3 eye = rounding->eye;
         materials[i] = (FlatMaterial){
-            .color = scalar4_of(material->checker ? material->checker_colors[0] : material->color, material->ambient),
+            .color = scalar4_of(material->checker ? material->checker_colors[0] : material->color,
+                                material->ambient),
             .diffuse = scalar4_of(material->diffuse, material->specular),
             .other_color = scalar4_of(material->checker_colors[1], material->shininess),
+            .mirror_glass = {material->reflection, material->transmission, material->ior, 0},
+            .opacity = opacity_of(material->transmission),
         };
         if (material->checker)
             materials[i].grid =
@@ -234,14 +266,15 @@ static void lights_flatten(FlatScene *flat, const Scene *scene, const Rounding *
         [LIGHT_DIRECTIONAL] = LIGHT_KIND_DIRECTIONAL,
         [LIGHT_SPOT] = LIGHT_KIND_SPOT,
     };
-    flat_array_open(flat, FLAT_LIGHTS, scene->lights.count);
+    flat->arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, scene->lights.count);
     FlatLight *lights = flat->arrays[FLAT_LIGHTS].items;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         lights[i] = (FlatLight){.color = scalar4_of(light->color, 0), .kind.x = kinds[light->kind]};
         if (light->kind != LIGHT_DIRECTIONAL)
             lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
-        if (light->kind != LIGHT_POINT) lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
+        if (light->kind != LIGHT_POINT)
+            lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
         if (light->kind == LIGHT_SPOT) {
             double outer = versine(light->angle), inner = versine(light->angle - light->penumbra);
             lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
@@ -251,7 +284,7 @@ static void lights_flatten(FlatScene *flat, const Scene *scene, const Rounding *
 
 static void header_flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings)
 {
-    flat_array_open(flat, FLAT_HEADER, 1);
+    flat->arrays[FLAT_HEADER] = flat_array_make(FLAT_HEADER, 1);
     SceneHeader *header = flat->arrays[FLAT_HEADER].items;
     CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     *header = (SceneHeader){
@@ -260,6 +293,7 @@ static void header_flatten(FlatScene *flat, const Scene *scene, const FlattenSet
         .forward = scalar4_of(basis.forward, 0),
         .right = scalar4_of(basis.right, 0),
         .up = scalar4_of(basis.up, 0),
+        .bounces.x = settings->bounce_count,
         .picture = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
     };
     uint32_t counts[8] = {0};
@@ -278,6 +312,7 @@ void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *setting
     materials_flatten(flat, scene, &rounding);
     lights_flatten(flat, scene, &rounding);
     header_flatten(flat, scene, settings);
+    flat->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, 0);
 }
 
 void flat_scene_free(FlatScene *flat)
@@ -290,7 +325,8 @@ void flat_scene_free(FlatScene *flat)
 size_t flat_array_size(const FlatArray *array, bool wide)
 {
     const FlatLayout *layout = &array->layout;
-    size_t size = wide ? layout->size : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+    size_t size =
+        wide ? layout->size : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
     return array->count * size;
 }
 

@@ -17,7 +17,15 @@ typedef struct {
     FlatLayout layout;
 } FlatArray;
 
-typedef enum { FLAT_HEADER, FLAT_FIRST_SHAPE, FLAT_OBJECTS = FLAT_FIRST_SHAPE + KIND_COUNT, FLAT_MATERIALS, FLAT_LIGHTS, FLAT_COUNT } FlatKind;
+typedef enum {
+    FLAT_HEADER,
+    FLAT_FIRST_SHAPE,
+    FLAT_NODES = FLAT_FIRST_SHAPE + KIND_COUNT,
+    FLAT_OBJECTS,
+    FLAT_MATERIALS,
+    FLAT_LIGHTS,
+    FLAT_COUNT
+} FlatKind;
 
 // The arrays in the order of the kernels' arguments.
 typedef struct {
@@ -25,15 +33,20 @@ typedef struct {
 } FlatScene;
 
 typedef struct {
-    uint32_t width, height, sample_count;
+    uint32_t width, height, sample_count, bounce_count;
     bool shift_to_eye; // else positions stay as they are
     bool wide;         // the kernel's precision is double; else every number is first rounded to float
 } FlattenSettings;
 
-// Every number of the scene is rounded to the kernel's precision once, after the eye's position was subtracted in
-// double; what is derived from numbers (axes, slopes, squares of a checker) is derived from the rounded ones.
+// Every number of the scene is rounded to the kernel's precision once, after the eye's position was
+// subtracted in double; what is derived from numbers (axes, slopes, squares of a checker) is derived from the
+// rounded ones.
 void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings);
 void flat_scene_free(FlatScene *flat);
+
+FlatArray flat_array_make(size_t kind, size_t count); // zeroed
+void *flat_array_at(const FlatArray *array, size_t index);
+uint32_t flat_id(const FlatArray *array, size_t index); // of a shape's struct: the object's
 
 // Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
 size_t flat_array_size(const FlatArray *array, bool wide);

@@ -31,9 +31,11 @@ static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count,
             scalar_set(values, i * RAY_SCALARS + k, wide, ray[k]);
     }
     Compute *compute = renderer->compute;
-    cl_mem ray_buffer = buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, values, CL_MEM_READ_ONLY);
+    cl_mem ray_buffer =
+        buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, values, CL_MEM_READ_ONLY);
     free(values);
-    size_t result_size = (size_t)count * RESULT_SCALARS * scalar, object_size = (size_t)count * sizeof(uint32_t);
+    size_t result_size = (size_t)count * RESULT_SCALARS * scalar,
+           object_size = (size_t)count * sizeof(uint32_t);
     cl_mem results = buffer_create(compute, result_size, NULL, CL_MEM_WRITE_ONLY);
     cl_mem objects = buffer_create(compute, object_size, NULL, CL_MEM_WRITE_ONLY);
 

@@ -1,11 +1,17 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
+#include "host/render/hierarchy.h"
 #include "host/render/renderer_state.h"
 #include <math.h>
 #include <stdlib.h>
 
 const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double"};
+
+const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
+
+// From so many bounded primitives on the hierarchy is faster than the plain loop.
+enum { BVH_WORTHWHILE = 24 };
 
 static const struct {
     const char *file, *name;
@@ -23,8 +29,8 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
         return false;
     }
     if (settings->precision == PRECISION_DOUBLE && !device->fp64) {
-        message_add(messages, MESSAGE_ERROR, "precision double: the device \"%s\" has no 64-bit floating point",
-                    device->name);
+        message_add(messages, MESSAGE_ERROR,
+                    "precision double: the device \"%s\" has no 64-bit floating point", device->name);
         return false;
     }
     return true;
@@ -34,7 +40,8 @@ static bool array_is_finite(const FlatArray *array, bool wide)
 {
     double largest = wide ? INFINITY : 3.4028234663852886e38;
     for (size_t i = 0; i < array->count; i++) {
-        const double *numbers = (const double *)(const void *)((const char *)array->items + i * array->layout.size);
+        const double *numbers =
+            (const double *)(const void *)((const char *)array->items + i * array->layout.size);
         for (size_t k = 0; k < 4 * array->layout.scalar4_count; k++)
             if (!(fabs(numbers[k]) <= largest) || isinf(numbers[k])) return false;
     }
@@ -45,8 +52,10 @@ static bool scene_fits(const FlatScene *flat, const Renderer *renderer, MessageL
 {
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         if (array_is_finite(&flat->arrays[kind], renderer->report.wide)) continue;
-        message_add(messages, MESSAGE_ERROR, "a number of the scene does not fit precision %s: its magnitude is beyond %s",
-                    precision_names[renderer->settings.precision], renderer->report.wide ? "1.8e308" : "3.4e38");
+        message_add(messages, MESSAGE_ERROR,
+                    "a number of the scene does not fit precision %s: its magnitude is beyond %s",
+                    precision_names[renderer->settings.precision],
+                    renderer->report.wide ? "1.8e308" : "3.4e38");
         return false;
     }
     return true;
@@ -76,6 +85,7 @@ static void prelude_write(Renderer *renderer)
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
+    text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
     features_write_prelude(text, renderer->report.features);
 
     renderer->options = "-cl-std=CL1.2";
@@ -84,7 +94,8 @@ static void prelude_write(Renderer *renderer)
         renderer->options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
 }
 
-Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings, MessageList *messages)
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                        MessageList *messages)
 {
     if (!settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
@@ -100,13 +111,21 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     double start = clock_seconds();
     FlatScene flat;
     flatten(&flat, scene,
-            &(FlattenSettings){settings->width, settings->height, settings->sample_count, settings->shift_to_eye,
-                               report->wide});
+            &(FlattenSettings){settings->width, settings->height, settings->sample_count,
+                               settings->bounce_count, settings->shift_to_eye, report->wide});
     report->flatten_seconds = clock_seconds() - start;
     if (!scene_fits(&flat, renderer, messages)) {
         flat_scene_free(&flat);
         free(renderer);
         return NULL;
+    }
+    size_t bounded_count = hierarchy_bounded_count(&flat);
+    bool hangs = settings->bvh == BVH_ON || (settings->bvh == BVH_AUTO && bounded_count >= BVH_WORTHWHILE);
+    if (hangs && bounded_count > 0) {
+        start = clock_seconds();
+        hierarchy_hang(&flat);
+        report->features |= FEATURE_BVH;
+        report->bvh_seconds = clock_seconds() - start;
     }
     start = clock_seconds();
     upload(renderer, &flat);
@@ -121,8 +140,11 @@ void renderer_close(Renderer *renderer)
     if (!renderer) return;
     for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
         if (!renderer->kernels[kind].kernel) continue;
-        cl_must(clReleaseKernel(renderer->kernels[kind].kernel));
-        program_close(&renderer->kernels[kind].program);
+        KernelSlot *slot = &renderer->kernels[kind];
+        // by now it has been launched: what is kept holds finished machine code
+        program_store(renderer->compute, &slot->request, &slot->program);
+        cl_must(clReleaseKernel(slot->kernel));
+        program_close(&slot->program);
     }
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
         cl_must(clReleaseMemObject(renderer->arrays[kind]));
@@ -165,8 +187,6 @@ LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensio
     KernelSlot *slot = &renderer->kernels[kind];
     LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, global, local);
     array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
-    if (!slot->stored) program_store(renderer->compute, &slot->request, &slot->program);
-    slot->stored = true;
     return time;
 }
 
@@ -175,8 +195,8 @@ const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
     double start = clock_seconds();
     cl_event event;
     cl_int status;
-    const void *mapped =
-        clEnqueueMapBuffer(renderer->compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size, 0, NULL, &event, &status);
+    const void *mapped = clEnqueueMapBuffer(renderer->compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size,
+                                            0, NULL, &event, &status);
     cl_check(status, "clEnqueueMapBuffer");
     array_push(renderer->report.reads, ((NamedLaunch){"read-back", event_time(event, start)}));
     return mapped;
@@ -184,7 +204,8 @@ const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
 
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped)
 {
-    cl_must(clEnqueueUnmapMemObject(renderer->compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL));
+    cl_must(
+        clEnqueueUnmapMemObject(renderer->compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL));
 }
 
 const RenderReport *renderer_report(const Renderer *renderer)

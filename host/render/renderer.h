@@ -8,30 +8,45 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef enum { PRECISION_FAST, PRECISION_SINGLE, PRECISION_STRICT, PRECISION_DOUBLE, PRECISION_COUNT } Precision;
+typedef enum {
+    PRECISION_FAST,
+    PRECISION_SINGLE,
+    PRECISION_STRICT,
+    PRECISION_DOUBLE,
+    PRECISION_COUNT
+} Precision;
 extern const char *const precision_names[PRECISION_COUNT];
 
 // What a picture can hold beside its color; a set of bits.
 enum { AOV_T = 1, AOV_NORMAL = 2, AOV_POSITION = 4, AOV_OBJECT = 8, AOV_SHADOW = 16 };
 
+// Whether rays go through a hierarchy. The picture is the same either way.
+typedef enum { BVH_AUTO, BVH_ON, BVH_OFF, BVH_CHOICE_COUNT } BvhChoice;
+extern const char *const bvh_choice_names[BVH_CHOICE_COUNT];
+
 typedef struct {
-    uint32_t width, height;                          // of the whole picture
+    uint32_t width, height;                                   // of the whole picture
     uint32_t region_x, region_y, region_width, region_height; // what is rendered of it
-    uint32_t sample_count;                           // per pixel, >= 1
+    uint32_t sample_count;                                    // per pixel, >= 1
+    uint32_t bounce_count;                                    // of a ray, at most; 0..16
     Precision precision;
-    uint32_t lanes;          // 1, 4, 8, 16; 0: the device's own choice
+    uint32_t lanes; // 1, 4, 8, 16; 0: the device's own choice
+    BvhChoice bvh;
+    bool counting;             // count rays by kind, with a build of its own: never time such a run
     FeatureSet extra_features; // built in though the scene does not need them, for tests
-    bool shift_to_eye;       // true for pictures; false for probes: rays and scene as they are
+    bool shift_to_eye;         // true for pictures; false for probes: rays and scene as they are
     bool no_cache;
-    double band_seconds;     // aim for a launch's length; 0: 0.1
-    uint32_t band_rows;      // fixed number of rows in a band (tests); 0: by time
+    double band_seconds; // aim for a launch's length; 0: 0.1
+    uint32_t band_rows;  // fixed number of rows in a band (tests); 0: by time
 } RenderSettings;
 
 typedef struct Renderer Renderer;
 
-// Flattens, builds and uploads. NULL with a message where the settings do not fit the device (double without fp64,
-// lanes not 1, 4, 8 or 16) or a number of the scene does not fit the precision. The compute outlives it.
-Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings, MessageList *messages);
+// Flattens, builds and uploads. NULL with a message where the settings do not fit the device (double without
+// fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the precision. The compute outlives
+// it.
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                        MessageList *messages);
 void renderer_close(Renderer *renderer);
 
 // Rows of the region, from the top. Values are float, or double at `double` (RenderReport.wide).
@@ -39,10 +54,10 @@ typedef struct {
     uint32_t first_row, row_count;
     const void *colors; // 3 per pixel, linear
     // NULL where not asked for; at the pixel's center
-    const void *t;                   // 1 per pixel; infinity where nothing was hit
-    const void *normal, *position;   // 3 per pixel, 0 where nothing was hit; relative to the eye
-    const uint32_t *object;          // 1 per pixel; UINT32_MAX where nothing was hit
-    const uint32_t *shadow;          // 1 per light and pixel: 1 where the light does not reach what was hit
+    const void *t;                 // 1 per pixel; infinity where nothing was hit
+    const void *normal, *position; // 3 per pixel, 0 where nothing was hit; relative to the eye
+    const uint32_t *object;        // 1 per pixel; UINT32_MAX where nothing was hit
+    const uint32_t *shadow;        // 1 per light and pixel: 1 where the light does not reach what was hit
 } Band;
 
 // Called for each band from the top; returns false to stop (a user's interrupt).
@@ -70,10 +85,11 @@ typedef struct {
 typedef struct {
     FeatureSet features;
     uint32_t lanes;
-    bool wide;                 // structs in double
+    bool wide; // structs in double
     uint64_t kernel_hash;
-    double flatten_seconds, build_seconds, upload_seconds;
+    double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
+    uint64_t rays[5];      // of each RAYS_… (kernels/types.h); counted only where asked for
     struct {
         NamedLaunch *items;
         size_t count, capacity;

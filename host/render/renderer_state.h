@@ -10,7 +10,6 @@ typedef struct {
     ProgramRequest request;
     Program program;
     cl_kernel kernel; // NULL until first asked for
-    bool stored;
 } KernelSlot;
 
 struct Renderer {
@@ -29,7 +28,7 @@ size_t renderer_scalar_size(const Renderer *renderer);
 // The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first asked for.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 
-// Launches, notes the time in the report, and has the finished machine code kept after the first launch.
+// Launches and notes the time in the report.
 LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *global,
                            const size_t *local);
 

@@ -79,6 +79,12 @@ static Bounds object_bounds(const Object *object)
                               object->as.cone.radius[1]);
     case SHAPE_TRIANGLE:
         return triangle_bounds(object->as.triangle.vertices);
+    case SHAPE_TORUS: {
+        double minor = object->as.torus.minor;
+        Bounds circle = disc_bounds(object->as.torus.center, object->as.torus.axis, object->as.torus.major);
+        return (Bounds){vector_subtract(circle.min, (Vector3){minor, minor, minor}),
+                        vector_add(circle.max, (Vector3){minor, minor, minor})};
+    }
     case SHAPE_PLANE:
     case SHAPE_COUNT:
         break;

@@ -10,7 +10,7 @@
 const char *const shape_names[SHAPE_COUNT] = {
     [SHAPE_SPHERE] = "sphere",     [SHAPE_PLANE] = "plane",       [SHAPE_DISC] = "disc",
     [SHAPE_BOX] = "box",           [SHAPE_CYLINDER] = "cylinder", [SHAPE_CONE] = "cone",
-    [SHAPE_TRIANGLE] = "triangle",
+    [SHAPE_TRIANGLE] = "triangle", [SHAPE_TORUS] = "torus",
 };
 
 Material material_default(void)

@@ -24,18 +24,18 @@ typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
 
 typedef struct {
     LightKind kind;
-    Color color;             // times intensity
-    Vector3 position;        // point, spot
-    Vector3 direction;       // directional: the way the light travels; spot: look_at - position; not unit
-    double angle, penumbra;  // spot, degrees: no light beyond the half-angle; full within angle - penumbra
+    Color color;            // times intensity
+    Vector3 position;       // point, spot
+    Vector3 direction;      // directional: the way the light travels; spot: look_at - position; not unit
+    double angle, penumbra; // spot, degrees: no light beyond the half-angle; full within angle - penumbra
 } Light;
 
 typedef struct {
     Color color;
-    double ambient;       // ka
-    Color diffuse;        // kd, per channel
-    double specular;      // ks; the highlight has the light's colour
-    double shininess;     // Phong's power, >= 0
+    double ambient;   // ka
+    Color diffuse;    // kd, per channel
+    double specular;  // ks; the highlight has the light's colour
+    double shininess; // Phong's power, >= 0
     double reflection, transmission, ior;
     bool checker;
     Color checker_colors[2]; // in place of color
@@ -50,6 +50,7 @@ typedef enum {
     SHAPE_CYLINDER,
     SHAPE_CONE,
     SHAPE_TRIANGLE,
+    SHAPE_TORUS,
     SHAPE_COUNT
 } ShapeKind;
 
@@ -60,18 +61,57 @@ typedef struct {
     ShapeKind kind;
     uint32_t material; // index into the scene's materials
     union {
-        struct { Vector3 center; double radius; } sphere;
-        struct { Vector3 point, normal; } plane;
-        struct { Vector3 center, normal; double radius; } disc;
-        struct { Vector3 min, max; } box; // min <= max in each component
+        struct {
+            Vector3 center;
+            double radius;
+        } sphere;
+        struct {
+            Vector3 point, normal;
+        } plane;
+        struct {
+            Vector3 center, normal;
+            double radius;
+        } disc;
+        struct {
+            Vector3 min, max;
+        } box; // min <= max in each component
         // finite: from .. from + axis; infinite: through `from` along axis
-        struct { Vector3 from, axis; double radius; bool finite, caps; } cylinder;
+        struct {
+            Vector3 from, axis;
+            double radius;
+            bool finite, caps;
+        } cylinder;
         // finite: radius[0] at from, radius[1] at from + axis, not both zero
-        // infinite: both nappes, apex at `from`, radius grows by `slope` for each unit of length along the axis
-        struct { Vector3 from, axis; double radius[2], slope; bool finite, caps; } cone;
-        struct { Vector3 vertices[3], normals[3]; bool smooth; } triangle;
+        // infinite: both nappes, apex at `from`, radius grows by `slope` for each unit of length along the
+        // axis
+        struct {
+            Vector3 from, axis;
+            double radius[2], slope;
+            bool finite, caps;
+        } cone;
+        struct {
+            Vector3 vertices[3], normals[3];
+            bool smooth;
+        } triangle;
+        // radii of the circle and of the tube around it
+        struct {
+            Vector3 center, axis;
+            double major, minor;
+        } torus;
     } as;
 } Object;
+
+// Triangles that share vertices. A mesh is one object in the file; each of its triangles has an id of its
+// own.
+typedef struct {
+    Vector3 *vertices;
+    Vector3 *normals; // one for each vertex, unit or zero (flat there), or NULL: flat
+    double (*uvs)[2]; // one for each vertex, or NULL
+    size_t vertex_count;
+    uint32_t (*triangles)[3];
+    uint32_t *materials; // one for each triangle, or NULL: the object's
+    size_t triangle_count;
+} Mesh;
 
 // How a format means its colours: linear light, or values a display takes as they are.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
@@ -79,10 +119,22 @@ typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 typedef struct {
     Camera camera;
     Color background, ambient;
-    struct { Light *items; size_t count, capacity; } lights;
-    struct { Material *items; size_t count, capacity; } materials;
-    struct { char **items; size_t count, capacity; } material_names; // one for each material; may be ""
-    struct { Object *items; size_t count, capacity; } objects; // an object's id is its index here
+    struct {
+        Light *items;
+        size_t count, capacity;
+    } lights;
+    struct {
+        Material *items;
+        size_t count, capacity;
+    } materials;
+    struct {
+        char **items;
+        size_t count, capacity;
+    } material_names; // one for each material; may be ""
+    struct {
+        Object *items;
+        size_t count, capacity;
+    } objects; // an object's id is its index here
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own picture size, or 0
 } Scene;
@@ -101,7 +153,8 @@ bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 
-// Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32, ior 1.5.
+// Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32,
+// ior 1.5.
 Material material_default(void);
 
 typedef struct {

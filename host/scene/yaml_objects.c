@@ -131,6 +131,14 @@ static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form fo
     return true;
 }
 
+static const Field torus_fields[] = {
+    {"center", read_vector, offsetof(Object, as.torus.center), FORM_ANY, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.torus.axis), FORM_ANY, REQUIRED, NULL},
+    {"major", read_number, offsetof(Object, as.torus.major), FORM_ANY, REQUIRED, &range_positive},
+    {"minor", read_number, offsetof(Object, as.torus.minor), FORM_ANY, REQUIRED, &range_positive},
+    MATERIAL,
+};
+
 typedef struct {
     Object start; // what the fields leave as it is
     const Field *fields;
@@ -151,6 +159,7 @@ static const Shape shapes[SHAPE_COUNT] = {
     {{.kind = SHAPE_CYLINDER, .as.cylinder.caps = true}, FIELDS(cylinder_fields), cylinder_finish},
     {{.kind = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish},
     {{.kind = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish},
+    {{.kind = SHAPE_TORUS}, FIELDS(torus_fields), NULL},
 };
 
 static void object_read(YamlReader *reader, const YamlNode *item)

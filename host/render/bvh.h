@@ -1,0 +1,38 @@
+// The bounding volume hierarchy over a scene's bounded primitives: a binary tree by binned surface area
+// heuristic (Wald, On fast construction of SAH-based bounding volume hierarchies, RT 2007; here with both
+// sides of a split built by two threads, and every leaf of one kind of shape).
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    double low[3], high[3];
+} BvhBox;
+
+// A child: an inner node's index, or `count` primitives from `first` of the order below.
+typedef struct {
+    BvhBox box;
+    uint32_t first, count; // count 0: `first` is the node's index
+} BvhChild;
+
+typedef struct {
+    BvhChild children[2];
+} BvhNodeBuild;
+
+typedef struct {
+    BvhNodeBuild *nodes; // the root first; a tree of one leaf has an empty second child (low > high)
+    size_t node_count;
+    uint32_t *order; // the primitives, leaf by leaf
+    size_t primitive_count;
+    unsigned depth; // inner nodes on the longest way down
+} Bvh;
+
+// No tree is deeper, whatever the boxes: beyond BVH_DEPTH_LARGEST - 32 levels ranges are halved by count.
+// (BVH_DEPTH_LARGEST: kernels/types.h)
+enum { BVH_LEAF_LARGEST = 8 };
+
+// `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
+// of them.
+void bvh_build(Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, size_t count);
+void bvh_free(Bvh *bvh);

@@ -1,0 +1,237 @@
+#include "host/render/hierarchy.h"
+
+#include "host/base/fault.h"
+#include "host/render/bvh.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Half the extent, along each axis, of a circle of radius 1 across an axis.
+static Vector3 circle_reach(Vector3 unit)
+{
+    return (Vector3){hypot(unit.y, unit.z), hypot(unit.x, unit.z), hypot(unit.x, unit.y)};
+}
+
+static Vector3 vector_of(scalar4 v)
+{
+    return (Vector3){v.x, v.y, v.z};
+}
+
+static void box_include(BvhBox *box, Vector3 center, Vector3 reach)
+{
+    const double centers[3] = {center.x, center.y, center.z}, reaches[3] = {reach.x, reach.y, reach.z};
+    for (int axis = 0; axis < 3; axis++) {
+        box->low[axis] = fmin(box->low[axis], centers[axis] - reaches[axis]);
+        box->high[axis] = fmax(box->high[axis], centers[axis] + reaches[axis]);
+    }
+}
+
+static bool revolution_box(const Revolution *shape, BvhBox *box)
+{
+    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
+    Vector3 base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
+    double length = shape->range.y, radius = shape->base_radius.w / length;
+    double height = shape->range.x / shape->range.z; // in units of the stored axis
+    double end_radius = radius + shape->axis_slope.w * height * length;
+    Vector3 reach = circle_reach(vector_scale(axis, 1 / length));
+    box_include(box, base, vector_scale(reach, fabs(radius)));
+    box_include(box, vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius)));
+    return true;
+}
+
+// The box of one primitive; false where it has none. A disc's is that of the ball around it: where the ray
+// lies nearly in its plane the kernels know no more about t.
+static bool primitive_box(size_t kind, const void *primitive, BvhBox *box)
+{
+    *box = (BvhBox){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    const Vector3 nothing = {0, 0, 0};
+    switch (kind) {
+    case KIND_SPHERES: {
+        const Sphere *sphere = primitive;
+        double radius = sphere->center_radius.w;
+        box_include(box, vector_of(sphere->center_radius), (Vector3){radius, radius, radius});
+        return true;
+    }
+    case KIND_DISCS: {
+        const Disc *disc = primitive;
+        double radius = disc->center_radius.w;
+        box_include(box, vector_of(disc->center_radius), (Vector3){radius, radius, radius});
+        return true;
+    }
+    case KIND_BOXES:
+        box_include(box, vector_of(((const Box *)primitive)->low), nothing);
+        box_include(box, vector_of(((const Box *)primitive)->high), nothing);
+        return true;
+    case KIND_CYLINDERS:
+    case KIND_CONES:
+        return revolution_box(primitive, box);
+    case KIND_TRIANGLES:
+        box_include(box, vector_of(((const Triangle *)primitive)->a), nothing);
+        box_include(box, vector_of(((const Triangle *)primitive)->b), nothing);
+        box_include(box, vector_of(((const Triangle *)primitive)->c), nothing);
+        return true;
+    case KIND_TORI: {
+        const Torus *torus = primitive;
+        double major = torus->center_major.w, minor = torus->axis_minor.w;
+        Vector3 reach = vector_scale(circle_reach(vector_of(torus->axis_minor)), major);
+        box_include(box, vector_of(torus->center_major), vector_add(reach, (Vector3){minor, minor, minor}));
+        return true;
+    }
+    default:
+        return false;
+    }
+}
+
+// The bounded primitives on their way into the tree.
+typedef struct {
+    BvhBox *boxes;
+    uint8_t *kinds;
+    uint32_t *places; // in their shapes' arrays
+    size_t count;
+    size_t kind_counts[KIND_COUNT];
+} Bounded;
+
+static void bounded_collect(Bounded *bounded, const FlatScene *flat)
+{
+    size_t capacity = 0;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        capacity += flat->arrays[FLAT_FIRST_SHAPE + kind].count;
+    *bounded = (Bounded){
+        .boxes = memory_allocate(capacity + 1, sizeof(BvhBox)),
+        .kinds = memory_allocate(capacity + 1, 1),
+        .places = memory_allocate(capacity + 1, sizeof(uint32_t)),
+    };
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        for (size_t i = 0; i < array->count; i++) {
+            if (!primitive_box(kind, flat_array_at(array, i), &bounded->boxes[bounded->count])) continue;
+            bounded->kinds[bounded->count] = (uint8_t)kind;
+            bounded->places[bounded->count++] = (uint32_t)i;
+            bounded->kind_counts[kind]++;
+        }
+    }
+}
+
+static void bounded_free(Bounded *bounded)
+{
+    free(bounded->boxes);
+    free(bounded->kinds);
+    free(bounded->places);
+}
+
+// Where each primitive of the tree's order stands in its shape's new array.
+static uint32_t *order_in_kinds(const Bvh *bvh, const Bounded *bounded)
+{
+    uint32_t *order = memory_allocate(bvh->primitive_count + 1, sizeof *order);
+    uint32_t counts[KIND_COUNT] = {0};
+    for (size_t i = 0; i < bvh->primitive_count; i++)
+        order[i] = counts[bounded->kinds[bvh->order[i]]]++;
+    return order;
+}
+
+static void primitive_move(FlatScene *flat, FlatArray *target, size_t index, const FlatArray *source,
+                           size_t old_index)
+{
+    memcpy(flat_array_at(target, index), flat_array_at(source, old_index), source->layout.size);
+    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
+    entries[flat_id(target, index)].kind_index_material.y = (uint32_t)index;
+}
+
+// Moves a shape's primitives into the leaves' order, the unbounded behind them, and tells the objects.
+static void array_reorder(FlatScene *flat, size_t kind, const Bvh *bvh, const Bounded *bounded)
+{
+    FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+    if (array->count == 0) return;
+    FlatArray ordered = flat_array_make(FLAT_FIRST_SHAPE + kind, array->count);
+    size_t next = 0;
+    for (size_t i = 0; i < bvh->primitive_count; i++)
+        if (bounded->kinds[bvh->order[i]] == kind)
+            primitive_move(flat, &ordered, next++, array, bounded->places[bvh->order[i]]);
+    BvhBox box;
+    for (size_t i = 0; i < array->count; i++)
+        if (!primitive_box(kind, flat_array_at(array, i), &box))
+            primitive_move(flat, &ordered, next++, array, i);
+    free(array->items);
+    *array = ordered;
+}
+
+static void child_write(const BvhChild *child, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
+                        uint32_t *reference, uint32_t *what)
+{
+    bool empty = child->box.low[0] > child->box.high[0];
+    if (child->count == 0 && !empty) {
+        *reference = child->first;
+        *what = BVH_NODE;
+        return;
+    }
+    *reference = empty ? 0 : order[child->first];
+    *what = empty ? 0 : child->count << 8 | bounded->kinds[bvh->order[child->first]];
+}
+
+static scalar4 corner_of(const BvhBox *box, const double corner[3])
+{
+    // an empty child has no primitives: any box will do
+    if (box->low[0] > box->high[0]) return (scalar4){0, 0, 0, 0};
+    return (scalar4){corner[0], corner[1], corner[2], 0};
+}
+
+static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded)
+{
+    free(flat->arrays[FLAT_NODES].items);
+    flat->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, bvh->node_count);
+    BvhNode *nodes = flat->arrays[FLAT_NODES].items;
+    uint32_t *order = order_in_kinds(bvh, bounded);
+    for (size_t i = 0; i < bvh->node_count; i++) {
+        const BvhChild *children = bvh->nodes[i].children;
+        nodes[i] = (BvhNode){
+            .low_0 = corner_of(&children[0].box, children[0].box.low),
+            .high_0 = corner_of(&children[0].box, children[0].box.high),
+            .low_1 = corner_of(&children[1].box, children[1].box.low),
+            .high_1 = corner_of(&children[1].box, children[1].box.high),
+        };
+        child_write(&children[0], bvh, bounded, order, &nodes[i].children.x, &nodes[i].children.y);
+        child_write(&children[1], bvh, bounded, order, &nodes[i].children.z, &nodes[i].children.w);
+    }
+    free(order);
+}
+
+static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *bounded)
+{
+    uint32_t counts[8] = {0};
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        counts[kind] = (uint32_t)bounded->kind_counts[kind];
+    memcpy(header->bounded_counts, counts, sizeof counts);
+    for (int side = 0; side < 2; side++) {
+        const BvhBox *box = &bvh->nodes[0].children[side].box;
+        for (int axis = 0; axis < 3 && box->low[0] <= box->high[0]; axis++)
+            header->extent.x = fmax(header->extent.x, fmax(fabs(box->low[axis]), fabs(box->high[axis])));
+    }
+}
+
+void hierarchy_hang(FlatScene *flat)
+{
+    Bounded bounded;
+    bounded_collect(&bounded, flat);
+    if (bounded.count > 0) {
+        Bvh bvh;
+        bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
+        nodes_write(flat, &bvh, &bounded);
+        for (size_t kind = 0; kind < KIND_COUNT; kind++)
+            array_reorder(flat, kind, &bvh, &bounded);
+        header_note(flat->arrays[FLAT_HEADER].items, &bvh, &bounded);
+        bvh_free(&bvh);
+    }
+    bounded_free(&bounded);
+}
+
+size_t hierarchy_bounded_count(const FlatScene *flat)
+{
+    size_t count = 0;
+    BvhBox box;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        for (size_t i = 0; i < array->count; i++)
+            count += primitive_box(kind, flat_array_at(array, i), &box);
+    }
+    return count;
+}

@@ -1,0 +1,11 @@
+// The flat scene's bounded primitives hung into a hierarchy.
+#pragma once
+
+#include "host/render/flatten.h"
+
+// Fills FLAT_NODES, orders each shape's array as the leaves have it (unbounded shapes last), and notes in the
+// header how many hang there and how far they reach. A scene without bounded primitives is left as it is.
+void hierarchy_hang(FlatScene *flat);
+
+// How many primitives could hang.
+size_t hierarchy_bounded_count(const FlatScene *flat);

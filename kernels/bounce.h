@@ -1,0 +1,70 @@
+// Mirrors and glass: the rays a surface sends on (Whitted, An improved illumination model for shaded display,
+// CACM 23(6), 1980), without recursion.
+#ifndef BOUNCE_H
+#define BOUNCE_H
+
+#include "surface.h"
+
+// A ray still to be followed, and how much of its color reaches the picture. Weights of 0 carry no ray.
+typedef struct {
+    Vector origin, direction; // unit
+    Color3 weight;
+    uint depth;
+} Bounce;
+
+static inline mask bounce_counts(const Bounce *bounce)
+{
+    return (bounce->weight.x > (real)(0)) | (bounce->weight.y > (real)(0)) | (bounce->weight.z > (real)(0));
+}
+
+static inline Ray bounce_ray(const Bounce *bounce)
+{
+    return ray_make(bounce->origin, bounce->direction, (real)(0), (real)(LARGEST), bounce_counts(bounce));
+}
+
+static inline Vector ray_unit_direction(const Ray *ray)
+{
+    return vector_normalize(ray->direction);
+}
+
+static inline Vector reflected_direction(Vector direction, Vector normal)
+{
+    real away = vector_dot(direction, normal);
+    return vector_normalize(vector_fma(normal, (real)(-2) * away, direction));
+}
+
+// Snell's law for a unit direction against a unit normal that faces it, with the ratio of indices eta; the
+// mask tells where there is total reflection instead. The squared cosine behind the surface is (eta c)^2 -
+// (eta - 1)(eta + 1), a difference of products: written as 1 - eta^2 (1 - c^2) it would lose grazing rays
+// where eta is near 1.
+static inline mask refracted_direction(Vector direction, Vector normal, real eta, Vector *refracted)
+{
+    real scaled = eta * -vector_dot(direction, normal);
+    real squared = product_difference(scaled, scaled, eta - (real)(1), eta + (real)(1));
+    mask total = squared < (real)(0);
+    real cosine = real_sqrt(real_max(squared, (real)(0)));
+    *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, eta)));
+    return total;
+}
+
+// What the surface sends on: the mirrored ray, and the one through it. Where all is reflected the mirrored
+// ray carries what would have passed.
+static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3 weight, Bounce *mirrored,
+                                  Bounce *passed)
+{
+    Vector direction = ray_unit_direction(ray);
+    real reflection = surface->reflection;
+    if (HAS_TRANSMISSION) {
+        real eta = lanes_select(surface->entering, real_divide((real)(1), surface->ior), surface->ior);
+        mask total = refracted_direction(direction, surface->shading_normal, eta, &passed->direction);
+        real transmission = lanes_select(total, (real)(0), surface->transmission);
+        reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
+        passed->origin = surface_leave(surface, true);
+        passed->weight = vector_scale(weight, transmission);
+    }
+    mirrored->direction = reflected_direction(direction, surface->shading_normal);
+    mirrored->origin = surface_leave(surface, false);
+    mirrored->weight = vector_scale(weight, reflection);
+}
+
+#endif
