@@ -44,7 +44,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
 
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
 {
-    const uint64_t largest = 1u << 20;
+    const uint64_t largest = PICTURE_SIDE_LARGEST;
     const char *at;
     uint64_t w, h;
     if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||

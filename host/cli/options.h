@@ -39,6 +39,8 @@ enum {
 
 extern const char common_options_help[];
 
+enum { PICTURE_SIDE_LARGEST = 1 << 20 }; // pixels
+
 // Each reads one value; on a fault it tells the user what is wrong with `option` and returns false.
 bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
                   uint32_t *result);

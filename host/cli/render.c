@@ -6,6 +6,7 @@
 #include "host/cli/picture.h"
 #include "host/cli/progress.h"
 #include "host/cli/timing.h"
+#include <errno.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
@@ -66,11 +67,18 @@ typedef struct {
 
 static bool region_read(const char *value, uint32_t region[4])
 {
-    int end = 0;
-    if (strspn(value, "0123456789,") == strlen(value) &&
-        sscanf(value, "%9u,%9u,%9u,%9u%n", &region[0], &region[1], &region[2], &region[3], &end) == 4 &&
-        value[end] == '\0' && region[2] > 0 && region[3] > 0)
-        return true;
+    const char *at = value;
+    for (int i = 0; i < 4; i++) {
+        char *end;
+        errno = 0;
+        unsigned long number = strtoul(at, &end, 10);
+        bool digit_first = *at >= '0' && *at <= '9';
+        if (!digit_first || errno != 0 || number > PICTURE_SIDE_LARGEST || *end != (i < 3 ? ',' : '\0'))
+            break;
+        region[i] = (uint32_t)number;
+        at = end + 1;
+        if (i == 3 && region[2] > 0 && region[3] > 0) return true;
+    }
     fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n",
             value);
     return false;
@@ -143,7 +151,7 @@ static void size_choose(RenderOptions *options, const Scene *scene)
     if (options->width > 0) return;
     options->width = scene->width > 0 ? scene->width : 1280;
     double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
-    double height = fmax(1, fmin(round(options->width / aspect), 1 << 20));
+    double height = fmax(1, fmin(round(options->width / aspect), PICTURE_SIDE_LARGEST));
     options->height = scene->height > 0 ? scene->height : (uint32_t)height;
 }
 
