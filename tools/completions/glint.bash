@@ -2,9 +2,9 @@
 
 _glint_options() {
     case ${1-} in
-    render) echo "-o --output --size --samples --region --device --precision --lanes --aov --timing --transfer" \
-        "--bits --no-cache --lenient --quiet -h --help" ;;
-    trace) echo "--rays -o --output --device --precision --lanes --no-cache --lenient -h --help" ;;
+    render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
+        "--timing --transfer --bits --no-cache --lenient --quiet -h --help" ;;
+    trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient -h --help" ;;
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
     *) echo "--version --help" ;;
@@ -23,12 +23,13 @@ _glint() {
     case $before in
     --precision) words="fast single strict double" ;;
     --lanes) words="1 4 8 16" ;;
+    --bvh) words="auto on off" ;;
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
     --device) words="cpu gpu" ;;
     --aov) words="t normal position object shadow color" ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
-    --size | --samples | --region) return ;;
+    --size | --samples | --region | --bounces) return ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

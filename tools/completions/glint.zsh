@@ -10,6 +10,8 @@ _glint_render() {
         '--device[device to render on]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
         '--lanes[pixels a work-item carries]:lanes:(1 4 8 16)' \
+        '--bvh[use a hierarchy]:choice:(auto on off)' \
+        '--bounces[reflections and refractions at most]:number:' \
         '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow color' \
         '--timing=-[how long each stage took]::form:(json)' \
         '--transfer[curve from linear light to display values]:curve:(srgb none)' \
@@ -28,6 +30,7 @@ _glint_trace() {
         '--device[device to trace on]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
         '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
+        '--bvh[use a hierarchy]:choice:(auto on off)' \
         '--no-cache[build the kernel anew]' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
