@@ -67,7 +67,13 @@ Object reference_round_object(const Object *object)
             rounded3(&result.as.triangle.normals[i]);
         }
         break;
-    case SHAPE_COUNT:
+    case SHAPE_TORUS:
+        rounded3(&result.as.torus.center);
+        rounded3(&result.as.torus.axis);
+        rounded(&result.as.torus.major);
+        rounded(&result.as.torus.minor);
+        break;
+    default:
         break;
     }
     return result;

@@ -96,7 +96,8 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
 {
     Scene scene = scene_of_text("layout.yaml", scene_text);
     FlatScene flat;
-    flatten(&flat, &scene, &(FlattenSettings){1, 1, 1, true, wide});
+    const FlattenSettings settings = {.width = 1, .height = 1, .sample_count = 1, .shift_to_eye = true, .wide = wide};
+    flatten(&flat, &scene, &settings);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         assert_true(flat.arrays[kind].count > 0);
         layouts[kind] = flat.arrays[kind].layout;
