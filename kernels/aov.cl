@@ -6,12 +6,11 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global sc
                 global scalar *positions, global int *objects_hit, global int *shadows)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    SceneHeader frame = *header;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     Tile tile = band_tile(&band);
     if (!lanes_any(tile.inside)) return;
 
-    Ray ray = camera_ray(&frame, tile.pixels, 0, 0, tile.inside);
+    Ray ray = camera_ray(header, tile.pixels, 0, 0, tile.inside);
     Hit hit = closest_hit(&scene, &ray);
     Surface surface = surface_at(&scene, &ray, &hit);
     const Vector nothing = {(real)(0), (real)(0), (real)(0)};
@@ -19,7 +18,7 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global sc
     film_store_color(normals, &tile, vector_select(surface.found, surface.shading_normal, nothing));
     film_store_color(positions, &tile, vector_select(surface.found, surface.position, nothing));
     film_store_integer(objects_hit, &tile, 1, 0, hit.object);
-    uint light_count = frame.picture.w;
+    uint light_count = header->picture.w;
     for (uint i = 0; i < light_count; i++) {
         mask shadowed;
         phong_light(&scene, &surface, &ray, i, &shadowed);

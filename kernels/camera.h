@@ -11,7 +11,8 @@ typedef struct {
 // The ray through a point of each pixel; dx and dy run from -1 to 1 across it, 0 is its center. Pixels are
 // counted in halves from the picture's center, 2 i + 1 - width, which is exact and odd-symmetric: a mirrored
 // scene gives the mirrored picture bit for bit.
-static inline Ray camera_ray(const SceneHeader *header, Pixels pixels, scalar dx, scalar dy, mask active)
+static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, scalar dx, scalar dy,
+                             mask active)
 {
     real x = real_from_integer(pixels.x * 2 + 1 - (integer)((scalar_integer)header->picture.x)) + dx;
     real y = real_from_integer((integer)((scalar_integer)header->picture.y) - 1 - pixels.y * 2) + dy;

@@ -12,6 +12,7 @@ typedef struct {
     Pixels pixels;
     mask inside;
     integer index; // of each pixel within the band
+    uint width;    // of the band
 } Tile;
 
 static inline Tile band_tile(const Band *band)
@@ -22,6 +23,7 @@ static inline Tile band_tile(const Band *band)
     tile.inside =
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
     tile.index = y * (integer)((scalar_integer)band->width) + x;
+    tile.width = band->width;
     tile.pixels.x = x + (integer)((scalar_integer)band->first_x);
     tile.pixels.y = y + (integer)((scalar_integer)band->first_y);
     return tile;
@@ -44,8 +46,34 @@ static inline void film_store_integer(global int *film, const Tile *tile, uint s
         if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = (int)values.each[lane];
 }
 
+#if TILE_WIDTH == 4
+// Four neighboring pixels' colors, interleaved.
+static inline void film_store_row(global scalar *film, scalar4 r, scalar4 g, scalar4 b)
+{
+    vstore4((scalar4)(r.x, g.x, b.x, r.y), 0, film);
+    vstore4((scalar4)(g.y, b.y, r.z, g.z), 1, film);
+    vstore4((scalar4)(b.z, r.w, g.w, b.w), 2, film);
+}
+#endif
+
 static inline void film_store_color(global scalar *film, const Tile *tile, Vector color)
 {
+#if TILE_WIDTH == 4
+    if (lanes_all(tile->inside)) {
+        global scalar *row = film + (size_t)tile->index.s0 * 3;
+        size_t next = (size_t)tile->width * 3;
+#if LANES == 16
+        film_store_row(row, color.x.s0123, color.y.s0123, color.z.s0123);
+        film_store_row(row + next, color.x.s4567, color.y.s4567, color.z.s4567);
+        film_store_row(row + 2 * next, color.x.s89ab, color.y.s89ab, color.z.s89ab);
+        film_store_row(row + 3 * next, color.x.scdef, color.y.scdef, color.z.scdef);
+#else
+        film_store_row(row, color.x.lo, color.y.lo, color.z.lo);
+        film_store_row(row + next, color.x.hi, color.y.hi, color.z.hi);
+#endif
+        return;
+    }
+#endif
     film_store(film, tile, 3, 0, color.x);
     film_store(film, tile, 3, 1, color.y);
     film_store(film, tile, 3, 2, color.z);

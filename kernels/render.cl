@@ -68,7 +68,6 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar 
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
-    SceneHeader frame = *header;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     Tile tile = band_tile(&band);
     if (!lanes_any(tile.inside)) return;
@@ -76,11 +75,11 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar 
     Color3 sum = {(real)(0), (real)(0), (real)(0)};
     if (first_sample > 0) sum = film_load_color(film, &tile);
     for (uint sample = first_sample; sample < last_sample; sample++) {
-        Ray ray = camera_ray(&frame, tile.pixels, offsets[2 * sample], offsets[2 * sample + 1], tile.inside);
+        Ray ray = camera_ray(header, tile.pixels, offsets[2 * sample], offsets[2 * sample + 1], tile.inside);
         rays_count(&scene, RAYS_CAMERA, ray.active);
         sum = vector_add(sum, ray_color(&scene, ray));
     }
-    uint count = frame.picture.z;
+    uint count = header->picture.z;
     if (count > 1 && last_sample == count) {
         real divisor = (real)((scalar)count);
         sum = (Color3){real_divide(sum.x, divisor), real_divide(sum.y, divisor), real_divide(sum.z, divisor)};

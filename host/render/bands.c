@@ -12,7 +12,7 @@ static const size_t group_size[2] = {8, 8};
 
 enum {
     FIRST_LAUNCH_SAMPLES = 1 << 17,  // before any time is known
-    BAND_BYTES_LARGEST = 32 << 20,   // of one film
+    BAND_BYTES_LARGEST = 4 << 20,   // of one film
     SAMPLES_OF_LAUNCH_LARGEST = 1024 // per pixel
 };
 
