@@ -1,7 +1,10 @@
 // OpenEXR in, through the C core: the first part's full resolution, rows or tiles, halves or floats.
 #include "host/image/codec.h"
 
+#include "host/base/fault.h"
+
 #include <openexr.h>
+#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
@@ -99,29 +102,46 @@ static bool exr_prepare(ExrReader *reader, Image *image)
                           height < 0 ? 0 : (uint64_t)height, channels, 65536);
 }
 
+// Where the channel's values of a block go: to the image, or aside. OpenEXR 3.1 writes through the null
+// pointer that should make it skip a channel, where there are three channels of halves.
+static void channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t pixel_values,
+                          uint32_t row_pixels)
+{
+    channel->decode_to_ptr = (uint8_t *)place;
+    channel->user_pixel_stride = (int32_t)(pixel_values * sizeof *place);
+    channel->user_line_stride = (int32_t)(pixel_values * row_pixels * sizeof *place);
+}
+
+static void channels_place(const ExrReader *reader, Image *image, exr_decode_pipeline_t *pipeline,
+                           float *aside, uint32_t x, uint32_t y)
+{
+    for (int i = 0; i < pipeline->channel_count; i++)
+        channel_place(&pipeline->channels[i], aside, 1, (uint32_t)pipeline->chunk.width);
+    float *place = image->values + ((size_t)y * image->width + x) * image->channels;
+    for (uint32_t i = 0; i < image->channels; i++) {
+        exr_coding_channel_info_t *channel = &pipeline->channels[reader->chosen[i]];
+        channel_place(channel, place + i, image->channels, image->width);
+        channel->user_bytes_per_element = sizeof *place;
+        channel->user_data_type = EXR_PIXEL_FLOAT;
+    }
+}
+
 // Decodes one block of rows or one tile to its place in the image.
 static exr_result_t exr_chunk(const ExrReader *reader, Image *image, const exr_chunk_info_t *chunk,
                               uint32_t x, uint32_t y)
 {
-    if (chunk->width < 0 || chunk->height < 0 || (uint64_t)chunk->width + x > image->width ||
+    if (chunk->width < 1 || chunk->height < 1 || (uint64_t)chunk->width + x > image->width ||
         (uint64_t)chunk->height + y > image->height)
         return EXR_ERR_BAD_CHUNK_LEADER;
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
     exr_result_t code = exr_decoding_initialize(reader->context, 0, chunk, &pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
-    size_t pixel_size = image->channels * sizeof *image->values;
-    float *place = image->values + ((size_t)y * image->width + x) * image->channels;
-    for (uint32_t i = 0; i < image->channels; i++) {
-        exr_coding_channel_info_t *channel = &pipeline.channels[reader->chosen[i]];
-        channel->decode_to_ptr = (uint8_t *)(place + i);
-        channel->user_pixel_stride = (int32_t)pixel_size;
-        channel->user_line_stride = (int32_t)(pixel_size * image->width);
-        channel->user_bytes_per_element = sizeof *image->values;
-        channel->user_data_type = EXR_PIXEL_FLOAT;
-    }
+    float *aside = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *aside);
+    channels_place(reader, image, &pipeline, aside, x, y);
     code = exr_decoding_choose_default_routines(reader->context, 0, &pipeline);
     if (code == EXR_ERR_SUCCESS) code = exr_decoding_run(reader->context, 0, &pipeline);
     exr_decoding_destroy(reader->context, &pipeline);
+    free(aside);
     return code;
 }
 

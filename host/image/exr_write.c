@@ -14,7 +14,8 @@ typedef struct {
     exr_context_t context;
     exr_encode_pipeline_t pipeline;
     bool has_pipeline;
-    float *block; // the rows of the block not yet full
+    exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
+    float *block;                                              // the rows of the block not yet full
     uint32_t block_rows, rows_held, block_start;
     int write_error; // errno of a failed write
 } ExrWriter;
@@ -56,7 +57,7 @@ static exr_result_t exr_header(ImageWriter *writer)
     settings.error_handler_fn = exr_keep_silent;
     settings.user_data = writer;
     settings.write_fn = exr_write_bytes;
-    // Level 4 (of 9) writes floats about as small as 9 at a fraction of the time.
+    // Files of level 4 were 4 to 8% larger than of level 9 on smooth pictures, and equal on noise.
     settings.zip_level = 4;
     exr_result_t code =
         exr_start_write(&state->context, writer->output.target, EXR_WRITE_FILE_DIRECTLY, &settings);
@@ -108,6 +109,17 @@ static size_t channel_place(const char *name)
     return *name == 'B' ? 2 : *name == 'G' ? 1 : 0;
 }
 
+// A block stored at its full size is read as it is. OpenEXR (3.1 and 3.4.7 do) stores compressed bytes there
+// where they happen to be just as many (its issue 2306).
+static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
+{
+    const ExrWriter *state = pipeline->encoding_user_data;
+    exr_result_t code = state->compress(pipeline);
+    if (code == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes)
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    return code;
+}
+
 // Writes the rows held as one block.
 static exr_result_t exr_block(ImageWriter *writer)
 {
@@ -130,7 +142,12 @@ static exr_result_t exr_block(ImageWriter *writer)
         channel->user_bytes_per_element = sizeof(float);
         channel->user_data_type = EXR_PIXEL_FLOAT;
     }
-    if (is_first) code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
+    if (is_first) {
+        code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
+        state->compress = pipeline->compress_fn;
+        pipeline->compress_fn = exr_compress;
+        pipeline->encoding_user_data = state;
+    }
     EXR_STEP(code, exr_encoding_run(state->context, 0, pipeline));
     state->block_start += state->rows_held;
     state->rows_held = 0;
