@@ -3,6 +3,8 @@
 
 #define NOWHERE ((Quad)LDBL_MAX)
 
+enum { QUAD_BITS = 113 };
+
 // The detour through memory keeps GCC 12 from dropping roundings where it merges stores
 // (-ftree-slp-vectorize).
 static void rounded(double *number)
@@ -368,11 +370,82 @@ static void hit_triangle(const Object *object, const ReferenceRay *ray, Referenc
     hit->shading_normal = quad3_unit(smooth);
 }
 
+static Quad polynomial_value(const Quad *coefficients, int degree, Quad x)
+{
+    Quad value = coefficients[degree];
+    for (int i = degree - 1; i >= 0; i--)
+        value = value * x + coefficients[i];
+    return value;
+}
+
+// Where a polynomial of degree 1..4 changes its sign between two places, in rising order; returns how often.
+// From one such place of its derivative to the next it only rises or only falls, which leaves one zero to
+// halve towards.
+static int polynomial_zeros(const Quad *coefficients, int degree, Quad low, Quad high, Quad zeros[])
+{
+    Quad derivative[4], places[5] = {low};
+    for (int i = 0; i < degree; i++)
+        derivative[i] = (Quad)(i + 1) * coefficients[i + 1];
+    int turn_count = degree > 1 ? polynomial_zeros(derivative, degree - 1, low, high, places + 1) : 0;
+    places[turn_count + 1] = high;
+    int count = 0;
+    for (int i = 0; i <= turn_count; i++) {
+        Quad before = places[i], after = places[i + 1];
+        bool rising = polynomial_value(coefficients, degree, before) < 0;
+        if (rising != (polynomial_value(coefficients, degree, after) >= 0)) continue;
+        for (int halving = 0; halving < QUAD_BITS; halving++) {
+            Quad middle = (before + after) / 2;
+            bool too_low = (polynomial_value(coefficients, degree, middle) < 0) == rising;
+            *(too_low ? &before : &after) = middle;
+        }
+        zeros[count++] = before;
+    }
+    return count;
+}
+
+// In the frame of the axis, from the ray's closest approach to the center on: the zeros of
+// (|p|^2 + R^2 - r^2)^2 - 4 R^2 (x^2 + y^2), and where it turns.
+static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
+{
+    Quad major = object->as.torus.major, minor = object->as.torus.minor;
+    Quad3 axis = quad3_unit(quad3(object->as.torus.axis)), across = quad3_beside(axis);
+    Quad3 beside = quad3_cross(axis, across);
+    Quad length = quad3_length(ray->direction);
+    Quad3 way = quad3_unit(ray->direction);
+    Quad3 from = quad3_subtract(ray->origin, quad3(object->as.torus.center));
+    Quad closest = -quad3_dot(from, way);
+    from = quad3_add(from, quad3_scale(way, closest));
+    Quad3 p = {quad3_dot(from, across), quad3_dot(from, beside), quad3_dot(from, axis)};
+    Quad3 q = {quad3_dot(way, across), quad3_dot(way, beside), quad3_dot(way, axis)};
+
+    const Quad pp = quad3_dot(p, p), pq = quad3_dot(p, q), four = 4 * major * major;
+    const Quad sum[3] = {pp + major * major - minor * minor, 2 * pq, 1}; // |p + s q|^2 + R^2 - r^2
+    const Quad quartic[5] = {sum[0] * sum[0] - four * (p.x * p.x + p.y * p.y),
+                             2 * sum[0] * sum[1] - 2 * four * (p.x * q.x + p.y * q.y),
+                             sum[1] * sum[1] + 2 * sum[0] - four * (q.x * q.x + q.y * q.y), 2 * sum[1], 1};
+    const Quad cubic[4] = {quartic[1], 2 * quartic[2], 3 * quartic[3], 4};
+    Quad reach = 4 * (major + minor), turns[3], zeros[4];
+    int turn_count = polynomial_zeros(cubic, 3, -reach, reach, turns);
+    for (int i = 0; i < turn_count; i++) {
+        Quad3 at = quad3_add(p, quad3_scale(q, turns[i]));
+        Quad off = quad_root(at.x * at.x + at.y * at.y) - major;
+        narrow(hit, 2 * (quad_root(off * off + at.z * at.z) - minor));
+    }
+    int count = polynomial_zeros(quartic, 4, -reach, reach, zeros);
+    for (int i = 0; i < count; i++) {
+        Quad3 at = quad3_add(p, quad3_scale(q, zeros[i]));
+        Quad rho = quad_root(at.x * at.x + at.y * at.y), out = 1 - major / rho;
+        Quad3 normal = quad3_add(quad3_add(quad3_scale(across, at.x * out), quad3_scale(beside, at.y * out)),
+                                 quad3_scale(axis, at.z));
+        offer(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
+    }
+}
+
 typedef void (*ShapeHit)(const Object *object, const ReferenceRay *ray, ReferenceHit *hit);
 static const ShapeHit shape_hits[SHAPE_COUNT] = {
     [SHAPE_SPHERE] = hit_sphere,     [SHAPE_PLANE] = hit_plane,       [SHAPE_DISC] = hit_disc,
     [SHAPE_BOX] = hit_box,           [SHAPE_CYLINDER] = hit_cylinder, [SHAPE_CONE] = hit_cone,
-    [SHAPE_TRIANGLE] = hit_triangle,
+    [SHAPE_TRIANGLE] = hit_triangle, [SHAPE_TORUS] = hit_torus,
 };
 
 ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)

@@ -1,9 +1,9 @@
 #include "tests/specimen.h"
 
 const char *const specimen_names[SPECIMEN_COUNT] = {
-    "sphere",           "plane",       "disc",      "box",          "capped cylinder", "open cylinder",
-    "endless cylinder", "capped cone", "open cone", "pointed cone", "endless cone",    "triangle",
-    "smooth triangle",
+    "sphere",           "plane",       "disc",       "box",          "capped cylinder", "open cylinder",
+    "endless cylinder", "capped cone", "open cone",  "pointed cone", "endless cone",    "triangle",
+    "smooth triangle",  "torus",       "thin torus", "fat torus",
 };
 
 // SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
@@ -97,6 +97,29 @@ static Specimen make_triangle(SpecimenKind kind, Random *random, Vector3 center,
     return specimen;
 }
 
+static Vector3 world_axis(Random *random)
+{
+    double parts[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++)
+        if (random_coin(random)) parts[i] = -0.0;
+    parts[random_bits(random) % 3] = random_coin(random) ? 1 : -1;
+    return (Vector3){parts[0], parts[1], parts[2]};
+}
+
+// Every other one lies square to a world axis.
+static Specimen make_torus(SpecimenKind kind, Random *random, Vector3 center, double major)
+{
+    double minor = major * random_between(random, 0.1, 0.6);
+    if (kind == SPECIMEN_TORUS_THIN) minor = major * 0.01;
+    if (kind == SPECIMEN_TORUS_FAT) minor = major * 0.9;
+    Vector3 axis = random_coin(random) ? world_axis(random) : on_grid(random_unit(random));
+    return (Specimen){.kind = kind,
+                      .object = {.kind = SHAPE_TORUS, .as.torus = {center, axis, major, minor}},
+                      .center = center,
+                      .reach = major + minor,
+                      .axis = axis};
+}
+
 Specimen specimen_make(SpecimenKind kind, Random *random)
 {
     double size = random_power(random, -1, 1);
@@ -125,25 +148,48 @@ Specimen specimen_make(SpecimenKind kind, Random *random)
     case SPECIMEN_TRIANGLE:
     case SPECIMEN_TRIANGLE_SMOOTH:
         return make_triangle(kind, random, center, size);
+    case SPECIMEN_TORUS:
+    case SPECIMEN_TORUS_THIN:
+    case SPECIMEN_TORUS_FAT:
+        return make_torus(kind, random, center, size);
     default:
         return make_round(kind, random, center, size);
     }
     return specimen;
 }
 
-static Vector3 world_axis(Random *random)
-{
-    double parts[3] = {0, 0, 0};
-    for (int i = 0; i < 3; i++)
-        if (random_coin(random)) parts[i] = -0.0;
-    parts[random_bits(random) % 3] = random_coin(random) ? 1 : -1;
-    return (Vector3){parts[0], parts[1], parts[2]};
-}
-
 static SpecimenRay ray_between(Vector3 eye, Vector3 target, Random *random)
 {
     Vector3 direction = vector_normalize(vector_subtract(target, eye));
     return (SpecimenRay){eye, vector_scale(direction, random_power(random, -1, 1))};
+}
+
+static SpecimenRay torus_ray(const Specimen *specimen, Random *random)
+{
+    double major = specimen->object.as.torus.major, minor = specimen->object.as.torus.minor;
+    Vector3 axis = vector_normalize(specimen->axis);
+    Vector3 in_plane = vector_normalize(vector_cross(axis, random_unit(random)));
+    Vector3 other = vector_normalize(vector_cross(axis, random_unit(random)));
+    Vector3 on_circle = vector_add(specimen->center, vector_scale(in_plane, major));
+    Vector3 in_tube = vector_add(on_circle, vector_scale(random_in_ball(random), 0.9 * minor));
+    Vector3 on_other = vector_add(specimen->center, vector_scale(other, major));
+    Vector3 in_hole = vector_add(specimen->center, vector_scale(random_in_ball(random), major - minor));
+    double distance = specimen->reach * random_power(random, log10(1.001), 4);
+    switch (random_bits(random) % 4) {
+    case 0:
+        return ray_between(in_tube, vector_add(in_tube, random_in_ball(random)), random);
+    case 1:
+        return ray_between(in_hole, vector_add(in_hole, random_in_ball(random)), random);
+    case 2: {
+        // Seen along the plane the outline is the same whatever the height.
+        Vector3 beside = vector_scale(other, specimen->reach * random_between(random, -1.1, 1.1));
+        return ray_between(vector_add(specimen->center, vector_scale(in_plane, distance)),
+                           vector_add(specimen->center, beside), random);
+    }
+    default:
+        return ray_between(vector_add(on_circle, vector_scale(random_unit(random), distance)),
+                           vector_add(on_other, vector_scale(random_in_ball(random), 1.5 * minor)), random);
+    }
 }
 
 SpecimenRay specimen_ray(const Specimen *specimen, Random *random)
@@ -154,6 +200,7 @@ SpecimenRay specimen_ray(const Specimen *specimen, Random *random)
     Vector3 eye = vector_add(center, vector_scale(random_unit(random), distance));
     Vector3 near = vector_add(center, vector_scale(random_in_ball(random), 1.1 * reach));
     Vector3 axis;
+    if (specimen->kind >= SPECIMEN_TORUS && random_coin(random)) return torus_ray(specimen, random);
     switch (random_bits(random) % 8) {
     case 0:
         return ray_between(vector_add(center, vector_scale(random_in_ball(random), 0.3 * reach)), eye,

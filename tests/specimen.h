@@ -18,6 +18,9 @@ typedef enum {
     SPECIMEN_CONE_INFINITE,
     SPECIMEN_TRIANGLE,
     SPECIMEN_TRIANGLE_SMOOTH,
+    SPECIMEN_TORUS,
+    SPECIMEN_TORUS_THIN,
+    SPECIMEN_TORUS_FAT,
     SPECIMEN_COUNT
 } SpecimenKind;
 
@@ -45,5 +48,6 @@ typedef struct {
 } SpecimenRay;
 
 // Aimed at the specimen and slightly past it from 1.001 to 10^4 times its reach; from inside; along the
-// world's axes with zeros of either sign; along its own axis; at its outline.
+// world's axes with zeros of either sign; along its own axis; at its outline. At a torus also from inside its
+// tube, from within its hole, and in the plane of its circle.
 SpecimenRay specimen_ray(const Specimen *specimen, Random *random);

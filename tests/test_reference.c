@@ -168,6 +168,31 @@ static void knows_cones(void **state)
     check(known, COUNT(known));
 }
 
+// The numbers are those of interval arithmetic.
+static void knows_tori(void **state)
+{
+    (void)state;
+    const Object ring = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 3}, 1, 0.25}};
+    const Object wire = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 1e-3}};
+    const Vector3 x = {1, 0, 0}, z = {0, 0, 1}, down = {0, 0, -1};
+    const Known known[] = {
+        {"far", ring, {0.9, 0, -1000}, z, 999.77087122566},
+        {"hole", ring, {0, 0, 10}, down, MISS},
+        {"hole", ring, {0.74, 0, 10}, down, MISS},
+        {"inner wall", ring, {0.76, 0, 10}, down, 9.9300000326974},
+        {"equator", ring, {-5, 0, 0}, x, 3.75},
+        {"equator", ring, {-1, 0, 0}, x, 0.25},
+        {"equator", ring, {0, 0, 0}, x, 0.75},
+        {"equator", ring, {-5, 0.75, 0}, x, 4},
+        {"equator", ring, {-5, 1, 0}, x, 4.25},
+        {"top", ring, {-5, 0, 0.25 - 0x1p-26}, x, 3.9999136832555},
+        {"top", ring, {-5, 0, 0.25 + 0x1p-25}, x, MISS},
+        {"wire", wire, {1.0005, 0, -10}, z, 9.9991339536194},
+        {"wire", wire, {1.0011, 0, -10}, z, MISS},
+    };
+    check(known, COUNT(known));
+}
+
 static Scene one_object(Object *object, Material *material, Light *lights, size_t light_count)
 {
     Scene scene = {.background = {0.1, 0.2, 0.3}, .ambient = {0.5, 0.5, 0.5}};
@@ -312,11 +337,12 @@ static void finds_the_nearest(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(knows_spheres),       cmocka_unit_test(knows_flat_shapes),
-        cmocka_unit_test(knows_cylinders),     cmocka_unit_test(knows_cones),
-        cmocka_unit_test(shades_as_phong),     cmocka_unit_test(casts_shadows),
-        cmocka_unit_test(lays_checkers),       cmocka_unit_test(aims_cameras),
-        cmocka_unit_test(rounds_every_number), cmocka_unit_test(finds_the_nearest),
+        cmocka_unit_test(knows_spheres),     cmocka_unit_test(knows_flat_shapes),
+        cmocka_unit_test(knows_cylinders),   cmocka_unit_test(knows_cones),
+        cmocka_unit_test(knows_tori),        cmocka_unit_test(shades_as_phong),
+        cmocka_unit_test(casts_shadows),     cmocka_unit_test(lays_checkers),
+        cmocka_unit_test(aims_cameras),      cmocka_unit_test(rounds_every_number),
+        cmocka_unit_test(finds_the_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

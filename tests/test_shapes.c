@@ -74,6 +74,8 @@ static void compare(const Trial *trial, size_t index, const ProbeHit *hit, Preci
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
     double distance = vector_length(vector_subtract(origin, trial->center)) + trial->reach;
+    // An endless plane may be met far beyond the reach.
+    if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
     double scale = u * (owed->compensated ? trial->reach : distance);
     // Flat shapes have no compensated edges.
     double band = fmax(owed->band * scale, 4 * u * distance);
