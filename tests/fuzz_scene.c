@@ -1,5 +1,5 @@
 // Feeds damaged scenes to one reader, in this process: fuzz_scene FORMAT RUNS SEED SCENE…
-// FORMAT: yaml, rt or cfg. The same arguments give the same inputs. Build it with sanitizers; it ends with a
+// FORMAT: yaml, rt, cfg or nff. The same arguments give the same inputs. Build it with sanitizers; it ends with a
 // failure only where a reader crashes, leaks or hangs; it then leaves the input in
 // fuzz_scene.input (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
 #include "host/base/array.h"
@@ -80,6 +80,7 @@ static void edit_replace_by_word(Text *text)
                                         "~",      "{}",
                                         "[]",     "sp",
                                         "cy",     "C",
+                                        "pp 4",   "p 3",
                                         "true",   "\xef\xbb\xbf",
                                         "...",    "\xe2\x80\xa8",
                                         "<<: *a"};
@@ -150,6 +151,7 @@ static bool scene_read(const char *format, const char *bytes, size_t length)
     Scene scene = {0};
     bool read = !strcmp(format, "rt")    ? scene_read_rt(&scene, &source, &options, &messages)
                 : !strcmp(format, "cfg") ? scene_read_cfg(&scene, &source, &messages)
+                : !strcmp(format, "nff") ? scene_read_nff(&scene, &source, &messages)
                                          : scene_read_yaml(&scene, &source, &messages);
     if (read == (message_count(&messages, MESSAGE_ERROR) > 0)) abort(); // errors and the verdict must agree
     scene_free(&scene);

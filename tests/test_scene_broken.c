@@ -87,6 +87,12 @@ static void test_cfg(void **state)
     check_folder("tests/broken/cfg", ".cfg");
 }
 
+static void test_nff(void **state)
+{
+    (void)state;
+    check_folder("tests/broken/nff", ".nff");
+}
+
 // The longest part of a format that is told as it stands, to find the message by.
 static char *format_core(const char *format, size_t length)
 {
@@ -150,7 +156,7 @@ static void test_names(void **state)
     Scene scene;
     assert_false(scene_load(&scene, "tests/scenes/complete.txt", &options, &messages));
     assert_string_equal(messages.items[0].text,
-                        "tests/scenes/complete.txt: a scene's name ends in .yaml, .yml, .rt or .cfg");
+                        "tests/scenes/complete.txt: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff");
     assert_false(scene_load(&scene, ".rt", &options, &messages));
     assert_false(scene_load(&scene, "tests/scenes/absent.yml", &options, &messages));
     assert_non_null(strstr(messages.items[2].text, "absent.yml"));
@@ -162,7 +168,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_yaml),  cmocka_unit_test(test_rt),
-        cmocka_unit_test(test_cfg),   cmocka_unit_test(test_every_message_has_a_scene),
+        cmocka_unit_test(test_cfg), cmocka_unit_test(test_nff),   cmocka_unit_test(test_every_message_has_a_scene),
         cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -65,6 +65,12 @@ static void test_cfg_examples(void **state)
     assert_in_range(check_examples("cfg", "s.cfg", ""), 1, 100);
 }
 
+static void test_nff_examples(void **state)
+{
+    (void)state;
+    assert_in_range(check_examples("nff", "s.nff", ""), 1, 100);
+}
+
 static void test_every_shape_is_named(void **state)
 {
     (void)state;
@@ -82,6 +88,7 @@ int main(void)
         cmocka_unit_test(test_yaml_examples),
         cmocka_unit_test(test_rt_examples),
         cmocka_unit_test(test_cfg_examples),
+        cmocka_unit_test(test_nff_examples),
         cmocka_unit_test(test_every_shape_is_named),
     };
     return cmocka_run_group_tests(tests, page_read, page_free);

@@ -49,7 +49,7 @@ static const char help_text[] =
     "      --region X,Y,W,H  render these pixels of the picture only\n"
     "      --aov LIST        more files beside the picture: t, normal, position, object, shadow, color\n"
     "      --timing[=json]   tell the time of every stage and launch\n"
-    "      --transfer T      srgb or none (default: srgb; none for .rt and .cfg)\n"
+    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
     "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
     "      --quiet           no progress\n";

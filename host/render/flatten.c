@@ -116,7 +116,8 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
     case SHAPE_SPHERE:
         *(Sphere *)target =
             (Sphere){.center_radius = scalar4_of(point_from_eye(rounding, object->as.sphere.center),
-                                                 object->as.sphere.radius)};
+                                                 object->as.sphere.radius),
+                     .id.y = object->as.sphere.only_inside ? ONLY_INSIDE : 0u};
         break;
     case SHAPE_PLANE: {
         Plane *plane = target;
@@ -141,12 +142,14 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
         *(Cylinder *)target = revolution_flatten(rounding, object->as.cylinder.from, object->as.cylinder.axis,
                                                  object->as.cylinder.radius, object->as.cylinder.radius, 0,
                                                  object->as.cylinder.finite, object->as.cylinder.caps);
+        if (object->as.cylinder.only_inside) ((Cylinder *)target)->id.y |= ONLY_INSIDE;
         break;
     case SHAPE_CONE:
         *(Cone *)target = revolution_flatten(rounding, object->as.cone.from, object->as.cone.axis,
                                              object->as.cone.finite ? object->as.cone.radius[0] : 0,
                                              object->as.cone.radius[1], object->as.cone.slope,
                                              object->as.cone.finite, object->as.cone.caps);
+        if (object->as.cone.only_inside) ((Cone *)target)->id.y |= ONLY_INSIDE;
         break;
     case SHAPE_TRIANGLE: {
         const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
@@ -244,7 +247,7 @@ static void materials_flatten(FlatScene *flat, const Scene *scene, const Roundin
             .diffuse = scalar4_of(material->diffuse, material->specular),
             .other_color = scalar4_of(material->checker_colors[1], material->shininess),
             .mirror_glass = {material->reflection, material->transmission, material->ior, 0},
-            .opacity = opacity_of(material->transmission),
+            .opacity = opacity_of(material->full_shadow ? 0 : material->transmission),
         };
         if (material->checker)
             materials[i].grid =

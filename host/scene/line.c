@@ -75,6 +75,16 @@ bool line_number(Line *line, const char *name, const Range *range, double *value
            number_read_field(line->report, word.offset, name, word.text, word.length, range, value);
 }
 
+bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value)
+{
+    double number;
+    size_t offset = line_peek(line).offset;
+    if (!line_number(line, name, range, &number)) return false;
+    *value = (unsigned)number;
+    if (*value != number) report_error(line->report, offset, "'%s' must be a whole number", name);
+    return *value == number;
+}
+
 static size_t comma_count(Word word)
 {
     size_t count = 0;

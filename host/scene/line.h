@@ -28,6 +28,8 @@ int word_shown(Word word); // how many bytes of it a message shows
 
 // One number, the next word. Reports where it is missing or wrong.
 bool line_number(Line *line, const char *name, const Range *range, double *value);
+// The same for a whole number; the range lies within that of unsigned.
+bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value);
 // Three numbers: in one word with commas, or in three words.
 bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value);
 bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value);

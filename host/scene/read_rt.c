@@ -14,7 +14,6 @@ typedef struct {
 
 static const Range range_byte = {0, 255, false, "from 0 to 255"};
 static const Range range_axis = {-1, 1, false, "from -1 to 1"};
-static const Range range_pixels = {1, 65536, false, "from 1 to 65536"};
 
 static bool read_color(Line *line, Color *color)
 {
@@ -143,16 +142,6 @@ static bool read_light(RtReader *reader)
     return true;
 }
 
-static bool read_pixel_count(RtReader *reader, const char *name, unsigned *count)
-{
-    double value;
-    size_t offset = line_peek(&reader->line).offset;
-    if (!line_number(&reader->line, name, &range_pixels, &value)) return false;
-    *count = (unsigned)value;
-    if (*count != value) report_error(&reader->report, offset, "'%s' must be a whole number", name);
-    return *count == value;
-}
-
 static bool read_resolution(RtReader *reader)
 {
     if (reader->has_size) {
@@ -160,8 +149,9 @@ static bool read_resolution(RtReader *reader)
         return false;
     }
     reader->has_size = true;
-    return read_pixel_count(reader, "width", &reader->scene->width) &&
-           read_pixel_count(reader, "height", &reader->scene->height) && element_end(reader);
+    return line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
+           line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height) &&
+           element_end(reader);
 }
 
 static bool read_sphere(RtReader *reader)

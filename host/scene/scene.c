@@ -70,18 +70,20 @@ static bool scene_read(Scene *scene, const Source *source, const SceneOptions *o
 {
     if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
     if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
+    if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
     return scene_read_yaml(scene, source, messages);
 }
 
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
 {
-    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg"};
+    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg", ".nff"};
     *scene = (Scene){0};
     bool is_known = false;
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
         is_known |= ends_with(path, endings[i]);
     if (!is_known) {
-        message_add(messages, MESSAGE_ERROR, "%s: a scene's name ends in .yaml, .yml, .rt or .cfg", path);
+        message_add(messages, MESSAGE_ERROR, "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff",
+                    path);
         return false;
     }
     Text text = {0};

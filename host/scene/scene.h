@@ -37,6 +37,7 @@ typedef struct {
     double specular;  // ks; the highlight has the light's colour
     double shininess; // Phong's power, >= 0
     double reflection, transmission, ior;
+    bool full_shadow; // it takes all light from what lies behind it, transparent or not
     bool checker;
     Color checker_colors[2]; // in place of color
     double checker_size;     // side of a square, > 0, in scene units
@@ -64,6 +65,7 @@ typedef struct {
         struct {
             Vector3 center;
             double radius;
+            bool only_inside; // rays from outside pass the near side unseen
         } sphere;
         struct {
             Vector3 point, normal;
@@ -75,11 +77,12 @@ typedef struct {
         struct {
             Vector3 min, max;
         } box; // min <= max in each component
-        // finite: from .. from + axis; infinite: through `from` along axis
+        // finite: from .. from + axis; infinite: through `from` along axis; only_inside, without caps: as for
+        // a sphere
         struct {
             Vector3 from, axis;
             double radius;
-            bool finite, caps;
+            bool finite, caps, only_inside;
         } cylinder;
         // finite: radius[0] at from, radius[1] at from + axis, not both zero
         // infinite: both nappes, apex at `from`, radius grows by `slope` for each unit of length along the
@@ -87,7 +90,7 @@ typedef struct {
         struct {
             Vector3 from, axis;
             double radius[2], slope;
-            bool finite, caps;
+            bool finite, caps, only_inside;
         } cone;
         struct {
             Vector3 vertices[3], normals[3];
@@ -143,8 +146,8 @@ typedef struct {
     bool lenient; // skip unknown elements of .rt with a warning
 } SceneOptions;
 
-// Reads a scene; the format follows from the name's ending (.yaml .yml .rt .cfg). On a user's fault returns
-// false with the errors in `messages` and an empty scene; warnings may be there either way.
+// Reads a scene; the format follows from the name's ending (.yaml .yml .rt .cfg .nff). On a user's fault
+// returns false with the errors in `messages` and an empty scene; warnings may be there either way.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 void scene_free(Scene *scene); // and zeroes
 
@@ -152,6 +155,7 @@ void scene_free(Scene *scene); // and zeroes
 bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
+bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
 
 // Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32,
 // ior 1.5.

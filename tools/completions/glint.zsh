@@ -20,7 +20,7 @@ _glint_render() {
         '--lenient[skip unknown elements of a .rt scene]' \
         '--quiet[no progress]' \
         '(- *)'{-h,--help}'[list the options]' \
-        '1:scene:_files -g "*.(yaml|yml|rt|cfg)"'
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
 
 _glint_trace() {
@@ -34,7 +34,7 @@ _glint_trace() {
         '--no-cache[build the kernel anew]' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
-        '1:scene:_files -g "*.(yaml|yml|rt|cfg)"'
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
 
 _glint_check() {
@@ -42,7 +42,7 @@ _glint_check() {
         '--json[for programs]' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
-        '1:scene:_files -g "*.(yaml|yml|rt|cfg)"'
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
 
 _glint_devices() {

@@ -1,0 +1,207 @@
+// `.nff`: every element's values, and what files in the wild hold and is tolerated.
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define VIEW     "v\nfrom 0 0 -5\nat 0 0 0\nup 0 1 0\nangle 45\n"
+#define LIT      VIEW "l 0 9 0\n"
+#define MATERIAL "f 1 1 1 1 0 1 0 0\n"
+#define SPHERE   "s 0 0 0 1\n"
+
+static Scene complete;
+
+static int complete_open(void **state)
+{
+    complete = scene_of_file("tests/scenes/complete.nff");
+    return probe_open(state);
+}
+
+static int complete_close(void **state)
+{
+    scene_free(&complete);
+    return probe_close(state);
+}
+
+static void test_view(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.width, 640);
+    assert_int_equal(complete.height, 480);
+    assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
+    assert_vector(complete.background, 0.1, 0.2, 0.3);
+    assert_vector(complete.camera.position, 0, 1, -5);
+    assert_vector(complete.camera.look_at, 0, 1, 0);
+    assert_vector(complete.camera.up, 0, 1, 0);
+    assert_int_equal(complete.camera.field_axis, FIELD_VERTICAL);
+    assert_number(complete.camera.half_tangent, tan(M_PI / 6));
+    assert_number(complete.camera.frame_aspect, 0);
+}
+
+// Four lights: each without a color has the intensity sqrt(4) / 8.
+static void test_lights(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.lights.count, 4);
+    const Light *lights = complete.lights.items;
+    assert_int_equal(lights[0].kind, LIGHT_POINT);
+    assert_vector(lights[0].position, 1, 2, 3);
+    assert_vector(lights[0].color, 0.25, 0.25, 0.25);
+    assert_vector(lights[1].color, 0.5, 0, 0.25);
+    assert_vector(lights[2].position, -1, -2, -3);
+    assert_vector(lights[3].color, 0.25, 0.25, 0.25);
+    assert_vector(complete.ambient, 0.25, 0.25, 0.25);
+}
+
+static void test_materials(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.materials.count, 2);
+    const Material *matte = &complete.materials.items[0], *glass = matte + 1;
+    assert_vector(matte->color, 1, 0.5, 0.25);
+    assert_number(matte->ambient, 0.8);
+    assert_vector(matte->diffuse, 0.8, 0.8, 0.8);
+    assert_number(matte->specular, 0.3);
+    assert_number(matte->shininess, 20);
+    assert_number(matte->reflection, 0.3);
+    assert_number(matte->transmission, 0);
+    assert_number(glass->transmission, 0.9);
+    assert_number(glass->ior, 1.5);
+    assert_true(glass->full_shadow);
+    assert_int_equal(complete.objects.items[1].material, 0);
+    assert_int_equal(complete.objects.items[2].material, 1);
+}
+
+static void test_round_shapes(void **state)
+{
+    (void)state;
+    const Object *objects = complete.objects.items;
+    assert_int_equal(objects[0].kind, SHAPE_SPHERE);
+    assert_vector(objects[0].as.sphere.center, 1, 2, 3);
+    assert_number(objects[0].as.sphere.radius, 4);
+    assert_false(objects[0].as.sphere.only_inside);
+    assert_number(objects[1].as.sphere.radius, 4);
+    assert_true(objects[1].as.sphere.only_inside);
+
+    assert_int_equal(objects[2].kind, SHAPE_CYLINDER);
+    assert_vector(objects[2].as.cylinder.axis, 0, 3, 0);
+    assert_number(objects[2].as.cylinder.radius, 2);
+    assert_true(objects[2].as.cylinder.finite);
+    assert_false(objects[2].as.cylinder.caps);
+    assert_false(objects[2].as.cylinder.only_inside);
+
+    assert_int_equal(objects[3].kind, SHAPE_CONE);
+    assert_number(objects[3].as.cone.radius[0], 2);
+    assert_number(objects[3].as.cone.radius[1], 0.5);
+    assert_true(objects[3].as.cone.finite);
+    assert_false(objects[3].as.cone.caps);
+    assert_false(objects[3].as.cone.only_inside);
+
+    assert_int_equal(objects[4].kind, SHAPE_CYLINDER);
+    assert_number(objects[4].as.cylinder.radius, 2);
+    assert_true(objects[4].as.cylinder.only_inside);
+
+    assert_int_equal(objects[5].kind, SHAPE_CONE);
+    assert_number(objects[5].as.cone.radius[0], 0);
+    assert_number(objects[5].as.cone.radius[1], 1);
+    assert_true(objects[5].as.cone.only_inside);
+}
+
+static double triangle_area(const Object *triangle)
+{
+    const Vector3 *v = triangle->as.triangle.vertices;
+    return vector_cross(vector_subtract(v[1], v[0]), vector_subtract(v[2], v[0])).z / 2;
+}
+
+static void test_polygons(void **state)
+{
+    (void)state;
+    assert_int_equal(complete.objects.count, 6 + 1 + 3 + 1);
+    const Object *triangles = complete.objects.items + 6;
+    for (size_t i = 0; i < 5; i++)
+        assert_int_equal(triangles[i].kind, SHAPE_TRIANGLE);
+    assert_number(triangle_area(&triangles[0]), 0.5);
+    assert_false(triangles[0].as.triangle.smooth);
+    double area = 0;
+    for (size_t i = 1; i < 4; i++)
+        area += triangle_area(&triangles[i]);
+    assert_number(area, 2.5);
+    assert_number(triangle_area(&triangles[4]), 0.5);
+    assert_true(triangles[4].as.triangle.smooth);
+    for (size_t i = 0; i < 3; i++) {
+        Vector3 vertex = triangles[4].as.triangle.vertices[i], normal = triangles[4].as.triangle.normals[i];
+        assert_vector(normal, vertex.x / 2, vertex.y / 2, 1);
+    }
+}
+
+static void check_messages(const char *text, const char *expected)
+{
+    Text messages = scene_messages("s.nff", text, false);
+    assert_string_equal(text_c(&messages), expected);
+    text_free(&messages);
+}
+
+static void test_tolerated(void **state)
+{
+    (void)state;
+    check_messages(LIT MATERIAL SPHERE, "");
+    check_messages("\xEF\xBB\xBF" LIT MATERIAL SPHERE, "");
+    check_messages("v from 0 0 -5 \r\n at\t0 0 0\r\nangle 45\r\nup 0 1 0 # no hither\r\nl 0 9 0\r\n" MATERIAL
+                   "s 0 0\r\n0 1\r\n",
+                   "");
+    check_messages(LIT SPHERE SPHERE, "7:1: warning: no material stands before this: white\n");
+    check_messages(LIT MATERIAL "p 3\n0 0 0\n1 1 1\n2 2 2\n" SPHERE,
+                   "8:1: warning: a polygon without area is never hit\n");
+    check_messages(LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",
+                   "8:1: warning: the polygon crosses itself: filled as far as it can be\n");
+    check_messages(LIT, "warning: s.nff: no objects\n");
+    check_messages(VIEW MATERIAL SPHERE, "warning: s.nff: no lights\n");
+}
+
+static void check_sides(const char *shape, double reach, bool only_inside)
+{
+    const ProbeRay rays[] = {{{0, 0, -5}, {0, 0, 1}, 0, INFINITY}, {{0, 0, 0}, {0, 0, 1}, 0, INFINITY}};
+    Text text = {0};
+    text_appendf(&text, LIT MATERIAL "%s\n", shape);
+    Scene scene = scene_of_text("s.nff", text_c(&text));
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        if (!probe_has(precision)) continue;
+        ProbeHit hits[2] = {0};
+        assert_true(probe_trace(&scene, precision, 0, rays, 2, hits));
+        assert_int_equal(hits[0].object, 0);
+        assert_true(fabs(hits[0].t - (only_inside ? 5 + reach : 5 - reach)) < 1e-5);
+        assert_int_equal(hits[1].object, 0);
+        assert_true(fabs(hits[1].t - reach) < 1e-6);
+    }
+    scene_free(&scene);
+    text_free(&text);
+}
+
+// Rays along the z axis, from outside and from inside. What is seen only from inside is hit at its far side
+// by both.
+static void test_only_inside(void **state)
+{
+    (void)state;
+    check_sides("s 0 0 0 1", 1, false);
+    check_sides("s 0 0 0 -1", 1, true);
+    check_sides("c 0 -1 0 1 0 1 0 1", 1, false);
+    check_sides("c 0 -1 0 -1 0 1 0 -1", 1, true);
+    check_sides("c 0 -1 0 1 0 1 0 0", 0.5, false);
+    check_sides("c 0 -1 0 -1 0 1 0 0", 0.5, true);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_view),        cmocka_unit_test(test_lights),
+        cmocka_unit_test(test_materials),   cmocka_unit_test(test_round_shapes),
+        cmocka_unit_test(test_polygons),    cmocka_unit_test(test_tolerated),
+        cmocka_unit_test(test_only_inside),
+    };
+    return cmocka_run_group_tests(tests, complete_open, complete_close);
+}
