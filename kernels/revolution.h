@@ -220,7 +220,10 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
         real target = lanes_select(height * (real)(2) < end, (real)(0), end);
         Vector on_plane = vector_fma(axis, real_divide(target - height, squared_axis), p);
         place = vector_select(on_cap, on_plane, place);
-        normal = vector_select(on_cap, vector_normalize(axis), normal);
+        Vector end_normal = vector_normalize(axis);
+        mask at_base = target == (real)(0);
+        end_normal = vector_select(at_base, vector_negate(end_normal), end_normal);
+        normal = vector_select(on_cap, end_normal, normal);
     }
     real size = vector_magnitude(p) + vector_magnitude(base) + radius;
     return patch_make(vector_add(place, base), normal, size);
