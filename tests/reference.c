@@ -115,7 +115,7 @@ static void narrow(ReferenceHit *hit, Quad margin)
     hit->margin = quad_minimum(hit->margin, quad_absolute(margin));
 }
 
-// Takes the surface met at `t` if it is the nearest so far. `normal` need not be unit nor face the ray.
+// Takes the surface met at `t` if it is the nearest so far. `normal` points outward; it need not be unit.
 static void offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad bend)
 {
     normal = quad3_unit(normal);
@@ -128,6 +128,7 @@ static void offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 norm
     hit->t = t;
     hit->normal = cosine < 0 ? quad3_scale(normal, -1) : normal;
     hit->shading_normal = hit->normal;
+    hit->entering = cosine >= 0;
     hit->cosine = quad_absolute(cosine);
     hit->bend = bend;
 }
@@ -145,20 +146,17 @@ static Quad line_distance(const ReferenceRay *ray, Quad3 on_line, Quad3 directio
     return quad_absolute(quad3_dot(quad3_subtract(ray->origin, on_line), quad3_unit(across)));
 }
 
-// Solves A t^2 + 2 B t + C = 0; returns how many roots there are.
+// Solves A t^2 + 2 B t + C = 0; returns how many roots there are. A root that far away is what roundings left
+// of an A that is 0.
 static int quadratic_roots(Quad a, Quad b, Quad c, Quad roots[2])
 {
-    // Between a line and a parabola this thin both answers are good to 17 digits.
-    if (quad_absolute(a * c) <= (Quad)1e-17L * b * b) {
-        if (b == 0) return 0;
-        roots[0] = -c / (2 * b);
-        return 1;
-    }
     Quad discriminant = b * b - a * c;
-    if (discriminant < 0) return 0;
+    if (discriminant < 0 || (a == 0 && b == 0)) return 0;
     Quad root = quad_root(discriminant);
-    roots[0] = (-b - root) / a;
-    roots[1] = (-b + root) / a;
+    Quad sum = b < 0 ? root - b : -b - root;
+    roots[0] = sum == 0 ? 0 : c / sum;
+    if (quad_absolute(sum) > (Quad)1e25L * quad_absolute(a)) return 1;
+    roots[1] = sum / a;
     return 2;
 }
 
@@ -232,7 +230,7 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
             int next = (axis + 1) % 3, last = (axis + 2) % 3;
             if (at[next] >= low[next] && at[next] <= high[next] && at[last] >= low[last] &&
                 at[last] <= high[last])
-                offer(hit, ray, t, along, NOWHERE);
+                offer(hit, ray, t, quad3_scale(along, side ? 1 : -1), NOWHERE);
         }
         for (int edge = 0; edge < 4; edge++) {
             Vector3 y_and_z = {corners[0].x, corners[edge & 1].y, corners[edge >> 1].z};
@@ -302,7 +300,7 @@ static void hit_round_body(const RoundBody *body, const ReferenceRay *ray, Refer
 {
     round_body_side(body, ray, hit);
     if (!body->finite || !body->caps) return;
-    hit_disc_at(body->from, body->axis, body->base, ray, hit);
+    hit_disc_at(body->from, quad3_scale(body->axis, -1), body->base, ray, hit);
     hit_disc_at(quad3_add(body->from, quad3_scale(body->axis, body->height)), body->axis,
                 body->base + body->slope * body->height, ray, hit);
 }

@@ -30,6 +30,7 @@ typedef struct {
     Quad t;
     Quad3 normal;         // of the geometry, unit, facing the ray
     Quad3 shading_normal; // on the same side; differs on smooth triangles
+    bool entering;        // the ray runs against the outward normal: of a triangle, that of its winding
     Quad cosine;          // of the angle between normal and ray, 0 .. 1
     Quad bend; // how far one moves along the surface to turn the normal by about a radian; LDBL_MAX if flat
     // About twice the distance, in scene units, between the ray's line and the nearest curve at which the
@@ -67,5 +68,18 @@ typedef struct {
 } ReferenceColor;
 
 // What the eye sees along a ray: background, or ambient and Phong with shadows (B. T. Phong, "Illumination
-// for Computer Generated Pictures", CACM 18(6), 1975). Neither reflection nor refraction.
+// for Computer Generated Pictures", CACM 18(6), 1975). Transparent objects pass their part of the light
+// unbent, once for each object. Neither reflection nor refraction.
 ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
+
+// With reflections and refractions, `bounce_count` of them in a row.
+//
+// Where `blur` is not 0, each ray starts and turns a little wrong: by up to so much of the size of the
+// numbers there, at random. How far colors differ from those without blur tells what errors of that size come
+// to on their way.
+typedef struct {
+    unsigned bounce_count;
+    double blur;
+    uint64_t seed;
+} ReferencePath;
+Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);

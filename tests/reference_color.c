@@ -1,5 +1,6 @@
 #include "tests/reference.h"
 #include "tests/reference_quad.h"
+#include "tests/specimen.h"
 
 // A shadow ray leaves out this part of its way at either end: far over the rounding of quadruple precision,
 // far under any gap that a scene's doubles can express at its own scale.
@@ -26,7 +27,11 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
 typedef struct {
     Quad3 point, normal, to_eye;
     Quad scale; // how far the point is from the ray's origin
-    uint32_t object;
+    Quad start; // rays that leave it have gone this far before they meet anything
+    bool entering;
+    const Object *object;
+    const Material *material;
+    Color base;
 } Surface;
 
 static long double square_of(Quad coordinate, double size, Quad *margin)
@@ -72,9 +77,10 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
     return x * x * (3 - 2 * x);
 }
 
-static void add_light(const Scene *scene, const Light *light, const Material *material, Color base,
-                      const Surface *surface, ReferenceColor *sum)
+static void add_light(const Scene *scene, const Light *light, const Surface *surface, ReferenceColor *sum)
 {
+    const Material *material = surface->material;
+    Color base = surface->base;
     bool endless = light->kind == LIGHT_DIRECTIONAL;
     Quad3 way = endless ? quad3_scale(quad3(light->direction), -1)
                         : quad3_subtract(quad3(light->position), surface->point);
@@ -83,18 +89,16 @@ static void add_light(const Scene *scene, const Light *light, const Material *ma
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
     if (facing <= 0) return;
 
-    Quad start = endless ? END_PART * surface->scale / quad3_length(way) : END_PART;
+    Quad start = surface->start / quad3_length(way);
     ReferenceRay shadow = {surface->point, way, start, endless ? (Quad)LDBL_MAX : 1 - END_PART};
-    bool blocked = false;
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        ReferenceHit blocker = reference_hit_object(&scene->objects.items[i], &shadow);
-        // The surface lies against itself; where it shadows itself is told by `facing`.
-        if (i != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
-        blocked = blocked || blocker.found;
-    }
-    if (blocked) return;
-
     Quad strength = light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(way, -1)) : 1;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        ReferenceHit blocker = reference_hit_object(object, &shadow);
+        // The surface lies against itself; where it shadows itself is told by `facing`.
+        if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
+        if (blocker.found) strength *= scene->materials.items[object->material].transmission;
+    }
     Quad3 mirrored = quad3_subtract(quad3_scale(surface->normal, 2 * facing), to_light);
     Quad alignment = quad3_dot(mirrored, surface->to_eye);
     double diffuse = (double)(strength * facing);
@@ -106,22 +110,104 @@ static void add_light(const Scene *scene, const Light *light, const Material *ma
     sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight);
 }
 
+static Quad3 random_offset(Random *random, double size)
+{
+    return quad3(vector_scale(random_in_ball(random), size));
+}
+
+// What a ray met; moved along the surface and turned by up to `blur`.
+static Surface surface_at(const Scene *scene, const ReferenceRay *ray, ReferenceHit *hit, double blur,
+                          Random *random)
+{
+    const Object *object = &scene->objects.items[hit->object];
+    const Material *material = &scene->materials.items[object->material];
+    Quad length = quad3_length(ray->direction);
+    Surface surface = {.point = reference_point(ray, hit->t),
+                       .normal = hit->shading_normal,
+                       .to_eye = quad3_scale(ray->direction, -1 / length),
+                       .scale = hit->t * length,
+                       .entering = hit->entering,
+                       .object = object,
+                       .material = material,
+                       .base = material->color};
+    surface.start = END_PART * surface.scale;
+    if (blur > 0) {
+        Quad size =
+            surface.scale + quad3_length(quad3_subtract(surface.point, quad3(scene->camera.position)));
+        Quad3 offset = random_offset(random, blur * (double)size);
+        Quad away = quad3_dot(offset, hit->normal);
+        surface.point = quad3_add(surface.point, quad3_subtract(offset, quad3_scale(hit->normal, away)));
+        surface.normal = quad3_unit(quad3_add(surface.normal, random_offset(random, blur)));
+        surface.start += blur * size;
+    }
+    if (material->checker) surface.base = checker_color(object, material, hit, surface.point, &hit->margin);
+    return surface;
+}
+
+static ReferenceColor surface_color(const Scene *scene, const Surface *surface, double margin)
+{
+    Color base = surface->base;
+    Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
+    ReferenceColor sum = {vector_scale(ambient, surface->material->ambient), margin};
+    for (size_t i = 0; i < scene->lights.count; i++)
+        add_light(scene, &scene->lights.items[i], surface, &sum);
+    return sum;
+}
+
 ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_hit(scene, ray);
     if (!hit.found) return (ReferenceColor){scene->background, (double)hit.margin};
+    Surface surface = surface_at(scene, ray, &hit, 0, NULL);
+    return surface_color(scene, &surface, (double)hit.margin);
+}
 
-    const Object *object = &scene->objects.items[hit.object];
-    const Material *material = &scene->materials.items[object->material];
-    Quad length = quad3_length(ray->direction);
-    Surface surface = {reference_point(ray, hit.t), hit.shading_normal,
-                       quad3_scale(ray->direction, -1 / length), hit.t * length, hit.object};
-    Color base = material->color;
-    if (material->checker) base = checker_color(object, material, &hit, surface.point, &hit.margin);
+// Snell's law: with the sine behind the surface eta times that before it. False where that is more than 1.
+static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted)
+{
+    Quad cosine = -quad3_dot(direction, normal);
+    Quad squared = 1 - eta * eta * (1 - cosine * cosine);
+    if (squared < 0) return false;
+    *refracted =
+        quad3_add(quad3_scale(direction, eta), quad3_scale(normal, eta * cosine - quad_root(squared)));
+    return true;
+}
 
-    Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
-    ReferenceColor sum = {vector_scale(ambient, material->ambient), (double)hit.margin};
-    for (size_t i = 0; i < scene->lights.count; i++)
-        add_light(scene, &scene->lights.items[i], material, base, &surface, &sum);
+static void add_path(const Scene *scene, const ReferenceRay *ray, double weight, unsigned bounces_left,
+                     double blur, Random *random, Color *sum)
+{
+    if (weight == 0) return;
+    ReferenceHit hit = reference_hit(scene, ray);
+    if (!hit.found) {
+        *sum = vector_add(*sum, vector_scale(scene->background, weight));
+        return;
+    }
+    Surface surface = surface_at(scene, ray, &hit, blur, random);
+    *sum = vector_add(*sum, vector_scale(surface_color(scene, &surface, 0).color, weight));
+    if (bounces_left == 0) return;
+
+    Quad3 direction = quad3_scale(surface.to_eye, -1);
+    const Material *material = surface.material;
+    double reflection = material->reflection, transmission = material->transmission;
+    ReferenceRay passed = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, mirrored = passed;
+    Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
+    if (transmission > 0 && !refract(direction, surface.normal, eta, &passed.direction)) {
+        reflection += transmission;
+        transmission = 0;
+    }
+    Quad away = quad3_dot(direction, surface.normal);
+    mirrored.direction = quad3_subtract(direction, quad3_scale(surface.normal, 2 * away));
+    add_path(scene, &mirrored, weight * reflection, bounces_left - 1, blur, random, sum);
+    add_path(scene, &passed, weight * transmission, bounces_left - 1, blur, random, sum);
+}
+
+Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
+{
+    Random random = {path->seed};
+    ReferenceRay first = *ray;
+    Quad3 turn = random_offset(&random, path->blur * (double)quad3_length(ray->direction));
+    first.direction = quad3_add(first.direction, turn);
+    Color sum = {0, 0, 0};
+    add_path(scene, &first, 1, path->bounce_count, path->blur, &random, &sum);
     return sum;
 }

@@ -79,6 +79,8 @@ static void knows_spheres(void **state)
         {"inside", unit, {0.5, 0, 0}, {1, 0, 0}, 0.5},
         {"inside", unit, {0.999999, 0, 0}, {1, 0, 0}, 1.0132789611816e-6},
         {"inside", unit, {0.999999, 0, 0}, {0, 1, 0}, 0.0014235718793335},
+        {"on it", unit, {0, 0, -1}, z, 2},
+        {"on it", unit, {0, 0, 1}, z, MISS},
         {"behind", unit, {0, 0, 5}, z, MISS},
     };
     check(known, COUNT(known));

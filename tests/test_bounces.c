@@ -1,0 +1,174 @@
+// Reflection, refraction, total reflection and light through glass: small pictures against the reference.
+#include "tests/frame.h"
+#include "tests/probe.h"
+#include "tests/reference.h"
+#include "tests/scene_reading.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 64, HEIGHT = 48, BLURRED_COUNT = 12, OPEN_AT_MOST = 10 };
+
+// In units of roundoff: an error that needs no excuse, and the blur whose effect is one. Surfaces put the
+// rays that leave them up to 40 u of the size of their numbers away.
+#define PLAIN_ERROR 64
+#define BLUR        64
+
+typedef struct {
+    const char *name, *text;
+    unsigned bounce_count;
+} Trial;
+
+#define STAGE                                                                                                \
+    "background: [0.25, 0.375, 0.5]\n"                                                                       \
+    "ambient: [0.25, 0.25, 0.25]\n"                                                                          \
+    "lights:\n"                                                                                              \
+    "  - point: {position: [4, 8, 6], color: [0.75, 0.75, 0.5]}\n"                                           \
+    "  - directional: {direction: [1, -2, -1], color: [0.25, 0.25, 0.5]}\n"                                  \
+    "materials:\n"                                                                                           \
+    "  tiles: {checker: {colors: [[1, 1, 1], [0.25, 0.125, 0]], size: 1}, diffuse: 0.75}\n"                  \
+    "  red: {color: [1, 0.25, 0.125], diffuse: 0.75, specular: 0.25, shininess: 8}\n"                        \
+    "  mirror: {color: [0.5, 0.5, 0.5], ambient: 0.25, diffuse: 0.25, specular: 0.5, shininess: 16, "        \
+    "reflection: 0.75}\n"                                                                                    \
+    "  glass: {color: [1, 1, 1], ambient: 0, diffuse: 0.125, specular: 0.25, reflection: 0.125, "            \
+    "transmission: 0.75,"                                                                                    \
+    " ior: 1.5}\n"                                                                                           \
+    "  clear: {color: [1, 1, 1], ambient: 0.25, diffuse: 0.125, transmission: 0.875, ior: 1.5}\n"            \
+    "  water: {color: [0.5, 1, 1], ambient: 0.25, diffuse: 0.125, transmission: 0.75, ior: 1.25}\n"
+
+#define CAMERA "camera: {position: [0.5, 2.25, 6], look_at: [0, 1, 0], up: [0, 1, 0], fov: 40}\n"
+#define FLOOR                                                                                                \
+    "objects:\n"                                                                                             \
+    "  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: tiles}\n"
+
+static Trial trials[] = {
+    {"mirror sphere",
+     STAGE CAMERA FLOOR "  - sphere: {center: [0, 1, 0], radius: 1, material: mirror}\n"
+                        "  - sphere: {center: [-1.5, 0.5, 1], radius: 0.5, material: red}\n",
+     4},
+    {"glass sphere",
+     STAGE CAMERA FLOOR "  - sphere: {center: [0, 1, 0], radius: 1, material: glass}\n"
+                        "  - sphere: {center: [1, 0.5, -2], radius: 0.5, material: red}\n",
+     5},
+    {"sphere in glass",
+     STAGE CAMERA FLOOR "  - sphere: {center: [0, 1.25, 0], radius: 1.25, material: clear}\n"
+                        "  - sphere: {center: [0, 1.25, 0], radius: 0.75, material: red}\n",
+     4},
+    {"bubble in glass",
+     STAGE CAMERA FLOOR "  - sphere: {center: [0, 1.25, 0], radius: 1.25, material: clear}\n"
+                        "  - sphere: {center: [0.25, 1.25, 0], radius: 0.5, material: water}\n",
+     8},
+    {"glass box",
+     STAGE CAMERA FLOOR "  - box: {min: [-1, 0.125, -0.5], max: [1, 1.75, 0.75], material: clear}\n"
+                        "  - sphere: {center: [0.5, 0.75, -2], radius: 0.75, material: red}\n",
+     8},
+    {"prism",
+     STAGE CAMERA FLOOR
+     "  - sphere: {center: [-0.5, 3, 0.5], radius: 0.75, material: red}\n"
+     // From the front the slope behind reflects all upward.
+     "  - triangle: {vertices: [[-1, 0.5, 1], [1, 0.5, 1], [1, 2, 1]], material: clear}\n"
+     "  - triangle: {vertices: [[-1, 0.5, 1], [1, 2, 1], [-1, 2, 1]], material: clear}\n"
+     "  - triangle: {vertices: [[-1, 2, 1], [1, 2, 1], [1, 2, -0.5]], material: clear}\n"
+     "  - triangle: {vertices: [[-1, 2, 1], [1, 2, -0.5], [-1, 2, -0.5]], material: clear}\n"
+     "  - triangle: {vertices: [[-1, 0.5, 1], [-1, 2, -0.5], [1, 2, -0.5]], material: clear}\n"
+     "  - triangle: {vertices: [[-1, 0.5, 1], [1, 2, -0.5], [1, 0.5, 1]], material: clear}\n"
+     "  - triangle: {vertices: [[-1, 0.5, 1], [-1, 2, 1], [-1, 2, -0.5]], material: clear}\n"
+     "  - triangle: {vertices: [[1, 0.5, 1], [1, 2, -0.5], [1, 2, 1]], material: clear}\n",
+     8},
+    {"mirror in mirror",
+     STAGE CAMERA FLOOR "  - plane: {point: [0, 0, -2], normal: [0, 0, 1], material: mirror}\n"
+                        "  - plane: {point: [0, 0, 7], normal: [0, 0, 2], material: mirror}\n"
+                        "  - sphere: {center: [-0.5, 0.75, 0], radius: 0.5, material: red}\n",
+     16},
+    {"glassware",
+     STAGE CAMERA FLOOR
+     "  - cylinder: {from: [-2, 0.25, 0], to: [-1.5, 1.75, 0.25], radius: 0.5, material: clear}\n"
+     "  - cone: {from: [0, 0.25, 0.5], to: [0, 1.75, 0], radius: [0.75, 0.25], material: clear}\n"
+     "  - torus: {center: [1.75, 1.25, 0], axis: [0, 0.5, 1], major: 0.75, minor: 0.25, material: water}\n"
+     "  - disc: {center: [0.5, 2.5, 0], normal: [0, 0.25, 1], radius: 0.5, material: mirror}\n",
+     6},
+    {"eye in glass",
+     STAGE "camera: {position: [0.25, 1.25, 0.5], look_at: [0, 0.5, -4], up: [0, 1, 0], fov: 60}\n" FLOOR
+           "  - sphere: {center: [0, 1.25, 0], radius: 1, material: clear}\n"
+           "  - sphere: {center: [0.5, 0.5, -4], radius: 0.75, material: red}\n",
+     8},
+};
+enum { TRIAL_COUNT = sizeof trials / sizeof *trials };
+
+static double unit_roundoff(Precision precision)
+{
+    return precision == PRECISION_DOUBLE ? 0x1p-53 : 0x1p-24;
+}
+
+static double largest_difference(Color a, Color b)
+{
+    return fmax(fabs(a.x - b.x), fmax(fabs(a.y - b.y), fabs(a.z - b.z)));
+}
+
+// How far the pixel's color moves where its rays do.
+static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Trial *trial, double u,
+                          Color color)
+{
+    double largest = 0;
+    for (uint64_t seed = 1; seed <= BLURRED_COUNT; seed++) {
+        const ReferencePath path = {trial->bounce_count, BLUR * u, seed};
+        largest = fmax(largest, largest_difference(reference_path_color(scene, ray, &path), color));
+    }
+    return largest;
+}
+
+static void compare(const Trial *trial, const Scene *scene, const Color *expected, Precision precision)
+{
+    if (!probe_has(precision)) return;
+    RenderSettings settings = frame_settings(WIDTH, HEIGHT, precision);
+    settings.bounce_count = trial->bounce_count;
+    Frame frame = frame_render(&probe_compute, scene, &settings, 0);
+    const double u = unit_roundoff(precision);
+    size_t wrong = 0, open = 0;
+    for (unsigned i = 0; i < WIDTH * HEIGHT; i++) {
+        Color seen = {frame.colors[3 * i], frame.colors[3 * i + 1], frame.colors[3 * i + 2]};
+        double error = largest_difference(seen, expected[i]);
+        if (error <= PLAIN_ERROR * u) continue;
+        ReferenceRay ray = reference_camera_ray(&scene->camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
+        double excuse = sensitivity(scene, &ray, trial, u, expected[i]);
+        // Here the answer itself hangs on the last bits.
+        open += excuse > 0x1p-7;
+        if (error <= PLAIN_ERROR * u + 2 * excuse) continue;
+        if (wrong++ == 0)
+            print_message(
+                "%s, %s: pixel %u,%u is off by %g, of which %g is excused: %g %g %g, not %g %g %g\n",
+                trial->name, precision_names[precision], i % WIDTH, i / WIDTH, error, excuse, seen.x, seen.y,
+                seen.z, expected[i].x, expected[i].y, expected[i].z);
+    }
+    frame_free(&frame);
+    assert_int_equal(wrong, 0);
+    assert_true(open < OPEN_AT_MOST);
+}
+
+static void shows_what_the_reference_shows(void **state)
+{
+    const Trial *trial = *state;
+    Scene scene = scene_of_text("bounces.yaml", trial->text);
+    static Color expected[WIDTH * HEIGHT];
+    const ReferencePath path = {.bounce_count = trial->bounce_count};
+    for (unsigned i = 0; i < WIDTH * HEIGHT; i++) {
+        ReferenceRay ray = reference_camera_ray(&scene.camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
+        expected[i] = reference_path_color(&scene, &ray, &path);
+    }
+    for (Precision precision = PRECISION_SINGLE; precision < PRECISION_COUNT; precision++)
+        compare(trial, &scene, expected, precision);
+    scene_free(&scene);
+}
+
+int main(void)
+{
+    struct CMUnitTest tests[TRIAL_COUNT];
+    for (size_t i = 0; i < TRIAL_COUNT; i++) {
+        tests[i] =
+            (struct CMUnitTest){trials[i].name, shows_what_the_reference_shows, NULL, NULL, &trials[i]};
+    }
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
