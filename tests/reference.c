@@ -170,8 +170,11 @@ static void hit_sphere(const Object *object, const ReferenceRay *ray, ReferenceH
     narrow(hit, (b * b / a - c) / radius);
     Quad roots[2];
     int count = quadratic_roots(a, b, c, roots);
-    for (int i = 0; i < count; i++)
-        offer(hit, ray, roots[i], quad3_add(from_center, quad3_scale(ray->direction, roots[i])), radius);
+    for (int i = 0; i < count; i++) {
+        Quad3 normal = quad3_add(from_center, quad3_scale(ray->direction, roots[i]));
+        if (object->as.sphere.only_inside && quad3_dot(normal, ray->direction) < 0) continue;
+        offer(hit, ray, roots[i], normal, radius);
+    }
 }
 
 // Where a ray crosses the plane through `point`; false if it runs parallel.
@@ -247,7 +250,7 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
 typedef struct {
     Quad3 from, axis;
     Quad base, slope, height;
-    bool finite, caps;
+    bool finite, caps, only_inside;
 } RoundBody;
 
 static void round_body_side(const RoundBody *body, const ReferenceRay *ray, ReferenceHit *hit)
@@ -292,6 +295,7 @@ static void round_body_side(const RoundBody *body, const ReferenceRay *ray, Refe
             narrow(hit, 2 * (body->height - z) * cosine);
             if (z < 0 || z > body->height) continue;
         }
+        if (body->only_inside && quad3_dot(normal, ray->direction) < 0) continue;
         offer(hit, ray, roots[i], normal, quad_root(x * x + y * y));
     }
 }
@@ -314,7 +318,8 @@ static void hit_cylinder(const Object *object, const ReferenceRay *ray, Referenc
                       0,
                       quad3_length(axis),
                       object->as.cylinder.finite,
-                      object->as.cylinder.caps};
+                      object->as.cylinder.caps,
+                      object->as.cylinder.only_inside};
     hit_round_body(&body, ray, hit);
 }
 
@@ -329,7 +334,8 @@ static void hit_cone(const Object *object, const ReferenceRay *ray, ReferenceHit
                       finite ? (second - first) / height : object->as.cone.slope,
                       height,
                       finite,
-                      object->as.cone.caps};
+                      object->as.cone.caps,
+                      object->as.cone.only_inside};
     hit_round_body(&body, ray, hit);
 }
 

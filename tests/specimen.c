@@ -66,7 +66,8 @@ static Specimen make_round(SpecimenKind kind, Random *random, Vector3 center, do
     bool caps = kind == SPECIMEN_CYLINDER_CAPPED || kind == SPECIMEN_CONE_CAPPED || kind == SPECIMEN_CONE_TIP;
     if (kind <= SPECIMEN_CYLINDER_INFINITE) {
         bool finite = kind != SPECIMEN_CYLINDER_INFINITE;
-        specimen.object = (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {from, axis, first, finite, caps}};
+        specimen.object =
+            (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {from, axis, first, finite, caps, false}};
         specimen.reach = hypot(length / 2, first);
     } else if (kind == SPECIMEN_CONE_INFINITE) {
         double slope = random_between(random, 0.1, 3);
@@ -74,7 +75,7 @@ static Specimen make_round(SpecimenKind kind, Random *random, Vector3 center, do
             (Object){.kind = SHAPE_CONE, .as.cone = {.from = from, .axis = axis, .slope = slope}};
     } else {
         specimen.object =
-            (Object){.kind = SHAPE_CONE, .as.cone = {from, axis, {first, second}, 0, true, caps}};
+            (Object){.kind = SHAPE_CONE, .as.cone = {from, axis, {first, second}, 0, true, caps, false}};
     }
     return specimen;
 }
@@ -128,7 +129,7 @@ Specimen specimen_make(SpecimenKind kind, Random *random)
     Specimen specimen = {.kind = kind, .center = center, .reach = size, .axis = normal};
     switch (kind) {
     case SPECIMEN_SPHERE:
-        specimen.object = (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, size}};
+        specimen.object = (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, size, false}};
         break;
     case SPECIMEN_PLANE:
         specimen.object = (Object){.kind = SHAPE_PLANE, .as.plane = {center, normal}};

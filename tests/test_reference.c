@@ -19,17 +19,18 @@ typedef struct {
 
 static Object sphere(Vector3 center, double radius)
 {
-    return (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, radius}};
+    return (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, radius, false}};
 }
 
 static Object cylinder(Vector3 from, Vector3 axis, double radius, bool finite, bool caps)
 {
-    return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {from, axis, radius, finite, caps}};
+    return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {from, axis, radius, finite, caps, false}};
 }
 
 static Object frustum(double first, double second, bool caps)
 {
-    return (Object){.kind = SHAPE_CONE, .as.cone = {{0, 0, 0}, {0, 0, 2}, {first, second}, 0, true, caps}};
+    return (Object){.kind = SHAPE_CONE,
+                    .as.cone = {{0, 0, 0}, {0, 0, 2}, {first, second}, 0, true, caps, false}};
 }
 
 static Object endless_cone(double slope)
@@ -82,6 +83,23 @@ static void knows_spheres(void **state)
         {"on it", unit, {0, 0, -1}, z, 2},
         {"on it", unit, {0, 0, 1}, z, MISS},
         {"behind", unit, {0, 0, 5}, z, MISS},
+    };
+    check(known, COUNT(known));
+}
+
+static void sees_only_insides(void **state)
+{
+    (void)state;
+    Object ball = sphere((Vector3){0, 0, 0}, 1),
+           tube = cylinder((Vector3){0, 0, -1}, (Vector3){0, 0, 2}, 1, true, false);
+    Object cup = frustum(1, 0.5, false);
+    ball.as.sphere.only_inside = tube.as.cylinder.only_inside = cup.as.cone.only_inside = true;
+    const Vector3 x = {1, 0, 0};
+    const Known known[] = {
+        {"ball", ball, {-5, 0, 0}, x, 6},   {"ball", ball, {0, 0, 0}, x, 1},
+        {"ball", ball, {1, 0, 0}, x, MISS}, {"tube", tube, {-5, 0, 0}, x, 6},
+        {"tube", tube, {0, 0, 0}, x, 1},    {"tube", tube, {-5, 0, 2}, x, MISS},
+        {"cup", cup, {-5, 0, 1}, x, 5.75},  {"cup", cup, {0, 0, 1}, x, 0.75},
     };
     check(known, COUNT(known));
 }
@@ -339,12 +357,12 @@ static void finds_the_nearest(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(knows_spheres),     cmocka_unit_test(knows_flat_shapes),
-        cmocka_unit_test(knows_cylinders),   cmocka_unit_test(knows_cones),
-        cmocka_unit_test(knows_tori),        cmocka_unit_test(shades_as_phong),
-        cmocka_unit_test(casts_shadows),     cmocka_unit_test(lays_checkers),
-        cmocka_unit_test(aims_cameras),      cmocka_unit_test(rounds_every_number),
-        cmocka_unit_test(finds_the_nearest),
+        cmocka_unit_test(knows_spheres),       cmocka_unit_test(sees_only_insides),
+        cmocka_unit_test(knows_flat_shapes),   cmocka_unit_test(knows_cylinders),
+        cmocka_unit_test(knows_cones),         cmocka_unit_test(knows_tori),
+        cmocka_unit_test(shades_as_phong),     cmocka_unit_test(casts_shadows),
+        cmocka_unit_test(lays_checkers),       cmocka_unit_test(aims_cameras),
+        cmocka_unit_test(rounds_every_number), cmocka_unit_test(finds_the_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
