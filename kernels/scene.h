@@ -14,6 +14,7 @@
 typedef struct {
     global const SceneHeader *header;
     SHAPE_LIST(SCENE_SHAPE_MEMBER)
+    global const TriangleNormals *triangle_normals;
     global const BvhNode *nodes;
     global const ObjectEntry *objects;
     global const Material *materials;
@@ -25,12 +26,14 @@ typedef struct {
 // kernel.
 #define SCENE_SHAPE_ARGUMENT(feature, Type, name, names) global const Type *names,
 #define SCENE_ARGUMENTS                                                                                      \
-    global const SceneHeader *header, SHAPE_LIST(SCENE_SHAPE_ARGUMENT) global const BvhNode *nodes,          \
-        global const ObjectEntry *objects, global const Material *materials, global const Light *lights
+    global const SceneHeader *header,                                                                        \
+        SHAPE_LIST(SCENE_SHAPE_ARGUMENT) global const TriangleNormals *triangle_normals,                     \
+        global const BvhNode *nodes, global const ObjectEntry *objects, global const Material *materials,    \
+        global const Light *lights
 #define SCENE_SHAPE_VALUE(feature, Type, name, names) names,
 #define SCENE_FROM_ARGUMENTS                                                                                 \
     {                                                                                                        \
-        header, SHAPE_LIST(SCENE_SHAPE_VALUE) nodes, objects, materials, lights, 0                           \
+        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, nodes, objects, materials, lights, 0         \
     }
 
 // Adds the lanes to a count, in a counting build only.

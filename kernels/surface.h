@@ -31,6 +31,16 @@ typedef struct {
 
 static inline Patch shape_patch(const Scene *scene, uint kind, uint index, const Ray *ray, real t)
 {
+    // alone in that part of it lies in another array
+    if (HAS_TRIANGLES && kind == KIND_TRIANGLES) {
+        Triangle triangle = scene->triangles[index];
+        Patch patch = triangle_patch(&triangle, ray, t);
+        if (triangle.id.y > 0) {
+            TriangleNormals normals = scene->triangle_normals[triangle.id.y - 1];
+            triangle_smooth(&triangle, &normals, ray, &patch);
+        }
+        return patch;
+    }
 #define PATCH_OF_SHAPE(feature, Type, name, names)                                                           \
     if (HAS_##feature && kind == KIND_##feature) {                                                           \
         Type shape = scene->names[index];                                                                    \

@@ -73,26 +73,50 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     return hit & (*t > ray->near);
 }
 
-static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
+// How much of each vertex the point has where the ray meets the triangle.
+typedef struct {
+    real a, b, c;
+} TriangleWeights;
+
+static inline TriangleWeights triangle_weights(const Triangle *triangle, const Ray *ray)
 {
-    (void)t;
     TriangleEdges edges = triangle_edges(triangle, ray);
     mask degenerate = edges.determinant == (real)(0);
     real inverse = real_divide((real)(1), lanes_select(degenerate, (real)(1), edges.determinant));
-    real u = edges.u * inverse, v = edges.v * inverse, w = edges.w * inverse;
+    return (TriangleWeights){edges.u * inverse, edges.v * inverse, edges.w * inverse};
+}
+
+static inline Vector triangle_blend(TriangleWeights weights, Vector a, Vector b, Vector c)
+{
+    return vector_fma(a, weights.a, vector_fma(b, weights.b, vector_scale(c, weights.c)));
+}
+
+// From one vertex to another, divided by a power of two: exact, and the cross product of two sides does not
+// vanish where the triangle is tiny.
+static inline Vector triangle_side(Vector from, Vector to)
+{
+    Vector side = vector_subtract(to, from);
+    real largest = real_max(real_max(fabs(side.x), fabs(side.y)), fabs(side.z));
+    return vector_scale(side, real_inverse_or_zero(real_power_below(largest)));
+}
+
+static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
+{
+    (void)t;
     Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
-    Vector normal = vector_normalize(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
-    Vector position = vector_fma(a, u, vector_fma(b, v, vector_scale(c, w)));
+    Vector normal = vector_normalize(vector_cross(triangle_side(a, b), triangle_side(a, c)));
     real size = real_max(real_max(vector_magnitude(a), vector_magnitude(b)), vector_magnitude(c));
-    Patch patch = patch_make(position, normal, size);
-    if (triangle->id.y) {
-        Vector smooth_ = vector_fma(
-            vector_of(triangle->normal_a), u,
-            vector_fma(vector_of(triangle->normal_b), v, vector_scale(vector_of(triangle->normal_c), w)));
-        mask vanishes = vector_dot(smooth_, smooth_) == (real)(0);
-        patch.shading_normal = vector_select(vanishes, normal, vector_normalize(smooth_));
-    }
-    return patch;
+    return patch_make(triangle_blend(triangle_weights(triangle, ray), a, b, c), normal, size);
+}
+
+// Bends the shading normal between the vertices' own.
+static inline void triangle_smooth(const Triangle *triangle, const TriangleNormals *normals, const Ray *ray,
+                                   Patch *patch)
+{
+    Vector normal = triangle_blend(triangle_weights(triangle, ray), vector_of(normals->a),
+                                   vector_of(normals->b), vector_of(normals->c));
+    mask vanishes = vector_dot(normal, normal) == (real)(0);
+    patch->shading_normal = vector_select(vanishes, patch->normal, vector_normalize(normal));
 }
 
 #endif

@@ -72,9 +72,13 @@ typedef struct {
 
 typedef struct {
     scalar4 a, b, c;
-    scalar4 normal_a, normal_b, normal_c; // unit, where smooth
-    uint4 id;                             // y: 1 where smooth
+    uint4 id; // y: 1 + the index of its TriangleNormals, 0 where it is flat
 } Triangle;
+
+// Apart from the triangle, which is read for each ray that comes near it: these only where one is seen.
+typedef struct {
+    scalar4 a, b, c; // unit
+} TriangleNormals;
 
 // Every shape: its feature, its struct, its name and its array's. Adding one begins here:
 // docs/adding-a-shape.md.

@@ -1,8 +1,9 @@
-// The structs that host and kernels share lie the same way on both sides: their sizes and the places of their members,
-// as the device's compiler has them in float and in double, and their values after the host's narrowing.
+// The structs that host and kernels share lie the same way on both sides: their sizes and the places of their
+// members, as the device's compiler has them in float and in double, and their values after the host's
+// narrowing.
 #include "host/base/fault.h"
 #include "host/opencl/compose.h"
-#include "host/render/flatten.h"
+#include "host/render/hierarchy.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
@@ -11,8 +12,8 @@
 
 #include <cmocka.h>
 
-// Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the member.
-// REALS are scalar4, INTEGERS uint4.
+// Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
+// member. REALS are scalar4, INTEGERS uint4.
 // clang-format off
 #define MEMBER_LIST(REALS, INTEGERS)                                             \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, background)                     \
@@ -20,9 +21,13 @@
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, extent)                         \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[1])                   \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounded_counts[0])           \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounded_counts[1])           \
     REALS(FLAT_FIRST_SHAPE + KIND_SPHERES, Sphere, Sphere, center_radius)        \
     INTEGERS(FLAT_FIRST_SHAPE + KIND_SPHERES, Sphere, Sphere, id)                \
     REALS(FLAT_FIRST_SHAPE + KIND_PLANES, Plane, Plane, point)                   \
@@ -49,15 +54,25 @@
     REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, a)              \
     REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, b)              \
     REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, c)              \
-    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, normal_a)       \
-    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, normal_b)       \
-    REALS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, normal_c)       \
     INTEGERS(FLAT_FIRST_SHAPE + KIND_TRIANGLES, Triangle, Triangle, id)          \
+    REALS(FLAT_FIRST_SHAPE + KIND_TORI, Torus, Torus, center_major)              \
+    REALS(FLAT_FIRST_SHAPE + KIND_TORI, Torus, Torus, axis_minor)                \
+    INTEGERS(FLAT_FIRST_SHAPE + KIND_TORI, Torus, Torus, id)                     \
+    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
+    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, b)            \
+    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
+    REALS(FLAT_NODES, BvhNode, BvhNode, low_0)                                   \
+    REALS(FLAT_NODES, BvhNode, BvhNode, high_0)                                  \
+    REALS(FLAT_NODES, BvhNode, BvhNode, low_1)                                   \
+    REALS(FLAT_NODES, BvhNode, BvhNode, high_1)                                  \
+    INTEGERS(FLAT_NODES, BvhNode, BvhNode, children)                             \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, other_color)                   \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, mirror_glass)                  \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, opacity)                    \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
@@ -72,32 +87,35 @@ typedef struct {
     bool integers;
 } Member;
 
-#define REALS_ENTRY(kind, Type, HostType, member)                                                                  \
+#define REALS_ENTRY(kind, Type, HostType, member)                                                            \
     {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), false},
-#define INTEGERS_ENTRY(kind, Type, HostType, member)                                                               \
+#define INTEGERS_ENTRY(kind, Type, HostType, member)                                                         \
     {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), true},
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY)};
 enum { MEMBER_COUNT = sizeof members / sizeof *members };
 
 // One object of every shape, so that flatten shows every struct's layout.
-static const char scene_text[] =
-    "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
-    "lights: [{point: {position: [1, 2, 3]}}]\n"
-    "objects:\n"
-    "  - sphere: {center: [0, 0, 0], radius: 1}\n"
-    "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
-    "  - disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}\n"
-    "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
-    "  - cylinder: {from: [0, 0, 0], to: [0, 1, 0], radius: 1}\n"
-    "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
-    "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}\n";
+static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
+                                 "lights: [{point: {position: [1, 2, 3]}}]\n"
+                                 "objects:\n"
+                                 "  - sphere: {center: [0, 0, 0], radius: 1}\n"
+                                 "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                                 "  - disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}\n"
+                                 "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
+                                 "  - cylinder: {from: [0, 0, 0], to: [0, 1, 0], radius: 1}\n"
+                                 "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
+                                 "  - torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, minor: 1}\n"
+                                 "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], normals: [[0, "
+                                 "0, 1], [0, 0, 1], [0, 0, 1]]}\n";
 
 static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
 {
     Scene scene = scene_of_text("layout.yaml", scene_text);
     FlatScene flat;
-    const FlattenSettings settings = {.width = 1, .height = 1, .sample_count = 1, .shift_to_eye = true, .wide = wide};
+    const FlattenSettings settings = {
+        .width = 1, .height = 1, .sample_count = 1, .shift_to_eye = true, .wide = wide};
     flatten(&flat, &scene, &settings);
+    hierarchy_hang(&flat);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         assert_true(flat.arrays[kind].count > 0);
         layouts[kind] = flat.arrays[kind].layout;
@@ -106,8 +124,8 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
     scene_free(&scene);
 }
 
-// The test's own kernels behind lanes.h and types.h: what the device thinks of each member, and its value in the second
-// struct of an array.
+// The test's own kernels behind lanes.h and types.h: what the device thinks of each member, and its value in
+// the second struct of an array.
 static void kernels_write(Text *text)
 {
     text_appendf(text, "#include \"lanes.h\"\n#include \"types.h\"\n"
@@ -121,8 +139,9 @@ static void kernels_write(Text *text)
                        "kernel void member(global const uint4 *items, global void *values, uint which)\n{\n"
                        "    switch (which) {\n");
     for (size_t i = 0; i < MEMBER_COUNT; i++)
-        text_appendf(text, "    case %zu: vstore4(((global const %s *)items)[1].%s, 0, (global %s *)values); break;\n", i,
-                     members[i].type, members[i].name, members[i].integers ? "uint" : "scalar");
+        text_appendf(
+            text, "    case %zu: vstore4(((global const %s *)items)[1].%s, 0, (global %s *)values); break;\n",
+            i, members[i].type, members[i].name, members[i].integers ? "uint" : "scalar");
     text_appendf(text, "    }\n}\n");
 }
 
@@ -136,7 +155,8 @@ static cl_program program_make(bool wide)
     Text text = {0};
     kernels_write(&text);
     files[file_count] = (KernelFile){"layout.cl", text_c(&text)};
-    const char *prelude = wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
+    const char *prelude =
+        wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
     char *composed = kernel_compose(files, "layout.cl", prelude, NULL);
     assert_non_null(composed);
     const char *source = composed;
@@ -164,14 +184,17 @@ static void kernel_run(cl_program program, const char *name, void *first, size_t
     kernel_argument(kernel, 2, sizeof number, &number);
     const size_t one = 1;
     kernel_launch(&probe_compute, kernel, 1, &one, &one);
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[0], CL_TRUE, 0, first_size, first, 0, NULL, NULL));
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[1], CL_TRUE, 0, second_size, second, 0, NULL, NULL));
+    cl_must(
+        clEnqueueReadBuffer(probe_compute.queue, buffers[0], CL_TRUE, 0, first_size, first, 0, NULL, NULL));
+    cl_must(
+        clEnqueueReadBuffer(probe_compute.queue, buffers[1], CL_TRUE, 0, second_size, second, 0, NULL, NULL));
     cl_must(clReleaseMemObject(buffers[0]));
     cl_must(clReleaseMemObject(buffers[1]));
     cl_must(clReleaseKernel(kernel));
 }
 
-// Where the rule of types.h puts a member: scalar4 members first, as many bytes as the kernel's four numbers have.
+// Where the rule of types.h puts a member: scalar4 members first, as many bytes as the kernel's four numbers
+// have.
 static size_t member_offset(const Member *member, const FlatLayout *layout, bool wide)
 {
     if (wide) return member->host_offset;
@@ -190,9 +213,11 @@ static void layout_check(bool wide)
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
         const FlatArray one = {NULL, 1, layouts[members[i].kind]};
         size_t size = flat_array_size(&one, wide), offset = member_offset(&members[i], &one.layout, wide);
-        if (sizes[i] != size) fail_msg("sizeof(%s): %u on the device, %zu here", members[i].type, sizes[i], size);
+        if (sizes[i] != size)
+            fail_msg("sizeof(%s): %u on the device, %zu here", members[i].type, sizes[i], size);
         if (offsets[i] != offset)
-            fail_msg("%s.%s: at %u on the device, at %zu here", members[i].type, members[i].name, offsets[i], offset);
+            fail_msg("%s.%s: at %u on the device, at %zu here", members[i].type, members[i].name, offsets[i],
+                     offset);
     }
     cl_must(clReleaseProgram(program));
 }
@@ -240,8 +265,8 @@ static void member_check(cl_program program, size_t index, void *bytes, size_t s
                      : wide                  ? values.wide[k] == real_at(index, k)
                                              : (double)values.narrow[k] == real_at(index, k);
         if (!equal)
-            fail_msg("%s.%s, component %zu: what the host uploaded is not what the device reads", members[index].type,
-                     members[index].name, k);
+            fail_msg("%s.%s, component %zu: what the host uploaded is not what the device reads",
+                     members[index].type, members[index].name, k);
     }
 }
 
@@ -309,8 +334,9 @@ static void values_in_double(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(list_is_complete), cmocka_unit_test(layout_in_float),  cmocka_unit_test(layout_in_double),
-        cmocka_unit_test(values_in_float),  cmocka_unit_test(values_in_double),
+        cmocka_unit_test(list_is_complete), cmocka_unit_test(layout_in_float),
+        cmocka_unit_test(layout_in_double), cmocka_unit_test(values_in_float),
+        cmocka_unit_test(values_in_double),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

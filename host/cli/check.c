@@ -27,7 +27,7 @@ static const char help_text[] =
     "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
 
 typedef struct {
-    size_t shapes[SHAPE_COUNT], unbounded_count;
+    size_t shapes[SHAPE_COUNT], mesh_triangle_count, unbounded_count;
     Bounds bounds;
     FeatureSet features;
 } SceneFacts;
@@ -37,6 +37,8 @@ static SceneFacts facts_of(const Scene *scene)
     SceneFacts facts = {0};
     for (size_t i = 0; i < scene->objects.count; i++)
         facts.shapes[scene->objects.items[i].kind]++;
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        facts.mesh_triangle_count += scene->meshes.items[i].triangle_count;
     facts.bounds = scene_bounds(scene, &facts.unbounded_count);
     facts.features = features_of(scene);
     return facts;
@@ -65,6 +67,7 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf("%s%zu %s", separator, facts->shapes[kind], shape_names[kind]);
         separator = ", ";
     }
+    if (facts->mesh_triangle_count > 0) printf(" (of %zu triangles)", facts->mesh_triangle_count);
     printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count,
            scene->materials.count);
     Vector3 low = facts->bounds.min, high = facts->bounds.max;
@@ -124,6 +127,7 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         for (size_t kind = 0; kind < SHAPE_COUNT; kind++)
             json_integer(json, shape_names[kind], (int64_t)facts.shapes[kind]);
         json_end(json);
+        json_integer(json, "mesh_triangles", (int64_t)facts.mesh_triangle_count);
         json_integer(json, "unbounded", (int64_t)facts.unbounded_count);
         json_integer(json, "lights", (int64_t)scene->lights.count);
         json_integer(json, "materials", (int64_t)scene->materials.count);

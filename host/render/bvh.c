@@ -9,8 +9,17 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <unistd.h>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
-enum { BIN_COUNT = 16, HALVING_DEPTH = BVH_DEPTH_LARGEST - 32, THREAD_RANGE_SMALLEST = 8192 };
+enum {
+    BIN_COUNT = 16,
+    SMALL_RANGE = 32,
+    SMALL_BIN_COUNT = 8,
+    HALVING_DEPTH = BVH_DEPTH_LARGEST - 32,
+    THREAD_RANGE_SMALLEST = 8192
+};
 
 // Costs relative to each other: one step down the tree, one primitive tested.
 static const float step_cost = 1.0f, test_cost = 1.0f;
@@ -18,6 +27,18 @@ static const float step_cost = 1.0f, test_cost = 1.0f;
 typedef float Float4 __attribute__((vector_size(16)));
 typedef int32_t Int4 __attribute__((vector_size(16)));
 
+// gcc makes no minps of a comparison and a choice.
+#ifdef __SSE__
+static inline Float4 float4_min(Float4 a, Float4 b)
+{
+    return _mm_min_ps(a, b);
+}
+
+static inline Float4 float4_max(Float4 a, Float4 b)
+{
+    return _mm_max_ps(a, b);
+}
+#else
 static inline Float4 float4_pick(Int4 take_a, Float4 a, Float4 b)
 {
     return (Float4)((take_a & (Int4)a) | (~take_a & (Int4)b));
@@ -32,6 +53,7 @@ static inline Float4 float4_max(Float4 a, Float4 b)
 {
     return float4_pick(a > b, a, b);
 }
+#endif
 
 typedef struct {
     Float4 low, high;
@@ -86,13 +108,13 @@ typedef struct {
 
 typedef struct {
     Float4 low, scale; // of the centers
+    int bin_count;
 } BinMap;
 
-static inline int bin_of(const BinMap *map, const Reference *reference, int axis)
+// Along each axis.
+static inline Int4 bins_of(const BinMap *map, const Reference *reference)
 {
-    float place = (reference_center(reference)[axis] - map->low[axis]) * map->scale[axis];
-    int bin = (int)place;
-    return bin < 0 ? 0 : bin >= BIN_COUNT ? BIN_COUNT - 1 : bin;
+    return __builtin_convertvector((reference_center(reference) - map->low) * map->scale, Int4);
 }
 
 // The cheapest split of a range between bins of centers, over all axes; cost in primitive tests.
@@ -101,14 +123,15 @@ static Split split_find(const Builder *builder, Range range, const BinMap *map)
     BuildBox boxes[3][BIN_COUNT];
     uint32_t counts[3][BIN_COUNT] = {{0}};
     for (int axis = 0; axis < 3; axis++)
-        for (int bin = 0; bin < BIN_COUNT; bin++)
+        for (int bin = 0; bin < map->bin_count; bin++)
             boxes[axis][bin] = empty_box;
     for (size_t i = range.begin; i < range.end; i++) {
         const Reference *reference = &builder->references[i];
+        Int4 bins = bins_of(map, reference);
         for (int axis = 0; axis < 3; axis++) {
-            int bin = bin_of(map, reference, axis);
-            boxes[axis][bin] = box_join(boxes[axis][bin], reference->box);
-            counts[axis][bin]++;
+            BuildBox *box = &boxes[axis][bins[axis]];
+            *box = box_join(*box, reference->box);
+            counts[axis][bins[axis]]++;
         }
     }
     Split best = {.cost = FLT_MAX};
@@ -118,7 +141,7 @@ static Split split_find(const Builder *builder, Range range, const BinMap *map)
         uint32_t right_counts[BIN_COUNT];
         BuildBox box = empty_box;
         uint32_t count = 0;
-        for (int bin = BIN_COUNT - 1; bin > 0; bin--) {
+        for (int bin = map->bin_count - 1; bin > 0; bin--) {
             box = box_join(box, boxes[axis][bin]);
             count += counts[axis][bin];
             right_areas[bin] = count ? box_half_area(box) : 0;
@@ -126,7 +149,7 @@ static Split split_find(const Builder *builder, Range range, const BinMap *map)
         }
         box = empty_box;
         count = 0;
-        for (int bin = 0; bin + 1 < BIN_COUNT; bin++) {
+        for (int bin = 0; bin + 1 < map->bin_count; bin++) {
             box = box_join(box, boxes[axis][bin]);
             count += counts[axis][bin];
             if (count == 0 || right_counts[bin + 1] == 0) continue;
@@ -143,7 +166,7 @@ static size_t range_partition(Builder *builder, Range range, const BinMap *map, 
     Reference *references = builder->references;
     size_t left = range.begin, right = range.end;
     while (left < right) {
-        if (bin_of(map, &references[left], split->axis) <= split->bin) {
+        if (bins_of(map, &references[left])[split->axis] <= split->bin) {
             left++;
         } else {
             Reference swapped = references[left];
@@ -184,9 +207,9 @@ static size_t range_cut(Builder *builder, Range range, unsigned depth)
         centers = box_join(centers, (BuildBox){center, center});
     }
     Float4 extent = centers.high - centers.low;
-    BinMap map = {.low = centers.low};
+    BinMap map = {.low = centers.low, .bin_count = count < SMALL_RANGE ? SMALL_BIN_COUNT : BIN_COUNT};
     for (int axis = 0; axis < 3; axis++)
-        map.scale[axis] = extent[axis] > FLT_MIN ? BIN_COUNT * (1 - 1e-6f) / extent[axis] : 0;
+        map.scale[axis] = extent[axis] > 0x1p-120f ? (float)map.bin_count * (1 - 1e-6f) / extent[axis] : 0;
 
     bool halve = depth >= HALVING_DEPTH;
     if (!halve && count > 1) {
@@ -252,11 +275,11 @@ static void range_build(Builder *builder, Range range, unsigned depth, BvhChild 
                 &builder->nodes[index]);
 }
 
-static void bvh_box_join(BvhBox *box, const BvhBox *other)
+static inline void bvh_box_join(BvhBox *box, const BvhBox *other)
 {
     for (int axis = 0; axis < 3; axis++) {
-        box->low[axis] = fmin(box->low[axis], other->low[axis]);
-        box->high[axis] = fmax(box->high[axis], other->high[axis]);
+        if (other->low[axis] < box->low[axis]) box->low[axis] = other->low[axis];
+        if (other->high[axis] > box->high[axis]) box->high[axis] = other->high[axis];
     }
 }
 
@@ -283,10 +306,12 @@ static void boxes_fit(Bvh *bvh, const BvhBox *boxes)
 
 static double largest_coordinate(const BvhBox *boxes, size_t count)
 {
-    double largest = 0;
+    BvhBox all = bvh_empty_box;
     for (size_t i = 0; i < count; i++)
-        for (int axis = 0; axis < 3; axis++)
-            largest = fmax(largest, fmax(fabs(boxes[i].low[axis]), fabs(boxes[i].high[axis])));
+        bvh_box_join(&all, &boxes[i]);
+    double largest = 0;
+    for (int axis = 0; axis < 3; axis++)
+        largest = fmax(largest, fmax(-all.low[axis], all.high[axis]));
     return largest;
 }
 

@@ -12,6 +12,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
 #define SHAPE_LAYOUT(feature, Type, name, names) \
     [FLAT_FIRST_SHAPE + KIND_##feature] = {sizeof(Type), offsetof(Type, id) / sizeof(scalar4), 1},
     SHAPE_LIST(SHAPE_LAYOUT)
+    [FLAT_TRIANGLE_NORMALS] = {sizeof(TriangleNormals), sizeof(TriangleNormals) / sizeof(scalar4), 0},
     [FLAT_NODES] = {sizeof(BvhNode), offsetof(BvhNode, children) / sizeof(scalar4), 1},
     [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
     [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 1},
@@ -22,7 +23,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
 static const int kind_of_shape[SHAPE_COUNT] = {
     [SHAPE_SPHERE] = KIND_SPHERES,     [SHAPE_PLANE] = KIND_PLANES,       [SHAPE_DISC] = KIND_DISCS,
     [SHAPE_BOX] = KIND_BOXES,          [SHAPE_CYLINDER] = KIND_CYLINDERS, [SHAPE_CONE] = KIND_CONES,
-    [SHAPE_TRIANGLE] = KIND_TRIANGLES, [SHAPE_TORUS] = KIND_TORI,
+    [SHAPE_TRIANGLE] = KIND_TRIANGLES, [SHAPE_TORUS] = KIND_TORI,         [SHAPE_MESH] = KIND_TRIANGLES,
 };
 
 // What flattening one object needs to know.
@@ -109,6 +110,23 @@ static Revolution revolution_flatten(const Rounding *rounding, Vector3 from, Vec
     };
 }
 
+static bool has_area(Vector3 a, Vector3 b, Vector3 c)
+{
+    return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
+}
+
+// One without area shrinks to a point, which no ray meets: the kernels turn vertices, and what was a line
+// could then have an area. One that loses its area in rounding stays: it fills what its neighbors have left
+// open.
+static Triangle triangle_flatten(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
+{
+    if (!has_area(a, b, c)) b = c = a;
+    return (Triangle){scalar4_of(point_from_eye(rounding, a), 0),
+                      scalar4_of(point_from_eye(rounding, b), 0),
+                      scalar4_of(point_from_eye(rounding, c), 0),
+                      {0}};
+}
+
 static void object_flatten(const Rounding *rounding, const Object *object, const Material *material,
                            void *target)
 {
@@ -152,16 +170,8 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
         if (object->as.cone.only_inside) ((Cone *)target)->id.y |= ONLY_INSIDE;
         break;
     case SHAPE_TRIANGLE: {
-        const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
-        *(Triangle *)target = (Triangle){
-            .a = scalar4_of(point_from_eye(rounding, vertices[0]), 0),
-            .b = scalar4_of(point_from_eye(rounding, vertices[1]), 0),
-            .c = scalar4_of(point_from_eye(rounding, vertices[2]), 0),
-            .normal_a = scalar4_of(vector_normalize(normals[0]), 0),
-            .normal_b = scalar4_of(vector_normalize(normals[1]), 0),
-            .normal_c = scalar4_of(vector_normalize(normals[2]), 0),
-            .id.y = object->as.triangle.smooth,
-        };
+        const Vector3 *vertices = object->as.triangle.vertices;
+        *(Triangle *)target = triangle_flatten(rounding, vertices[0], vertices[1], vertices[2]);
         break;
     }
     case SHAPE_TORUS:
@@ -171,6 +181,7 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
             .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
         };
         break;
+    case SHAPE_MESH:
     case SHAPE_COUNT:
         break;
     }
@@ -202,27 +213,94 @@ uint32_t flat_id(const FlatArray *array, size_t index)
     return *flat_id_at(array, index);
 }
 
-static void objects_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
+// The arrays of shapes on their way.
+typedef struct {
+    FlatScene *flat;
+    const Scene *scene;
+    const Rounding *rounding;
+    size_t counts[KIND_COUNT], normals_count, primitive_count; // so far
+} Filling;
+
+// Where the next primitive of a kind goes. It gets its id by primitive_end.
+static void *primitive_begin(const Filling *filling, int kind)
 {
-    size_t counts[KIND_COUNT] = {0};
-    for (size_t i = 0; i < scene->objects.count; i++)
-        counts[kind_of_shape[scene->objects.items[i].kind]]++;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        flat->arrays[FLAT_FIRST_SHAPE + kind] = flat_array_make(FLAT_FIRST_SHAPE + kind, counts[kind]);
-        counts[kind] = 0;
+    return flat_array_at(&filling->flat->arrays[FLAT_FIRST_SHAPE + kind], filling->counts[kind]);
+}
+
+static void primitive_end(Filling *filling, int kind, uint32_t material)
+{
+    uint32_t id = (uint32_t)filling->primitive_count++, index = (uint32_t)filling->counts[kind]++;
+    *flat_id_at(&filling->flat->arrays[FLAT_FIRST_SHAPE + kind], index) = id;
+    ObjectEntry *entries = filling->flat->arrays[FLAT_OBJECTS].items;
+    entries[id].kind_index_material = (uint4){(uint32_t)kind, index, material, 0};
+}
+
+// What a triangle's id.y holds; a triangle with a vertex without a normal is flat.
+static uint32_t normals_flatten(Filling *filling, Vector3 a, Vector3 b, Vector3 c)
+{
+    if (vector_is_zero(a) || vector_is_zero(b) || vector_is_zero(c)) return 0;
+    TriangleNormals *normals = filling->flat->arrays[FLAT_TRIANGLE_NORMALS].items;
+    normals[filling->normals_count++] =
+        (TriangleNormals){scalar4_of(a, 0), scalar4_of(b, 0), scalar4_of(c, 0)};
+    return (uint32_t)filling->normals_count;
+}
+
+static void mesh_flatten(Filling *filling, const Object *object)
+{
+    const Mesh *mesh = &filling->scene->meshes.items[object->as.mesh.index];
+    const Vector3 *vertices = mesh->vertices, *normals = mesh->normals;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        const uint32_t *corners = mesh->triangles[i];
+        Triangle *triangle = primitive_begin(filling, KIND_TRIANGLES);
+        *triangle = triangle_flatten(filling->rounding, vertices[corners[0]], vertices[corners[1]],
+                                     vertices[corners[2]]);
+        if (normals)
+            triangle->id.y =
+                normals_flatten(filling, normals[corners[0]], normals[corners[1]], normals[corners[2]]);
+        primitive_end(filling, KIND_TRIANGLES, mesh->materials ? mesh->materials[i] : object->material);
     }
-    flat->arrays[FLAT_OBJECTS] = flat_array_make(FLAT_OBJECTS, scene->objects.count);
-    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
+}
+
+static void arrays_make(FlatScene *flat, const Scene *scene)
+{
+    size_t counts[KIND_COUNT] = {0}, normals_count = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        int kind = kind_of_shape[object->kind];
-        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
-        size_t index = counts[kind]++;
-        object_flatten(rounding, object, &scene->materials.items[object->material],
-                       flat_array_at(array, index));
-        *flat_id_at(array, index) = (uint32_t)i;
-        entries[i].kind_index_material = (uint4){(uint32_t)kind, (uint32_t)index, object->material, 0};
+        size_t count = object_primitive_count(scene, object);
+        counts[kind_of_shape[object->kind]] += count;
+        bool smooth = object->kind == SHAPE_MESH
+                          ? scene->meshes.items[object->as.mesh.index].normals != NULL
+                          : object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth;
+        if (smooth) normals_count += count;
     }
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        flat->arrays[FLAT_FIRST_SHAPE + kind] = flat_array_make(FLAT_FIRST_SHAPE + kind, counts[kind]);
+    flat->arrays[FLAT_TRIANGLE_NORMALS] = flat_array_make(FLAT_TRIANGLE_NORMALS, normals_count);
+    flat->arrays[FLAT_OBJECTS] = flat_array_make(FLAT_OBJECTS, scene_primitive_count(scene));
+}
+
+static void objects_flatten(FlatScene *flat, const Scene *scene, const Rounding *rounding)
+{
+    arrays_make(flat, scene);
+    Filling filling = {.flat = flat, .scene = scene, .rounding = rounding};
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        if (object->kind == SHAPE_MESH) {
+            mesh_flatten(&filling, object);
+            continue;
+        }
+        int kind = kind_of_shape[object->kind];
+        void *primitive = primitive_begin(&filling, kind);
+        object_flatten(rounding, object, &scene->materials.items[object->material], primitive);
+        if (object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth) {
+            const Vector3 *normals = object->as.triangle.normals;
+            ((Triangle *)primitive)->id.y =
+                normals_flatten(&filling, vector_normalize(normals[0]), vector_normalize(normals[1]),
+                                vector_normalize(normals[2]));
+        }
+        primitive_end(&filling, kind, object->material);
+    }
+    flat->arrays[FLAT_TRIANGLE_NORMALS].count = filling.normals_count;
 }
 
 static uint4 opacity_of(double transmission)
@@ -315,7 +393,7 @@ void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *setting
     materials_flatten(flat, scene, &rounding);
     lights_flatten(flat, scene, &rounding);
     header_flatten(flat, scene, settings);
-    flat->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, 0);
+    flat->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, 1); // leads nowhere: a kernel may ask it
 }
 
 void flat_scene_free(FlatScene *flat)

@@ -21,8 +21,9 @@ static void box_include(BvhBox *box, Vector3 center, Vector3 reach)
 {
     const double centers[3] = {center.x, center.y, center.z}, reaches[3] = {reach.x, reach.y, reach.z};
     for (int axis = 0; axis < 3; axis++) {
-        box->low[axis] = fmin(box->low[axis], centers[axis] - reaches[axis]);
-        box->high[axis] = fmax(box->high[axis], centers[axis] + reaches[axis]);
+        double low = centers[axis] - reaches[axis], high = centers[axis] + reaches[axis];
+        if (low < box->low[axis]) box->low[axis] = low;
+        if (high > box->high[axis]) box->high[axis] = high;
     }
 }
 
@@ -129,12 +130,26 @@ static uint32_t *order_in_kinds(const Bvh *bvh, const Bounded *bounded)
     return order;
 }
 
-static void primitive_move(FlatScene *flat, FlatArray *target, size_t index, const FlatArray *source,
-                           size_t old_index)
+// Brings what stands at from[i] to i, cycle by cycle in place, which spares a second array; `from` is used
+// up.
+static void array_permute(FlatArray *array, uint32_t *from)
 {
-    memcpy(flat_array_at(target, index), flat_array_at(source, old_index), source->layout.size);
-    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
-    entries[flat_id(target, index)].kind_index_material.y = (uint32_t)index;
+    size_t size = array->layout.size;
+    void *first = memory_allocate(1, size);
+    for (uint32_t i = 0; i < array->count; i++) {
+        if (from[i] == i) continue;
+        memcpy(first, flat_array_at(array, i), size);
+        uint32_t place = i;
+        while (from[place] != i) {
+            uint32_t next = from[place];
+            memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
+            from[place] = place;
+            place = next;
+        }
+        memcpy(flat_array_at(array, place), first, size);
+        from[place] = place;
+    }
+    free(first);
 }
 
 // Moves a shape's primitives into the leaves' order, the unbounded behind them, and tells the objects.
@@ -142,17 +157,18 @@ static void array_reorder(FlatScene *flat, size_t kind, const Bvh *bvh, const Bo
 {
     FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
     if (array->count == 0) return;
-    FlatArray ordered = flat_array_make(FLAT_FIRST_SHAPE + kind, array->count);
-    size_t next = 0;
+    uint32_t *from = memory_allocate(array->count, sizeof *from);
+    size_t count = 0;
     for (size_t i = 0; i < bvh->primitive_count; i++)
-        if (bounded->kinds[bvh->order[i]] == kind)
-            primitive_move(flat, &ordered, next++, array, bounded->places[bvh->order[i]]);
+        if (bounded->kinds[bvh->order[i]] == kind) from[count++] = bounded->places[bvh->order[i]];
     BvhBox box;
+    for (size_t i = 0; count < array->count; i++)
+        if (!primitive_box(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
+    array_permute(array, from);
+    free(from);
+    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < array->count; i++)
-        if (!primitive_box(kind, flat_array_at(array, i), &box))
-            primitive_move(flat, &ordered, next++, array, i);
-    free(array->items);
-    *array = ordered;
+        entries[flat_id(array, i)].kind_index_material.y = (uint32_t)i;
 }
 
 static void child_write(const BvhChild *child, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
@@ -215,6 +231,8 @@ void hierarchy_hang(FlatScene *flat)
     if (bounded.count > 0) {
         Bvh bvh;
         bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
+        free(bounded.boxes);
+        bounded.boxes = NULL;
         nodes_write(flat, &bvh, &bounded);
         for (size_t kind = 0; kind < KIND_COUNT; kind++)
             array_reorder(flat, kind, &bvh, &bounded);

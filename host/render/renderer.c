@@ -5,6 +5,7 @@
 #include "host/render/renderer_state.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double"};
 
@@ -36,6 +37,17 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
     return true;
 }
 
+// The hierarchy counts with 28 bits.
+static bool scene_is_small_enough(const Scene *scene, MessageList *messages)
+{
+    const size_t largest = (size_t)1 << 28;
+    size_t count = scene_primitive_count(scene);
+    if (count <= largest) return true;
+    message_add(messages, MESSAGE_ERROR, "the scene has %zu objects and triangles, more than %zu", count,
+                largest);
+    return false;
+}
+
 static bool array_is_finite(const FlatArray *array, bool wide)
 {
     double largest = wide ? INFINITY : 3.4028234663852886e38;
@@ -61,13 +73,36 @@ static bool scene_fits(const FlatScene *flat, const Renderer *renderer, MessageL
     return true;
 }
 
-static void upload(Renderer *renderer, const FlatScene *flat)
+// Whether the device has room for the arrays, as far as it says.
+static bool device_has_room(const FlatScene *flat, const Renderer *renderer, MessageList *messages)
+{
+    const Device *device = renderer->compute->device;
+    size_t sum = 0, largest = 0;
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        size_t size = flat_array_size(&flat->arrays[kind], renderer->report.wide);
+        sum += size;
+        if (size > largest) largest = size;
+    }
+    if (sum <= device->memory_bytes && largest <= device->largest_buffer_bytes) return true;
+    const double mebi = 1024.0 * 1024.0;
+    message_add(messages, MESSAGE_ERROR,
+                "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
+                "%.1f MiB, and at most %.1f MiB in one buffer",
+                (double)sum / mebi, (double)largest / mebi, device->name, (double)device->memory_bytes / mebi,
+                (double)device->largest_buffer_bytes / mebi);
+    return false;
+}
+
+// Frees each array of the host once the device has it.
+static void upload(Renderer *renderer, FlatScene *flat)
 {
     bool wide = renderer->report.wide;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         size_t size = flat_array_size(&flat->arrays[kind], wide);
         void *bytes = memory_allocate(size + 1, 1);
         flat_array_write(&flat->arrays[kind], wide, bytes);
+        free(flat->arrays[kind].items);
+        flat->arrays[kind].items = NULL;
         renderer->arrays[kind] =
             buffer_create(renderer->compute, size, size > 0 ? bytes : NULL, CL_MEM_READ_ONLY);
         free(bytes);
@@ -97,7 +132,8 @@ static void prelude_write(Renderer *renderer)
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    if (!settings_fit(settings, compute->device, messages)) return NULL;
+    if (!settings_fit(settings, compute->device, messages) || !scene_is_small_enough(scene, messages))
+        return NULL;
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
     renderer->settings = *settings;
@@ -126,6 +162,11 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
         hierarchy_hang(&flat);
         report->features |= FEATURE_BVH;
         report->bvh_seconds = clock_seconds() - start;
+    }
+    if (!device_has_room(&flat, renderer, messages)) {
+        flat_scene_free(&flat);
+        free(renderer);
+        return NULL;
     }
     start = clock_seconds();
     upload(renderer, &flat);
@@ -211,4 +252,11 @@ void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped)
 const RenderReport *renderer_report(const Renderer *renderer)
 {
     return &renderer->report;
+}
+
+void renderer_report_restart(Renderer *renderer)
+{
+    RenderReport *report = &renderer->report;
+    report->launches.count = report->reads.count = 0;
+    memset(report->rays, 0, sizeof report->rays);
 }

@@ -62,7 +62,15 @@ static Bounds triangle_bounds(const Vector3 vertices[3])
                     vector_max(vertices[0], vector_max(vertices[1], vertices[2]))};
 }
 
-static Bounds object_bounds(const Object *object)
+static Bounds mesh_bounds(const Mesh *mesh)
+{
+    Bounds bounds = bounds_empty();
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        bounds = bounds_join(bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+    return bounds;
+}
+
+static Bounds object_bounds(const Scene *scene, const Object *object)
 {
     switch (object->kind) {
     case SHAPE_SPHERE:
@@ -85,6 +93,8 @@ static Bounds object_bounds(const Object *object)
         return (Bounds){vector_subtract(circle.min, (Vector3){minor, minor, minor}),
                         vector_add(circle.max, (Vector3){minor, minor, minor})};
     }
+    case SHAPE_MESH:
+        return mesh_bounds(&scene->meshes.items[object->as.mesh.index]);
     case SHAPE_PLANE:
     case SHAPE_COUNT:
         break;
@@ -99,7 +109,7 @@ Bounds scene_bounds(const Scene *scene, size_t *unbounded_count)
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (object_is_bounded(object))
-            bounds = bounds_join(bounds, object_bounds(object));
+            bounds = bounds_join(bounds, object_bounds(scene, object));
         else
             ++*unbounded_count;
     }

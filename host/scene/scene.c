@@ -1,6 +1,7 @@
 #include "host/scene/scene.h"
 #include "host/base/array.h"
 #include "host/base/text.h"
+#include "host/scene/mesh.h"
 #include "host/scene/scene_build.h"
 
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 const char *const shape_names[SHAPE_COUNT] = {
     [SHAPE_SPHERE] = "sphere",     [SHAPE_PLANE] = "plane",       [SHAPE_DISC] = "disc",
     [SHAPE_BOX] = "box",           [SHAPE_CYLINDER] = "cylinder", [SHAPE_CONE] = "cone",
-    [SHAPE_TRIANGLE] = "triangle", [SHAPE_TORUS] = "torus",
+    [SHAPE_TRIANGLE] = "triangle", [SHAPE_TORUS] = "torus",       [SHAPE_MESH] = "mesh",
 };
 
 Material material_default(void)
@@ -49,6 +50,19 @@ bool scene_finish(Scene *scene, Report *report)
     return true;
 }
 
+size_t object_primitive_count(const Scene *scene, const Object *object)
+{
+    return object->kind == SHAPE_MESH ? scene->meshes.items[object->as.mesh.index].triangle_count : 1;
+}
+
+size_t scene_primitive_count(const Scene *scene)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < scene->objects.count; i++)
+        count += object_primitive_count(scene, &scene->objects.items[i]);
+    return count;
+}
+
 void scene_free(Scene *scene)
 {
     for (size_t i = 0; i < scene->material_names.count; i++)
@@ -57,6 +71,9 @@ void scene_free(Scene *scene)
     free(scene->lights.items);
     free(scene->materials.items);
     free(scene->objects.items);
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        mesh_free(&scene->meshes.items[i]);
+    free(scene->meshes.items);
     *scene = (Scene){0};
 }
 

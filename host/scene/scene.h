@@ -52,6 +52,7 @@ typedef enum {
     SHAPE_CONE,
     SHAPE_TRIANGLE,
     SHAPE_TORUS,
+    SHAPE_MESH,
     SHAPE_COUNT
 } ShapeKind;
 
@@ -101,11 +102,14 @@ typedef struct {
             Vector3 center, axis;
             double major, minor;
         } torus;
+        struct {
+            uint32_t index; // into the scene's meshes
+        } mesh;
     } as;
 } Object;
 
-// Triangles that share vertices. A mesh is one object in the file; each of its triangles has an id of its
-// own.
+// Triangles that share vertices, in world coordinates. A mesh is one object in the file; each of its
+// triangles has an id of its own.
 typedef struct {
     Vector3 *vertices;
     Vector3 *normals; // one for each vertex, unit or zero (flat there), or NULL: flat
@@ -137,7 +141,11 @@ typedef struct {
     struct {
         Object *items;
         size_t count, capacity;
-    } objects; // an object's id is its index here
+    } objects; // an object's id is the number of primitives before it
+    struct {
+        Mesh *items;
+        size_t count, capacity;
+    } meshes;
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own picture size, or 0
 } Scene;
@@ -164,6 +172,10 @@ Material material_default(void);
 typedef struct {
     Vector3 min, max; // min > max: empty
 } Bounds;
+
+// How many ids an object takes: one for each triangle of a mesh, else one.
+size_t object_primitive_count(const Scene *scene, const Object *object);
+size_t scene_primitive_count(const Scene *scene);
 
 // Of all bounded objects; *unbounded_count counts the rest (planes, infinite cylinders and cones).
 Bounds scene_bounds(const Scene *scene, size_t *unbounded_count);

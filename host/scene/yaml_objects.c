@@ -150,8 +150,8 @@ typedef struct {
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
 
-// In the order of ShapeKind.
-static const Shape shapes[SHAPE_COUNT] = {
+// In the order of ShapeKind; a mesh has its own reader.
+static const Shape shapes[SHAPE_MESH] = {
     {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL},
     {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL},
     {{.kind = SHAPE_DISC}, FIELDS(disc_fields), NULL},
@@ -171,6 +171,10 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         kind++;
     if (kind == SHAPE_COUNT) {
         unknown_report(reader, key, "shape", shape_names, SHAPE_COUNT);
+        return;
+    }
+    if (kind == SHAPE_MESH) {
+        yaml_read_mesh(reader, mapping);
         return;
     }
     const Shape *shape = &shapes[kind];

@@ -16,3 +16,4 @@ uint32_t material_default_index(YamlReader *reader);
 void yaml_read_camera(YamlReader *reader, const YamlNode *node);
 void yaml_read_lights(YamlReader *reader, const YamlNode *node);
 void yaml_read_objects(YamlReader *reader, const YamlNode *node);
+void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping); // what stands behind `mesh:`

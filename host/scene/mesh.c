@@ -1,0 +1,142 @@
+#include "host/scene/mesh.h"
+#include "host/base/fault.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void mesh_free(Mesh *mesh)
+{
+    free(mesh->vertices);
+    free(mesh->normals);
+    free(mesh->uvs);
+    free(mesh->triangles);
+    free(mesh->materials);
+    *mesh = (Mesh){0};
+}
+
+// Multiplies by 2^64 over the golden ratio (Knuth, The Art of Computer Programming 3, 6.4) and folds.
+static uint64_t hash_mix(uint64_t hash, double number)
+{
+    double positive_zero = number + 0.0;
+    uint64_t bits;
+    memcpy(&bits, &positive_zero, sizeof bits);
+    hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
+    return hash ^ hash >> 29;
+}
+
+static uint64_t vector_hash(uint64_t hash, Vector3 v)
+{
+    return hash_mix(hash_mix(hash_mix(hash, v.x), v.y), v.z);
+}
+
+static bool vectors_equal(Vector3 a, Vector3 b)
+{
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+static uint64_t vertex_hash(const Mesh *mesh, size_t index)
+{
+    uint64_t hash = vector_hash(0, mesh->vertices[index]);
+    if (mesh->normals) hash = vector_hash(hash, mesh->normals[index]);
+    if (mesh->uvs) hash = hash_mix(hash_mix(hash, mesh->uvs[index][0]), mesh->uvs[index][1]);
+    return hash * 0x9e3779b97f4a7c15u >> 32;
+}
+
+static bool vertices_equal(const Mesh *mesh, size_t a, size_t b)
+{
+    return vectors_equal(mesh->vertices[a], mesh->vertices[b]) &&
+           (!mesh->normals || vectors_equal(mesh->normals[a], mesh->normals[b])) &&
+           (!mesh->uvs || (mesh->uvs[a][0] == mesh->uvs[b][0] && mesh->uvs[a][1] == mesh->uvs[b][1]));
+}
+
+static void vertex_move(Mesh *mesh, size_t to, size_t from)
+{
+    mesh->vertices[to] = mesh->vertices[from];
+    if (mesh->normals) mesh->normals[to] = mesh->normals[from];
+    if (mesh->uvs) memcpy(mesh->uvs[to], mesh->uvs[from], sizeof *mesh->uvs);
+}
+
+// The vertices that stay move forward in place; `joined[i]` becomes where vertex i has gone.
+static size_t vertices_join(Mesh *mesh, uint32_t *joined)
+{
+    const uint32_t none = UINT32_MAX;
+    size_t slot_count = 16;
+    while (slot_count < 2 * mesh->vertex_count)
+        slot_count *= 2;
+    uint32_t *slots = memory_allocate(slot_count, sizeof *slots);
+    memset(slots, 0xff, slot_count * sizeof *slots);
+    size_t kept = 0;
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        size_t slot = vertex_hash(mesh, i) & (slot_count - 1);
+        while (slots[slot] != none && !vertices_equal(mesh, slots[slot], i))
+            slot = (slot + 1) & (slot_count - 1);
+        if (slots[slot] == none) {
+            vertex_move(mesh, kept, i);
+            slots[slot] = (uint32_t)kept++;
+        }
+        joined[i] = slots[slot];
+    }
+    free(slots);
+    return kept;
+}
+
+void mesh_join_vertices(Mesh *mesh)
+{
+    if (mesh->vertex_count == 0) return;
+    uint32_t *joined = memory_allocate(mesh->vertex_count, sizeof *joined);
+    mesh->vertex_count = vertices_join(mesh, joined);
+    for (size_t i = 0; i < mesh->triangle_count; i++)
+        for (int corner = 0; corner < 3; corner++)
+            mesh->triangles[i][corner] = joined[mesh->triangles[i][corner]];
+    free(joined);
+    mesh->vertices = memory_resize(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
+    if (mesh->normals)
+        mesh->normals = memory_resize(mesh->normals, mesh->vertex_count, sizeof *mesh->normals);
+    if (mesh->uvs) mesh->uvs = memory_resize(mesh->uvs, mesh->vertex_count, sizeof *mesh->uvs);
+}
+
+static void corners_of(const Mesh *mesh, size_t triangle, Vector3 corners[3])
+{
+    for (int i = 0; i < 3; i++)
+        corners[i] = mesh->vertices[mesh->triangles[triangle][i]];
+}
+
+static double angle_between(Vector3 a, Vector3 b)
+{
+    return atan2(vector_length(vector_cross(a, b)), vector_dot(a, b));
+}
+
+// Weighted by the angle at the vertex, which makes the normal independent of how a polygon was cut into
+// triangles (Thuermer, Wuethrich, Computing vertex normals from polygonal facets, Journal of Graphics Tools
+// 3(1), 1998).
+void mesh_make_normals(Mesh *mesh)
+{
+    free(mesh->normals);
+    mesh->normals = memory_allocate_zeroed(mesh->vertex_count, sizeof *mesh->normals);
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        Vector3 corners[3];
+        corners_of(mesh, i, corners);
+        Vector3 unit = vector_normalize(
+            vector_cross(vector_subtract(corners[1], corners[0]), vector_subtract(corners[2], corners[0])));
+        for (int corner = 0; corner < 3; corner++) {
+            Vector3 *normal = &mesh->normals[mesh->triangles[i][corner]];
+            double angle = angle_between(vector_subtract(corners[(corner + 1) % 3], corners[corner]),
+                                         vector_subtract(corners[(corner + 2) % 3], corners[corner]));
+            *normal = vector_add(*normal, vector_scale(unit, angle));
+        }
+    }
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        mesh->normals[i] = vector_normalize(mesh->normals[i]);
+}
+
+size_t mesh_degenerate_count(const Mesh *mesh)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        Vector3 corners[3];
+        corners_of(mesh, i, corners);
+        count += vector_is_zero(
+            vector_cross(vector_subtract(corners[1], corners[0]), vector_subtract(corners[2], corners[0])));
+    }
+    return count;
+}

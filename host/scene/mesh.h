@@ -1,0 +1,41 @@
+// Meshes: read from files, placed in the world, their vertices joined and made smooth.
+#pragma once
+
+#include "host/scene/report.h"
+#include "host/scene/scene.h"
+
+// Scaled, then turned about x, y and z in this order, then moved.
+typedef struct {
+    Vector3 translate;
+    Vector3 rotate; // degrees
+    Vector3 scale;  // no component is 0; may be negative
+} MeshTransform;
+
+// Where normals come from: the file if it has some, nowhere, the file or else the triangles around a vertex.
+typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
+
+typedef struct {
+    const char *path; // to open, and in messages
+    MeshTransform transform;
+    MeshSmoothing smoothing;
+    bool own_materials; // the file's materials join the scene's
+} MeshImport;
+
+// Adds the file's triangles to the scene as one more mesh; *index is its place. False, reported at `offset`:
+// the file is no mesh that can be read, or a vertex is not finite, beyond NUMBER_LARGEST or missing.
+bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t offset, uint32_t *index);
+
+void mesh_free(Mesh *mesh); // and zeroes
+
+// Vertices that agree in all their numbers become one; 0 and -0 agree.
+void mesh_join_vertices(Mesh *mesh);
+
+// Gives the vertices normals: of the triangles around them, by angle. Zero where no triangle has an area.
+void mesh_make_normals(Mesh *mesh);
+
+// How many triangles have no area.
+size_t mesh_degenerate_count(const Mesh *mesh);
+
+// What is wrong with an OBJ file's vertices or with a face that names them, as `line N: what`; false where
+// nothing is, or the file cannot be read.
+bool obj_find_fault(const char *path, char *fault, size_t size);

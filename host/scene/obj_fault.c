@@ -1,0 +1,92 @@
+// Where the fault in an OBJ file lies that assimp refused or brought in: assimp names no line, and its
+// vertices are not the file's.
+#include "host/base/text.h"
+#include "host/scene/line.h"
+#include "host/scene/mesh.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+typedef struct {
+    Line line;
+    size_t line_number, vertex_count, all_vertex_count;
+    char *fault;
+    size_t size;
+} Search;
+
+static bool vertex_is_faulty(Search *search)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        Word word = line_word(&search->line);
+        double value;
+        NumberStatus status = number_read(word.text, word.length, &value);
+        if (status == NUMBER_READ) continue;
+        const char *what = word.length == 0             ? "is missing"
+                           : status == NUMBER_TOO_LARGE ? "is too large"
+                                                        : "is not a finite number";
+        snprintf(search->fault, search->size, "line %zu: vertex %zu: '%.*s' for %c %s", search->line_number,
+                 search->vertex_count, word_shown(word), word.text, "xyz"[axis], what);
+        return true;
+    }
+    return false;
+}
+
+// A negative index counts back from the last vertex before the face.
+static bool face_is_faulty(Search *search)
+{
+    for (Word word = line_word(&search->line); word.length > 0; word = line_word(&search->line)) {
+        long long index = strtoll(word.text, NULL, 10);
+        long long counted = index < 0 ? (long long)search->vertex_count + 1 + index : index;
+        if (counted >= 1 && counted <= (long long)search->all_vertex_count) continue;
+        snprintf(search->fault, search->size, "line %zu: a face names vertex '%.*s'; there are %zu",
+                 search->line_number, word_shown(word), word.text, search->all_vertex_count);
+        return true;
+    }
+    return false;
+}
+
+static size_t vertices_count(Line line)
+{
+    size_t count = 0;
+    while (line_next(&line, '#'))
+        count += word_is(line_word(&line), "v");
+    return count;
+}
+
+static bool fault_search(Search *search)
+{
+    search->all_vertex_count = vertices_count(search->line);
+    while (line_next(&search->line, '#')) {
+        search->line_number++;
+        Word keyword = line_word(&search->line);
+        if (word_is(keyword, "v")) {
+            search->vertex_count++;
+            if (vertex_is_faulty(search)) return true;
+        } else if (word_is(keyword, "f") && face_is_faulty(search)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool obj_find_fault(const char *path, char *fault, size_t size)
+{
+    size_t length = strlen(path);
+    if (length < 4 || strcasecmp(path + length - 4, ".obj") != 0) return false;
+    MessageList messages = {0};
+    Text text = {0};
+    bool found = false;
+    if (text_read_file(&text, path, &messages)) {
+        Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+        Report report = report_open(&source, &messages);
+        Search search = {.fault = fault, .size = size};
+        if (line_open(&search.line, &report))
+            found = fault_search(&search);
+        else
+            found = snprintf(fault, size, "not text: a NUL character") > 0;
+    }
+    text_free(&text);
+    message_list_free(&messages);
+    return found;
+}

@@ -1,0 +1,508 @@
+// The hierarchy: what a tree must be for any boxes, that no hit depends on it, and that closed meshes do not
+// leak. GLINT_LONG_TESTS=1 sends a million rays where this sends some ten thousand.
+#include "host/base/array.h"
+#include "host/render/bvh.h"
+#include "host/render/flat_types.h"
+#include "tests/probe.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+// splitmix64 (Steele, Lea, Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
+static uint64_t random_state;
+
+static uint64_t random_bits(void)
+{
+    uint64_t z = random_state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+
+static double random_between(double low, double high)
+{
+    return low + (high - low) * ldexp((double)(random_bits() >> 11), -53);
+}
+
+static Vector3 random_in_cube(double half)
+{
+    double x = random_between(-half, half), y = random_between(-half, half);
+    return (Vector3){x, y, random_between(-half, half)};
+}
+
+static Vector3 random_direction(void)
+{
+    Vector3 v;
+    do
+        v = random_in_cube(1);
+    while (vector_dot(v, v) > 1 || vector_is_zero(v));
+    return vector_normalize(v);
+}
+
+static size_t few_or_many(size_t few, size_t many)
+{
+    const char *long_tests = getenv("GLINT_LONG_TESTS");
+    return long_tests && !strcmp(long_tests, "1") ? many : few;
+}
+
+// The tree
+
+typedef struct {
+    const Bvh *bvh;
+    const BvhBox *boxes;
+    const uint8_t *kinds;
+    uint8_t *seen;
+    unsigned depth;
+} Walk;
+
+static void assert_contains(const BvhBox *outer, const BvhBox *inner)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        assert_true(outer->low[axis] <= inner->low[axis]);
+        assert_true(outer->high[axis] >= inner->high[axis]);
+    }
+}
+
+static void leaf_check(Walk *walk, const BvhChild *leaf)
+{
+    assert_true(leaf->count <= BVH_LEAF_LARGEST);
+    assert_true(leaf->first + leaf->count <= walk->bvh->primitive_count);
+    const uint32_t *order = walk->bvh->order + leaf->first;
+    for (uint32_t i = 0; i < leaf->count; i++) {
+        assert_int_equal(walk->seen[order[i]]++, 0);
+        assert_int_equal(walk->kinds[order[i]], walk->kinds[order[0]]);
+        assert_contains(&leaf->box, &walk->boxes[order[i]]);
+    }
+}
+
+static void node_check(Walk *walk, uint32_t index, unsigned depth)
+{
+    assert_true(index < walk->bvh->node_count);
+    if (depth > walk->depth) walk->depth = depth;
+    for (int side = 0; side < 2; side++) {
+        const BvhChild *child = &walk->bvh->nodes[index].children[side];
+        if (child->box.low[0] > child->box.high[0]) {
+            assert_int_equal(walk->bvh->primitive_count > BVH_LEAF_LARGEST, 0);
+        } else if (child->count > 0) {
+            leaf_check(walk, child);
+        } else {
+            assert_true(child->first > index);
+            for (int k = 0; k < 2; k++)
+                assert_contains(&child->box, &walk->bvh->nodes[child->first].children[k].box);
+            node_check(walk, child->first, depth + 1);
+        }
+    }
+}
+
+// Every primitive in exactly one leaf, leaves of one kind, boxes that hold what is below them, bounded depth.
+static void tree_check(const BvhBox *boxes, const uint8_t *kinds, size_t count)
+{
+    Bvh bvh;
+    bvh_build(&bvh, boxes, kinds, count);
+    Walk walk = {&bvh, boxes, kinds, memory_allocate_zeroed(count, 1), 0};
+    node_check(&walk, 0, 1);
+    for (size_t i = 0; i < count; i++)
+        assert_int_equal(walk.seen[i], 1);
+    assert_true(walk.depth <= BVH_DEPTH_LARGEST);
+    assert_int_equal(walk.depth, bvh.depth);
+    free(walk.seen);
+    bvh_free(&bvh);
+}
+
+static BvhBox box_around(Vector3 center, Vector3 half)
+{
+    return (BvhBox){{center.x - half.x, center.y - half.y, center.z - half.z},
+                    {center.x + half.x, center.y + half.y, center.z + half.z}};
+}
+
+static BvhBox cube_around(Vector3 center, double half)
+{
+    return box_around(center, (Vector3){half, half, half});
+}
+
+enum { IDENTICAL, ONE_CENTER, HUGE_AMONG_TINY, MANY_BINADES, NESTED, ON_A_LINE, FLAT, RANDOM, SET_COUNT };
+
+static BvhBox box_of_set(int set, size_t index, size_t count)
+{
+    const Vector3 nothing = {0, 0, 0};
+    double part = (double)index / (double)count;
+    switch (set) {
+    case IDENTICAL:
+        return cube_around((Vector3){1, 2, 3}, 0.5);
+    case ONE_CENTER:
+        return cube_around(nothing, 1 + part);
+    case HUGE_AMONG_TINY:
+        return index == 0 ? cube_around(nothing, 1e6) : cube_around(random_in_cube(1), 1e-4);
+    case MANY_BINADES: {
+        double size = exp2(random_between(-60, 60));
+        return cube_around(random_in_cube(size), size / 16);
+    }
+    case NESTED: // each beside the next, which is smaller: a split leaves one behind
+        return cube_around((Vector3){exp2(-100 * part), 0, 0}, exp2(-100 * part) / 64);
+    case ON_A_LINE:
+        return cube_around((Vector3){part, 0, 0}, 0);
+    case FLAT:
+        return box_around((Vector3){random_between(-1, 1), 7, random_between(-1, 1)},
+                          (Vector3){0.01, 0, 0.01});
+    default:
+        return cube_around(random_in_cube(10), random_between(0, 0.5));
+    }
+}
+
+static void any_boxes_make_a_tree(void **state)
+{
+    (void)state;
+    static const size_t counts[SET_COUNT] = {65536, 65536, 100001, 50000, 50000, 20000, 20000, 50000};
+    for (int set = 0; set < SET_COUNT; set++) {
+        size_t count = counts[set];
+        BvhBox *boxes = memory_allocate(count, sizeof *boxes);
+        uint8_t *kinds = memory_allocate_zeroed(count, 1);
+        for (size_t i = 0; i < count; i++)
+            boxes[i] = box_of_set(set, i, count);
+        tree_check(boxes, kinds, count);
+        for (size_t i = 0; i < count; i++)
+            kinds[i] = (uint8_t)(random_bits() % KIND_COUNT);
+        tree_check(boxes, kinds, count);
+        free(boxes);
+        free(kinds);
+    }
+}
+
+static void few_boxes_make_a_tree(void **state)
+{
+    (void)state;
+    BvhBox boxes[20];
+    uint8_t kinds[20];
+    for (size_t count = 1; count <= 20; count++) {
+        for (size_t i = 0; i < count; i++) {
+            boxes[i] = cube_around(random_in_cube(1), 0.1);
+            kinds[i] = (uint8_t)(i % 3);
+        }
+        tree_check(boxes, kinds, count);
+    }
+}
+
+// On and off
+
+static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const ProbeRay *rays, size_t count,
+                  ProbeHit *hits)
+{
+    const RenderSettings settings = {.width = 1,
+                                     .height = 1,
+                                     .region_width = 1,
+                                     .region_height = 1,
+                                     .sample_count = 1,
+                                     .precision = precision,
+                                     .bvh = bvh,
+                                     .extra_features = FEATURE_ALL};
+    Renderer *renderer = probe_renderer(scene, &settings);
+    assert_non_null(renderer);
+    renderer_trace(renderer, rays, count, hits);
+    renderer_close(renderer);
+}
+
+static Object random_object(ShapeKind kind, double size)
+{
+    Object object = {.kind = kind};
+    Vector3 center = random_in_cube(10),
+            axis = vector_scale(random_direction(), random_between(0.1, 1) * size);
+    double radius = random_between(0.05, 0.5) * size;
+    bool turned = random_bits() & 1; // else along a coordinate axis
+    if (!turned) axis = (Vector3){0, size, 0};
+    switch (kind) {
+    case SHAPE_SPHERE:
+        object.as.sphere.center = center;
+        object.as.sphere.radius = radius;
+        break;
+    case SHAPE_PLANE:
+        object.as.plane.point = (Vector3){0, -14, 0};
+        object.as.plane.normal = axis;
+        break;
+    case SHAPE_DISC:
+        object.as.disc.center = center;
+        object.as.disc.normal = axis;
+        object.as.disc.radius = radius;
+        break;
+    case SHAPE_BOX:
+        object.as.box.min = center;
+        object.as.box.max = vector_add(center, (Vector3){radius, fabs(axis.y), turned ? radius : 0});
+        break;
+    case SHAPE_CYLINDER:
+        object.as.cylinder.from = center;
+        object.as.cylinder.axis = axis;
+        object.as.cylinder.radius = radius;
+        object.as.cylinder.finite = true;
+        object.as.cylinder.caps = random_bits() & 1;
+        break;
+    case SHAPE_CONE:
+        object.as.cone.from = center;
+        object.as.cone.axis = axis;
+        object.as.cone.radius[0] = radius;
+        object.as.cone.radius[1] = random_bits() & 1 ? radius / 3 : 0;
+        object.as.cone.finite = true;
+        object.as.cone.caps = random_bits() & 1;
+        break;
+    case SHAPE_TORUS:
+        object.as.torus.center = center;
+        object.as.torus.axis = axis;
+        object.as.torus.major = radius;
+        object.as.torus.minor = radius / random_between(1.5, 8);
+        break;
+    default:
+        for (int corner = 0; corner < 3; corner++)
+            object.as.triangle.vertices[corner] = vector_add(center, random_in_cube(size));
+    }
+    return object;
+}
+
+// Every shape, mostly small ones, and a few without end.
+static Scene random_scene(size_t count)
+{
+    static const ShapeKind kinds[] = {SHAPE_SPHERE, SHAPE_DISC,     SHAPE_BOX,     SHAPE_CYLINDER,
+                                      SHAPE_CONE,   SHAPE_TRIANGLE, SHAPE_TRIANGLE};
+    Scene scene = {0};
+    array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
+    for (size_t i = 0; i < count; i++) {
+        double size = exp2(random_between(-5, 0));
+        ShapeKind kind = i % 16 == 15 ? SHAPE_TORUS : kinds[i % (sizeof kinds / sizeof *kinds)];
+        array_push(scene.objects, random_object(kind, size));
+    }
+    array_push(scene.objects, random_object(SHAPE_PLANE, 1));
+    return scene;
+}
+
+// A point where rounding matters: a vertex, an edge's point, a center, a corner of a box, a rim's.
+static Vector3 telling_point(const Scene *scene)
+{
+    const Object *object = &scene->objects.items[random_bits() % scene->objects.count];
+    double part = random_between(0, 1);
+    switch (object->kind) {
+    case SHAPE_SPHERE:
+        return vector_add(object->as.sphere.center, (Vector3){object->as.sphere.radius, 0, 0});
+    case SHAPE_BOX:
+        return random_bits() & 1
+                   ? object->as.box.min
+                   : (Vector3){object->as.box.max.x, object->as.box.min.y, object->as.box.max.z};
+    case SHAPE_TRIANGLE: {
+        Vector3 a = object->as.triangle.vertices[0], b = object->as.triangle.vertices[1];
+        if (random_bits() & 1) return a;
+        return vector_add(a, vector_scale(vector_subtract(b, a), part));
+    }
+    case SHAPE_DISC:
+        return vector_add(object->as.disc.center, (Vector3){0, 0, object->as.disc.radius});
+    case SHAPE_CYLINDER:
+        return vector_add(object->as.cylinder.from, vector_scale(object->as.cylinder.axis, part));
+    case SHAPE_CONE:
+        return vector_add(object->as.cone.from, object->as.cone.axis);
+    case SHAPE_TORUS:
+        return vector_add(object->as.torus.center,
+                          (Vector3){object->as.torus.major + object->as.torus.minor, 0, 0});
+    default:
+        return random_in_cube(10);
+    }
+}
+
+static ProbeRay ray_of(Vector3 origin, Vector3 direction)
+{
+    return (ProbeRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+}
+
+// A quarter each: any, along an axis with components of exactly 0 or -0, at a telling point, from far away.
+static void rays_fill(ProbeRay *rays, size_t count, const Scene *scene)
+{
+    for (size_t i = 0; i < count; i++) {
+        Vector3 target = random_bits() & 1 ? telling_point(scene) : random_in_cube(10);
+        Vector3 origin = random_in_cube(12), direction = vector_subtract(target, origin);
+        if (i % 4 == 1) {
+            double axes[3] = {0, -0.0, 0}, from[3] = {target.x, target.y, target.z};
+            uint64_t axis = random_bits() % 3;
+            axes[axis] = random_bits() & 1 ? 1 : -1;
+            from[axis] = -12 * axes[axis];
+            rays[i] = ray_of((Vector3){from[0], from[1], from[2]}, (Vector3){axes[0], axes[1], axes[2]});
+            continue;
+        }
+        if (i % 4 == 2) direction = vector_subtract(telling_point(scene), origin);
+        if (i % 4 == 3) {
+            origin = vector_scale(random_direction(), exp2(random_between(5, 20)));
+            direction = vector_subtract(target, origin);
+        }
+        rays[i] = ray_of(origin, vector_scale(direction, exp2(random_between(-3, 3))));
+    }
+}
+
+static void no_hit_depends_on_the_tree(void **state)
+{
+    (void)state;
+    static const struct {
+        Precision precision;
+        size_t few, many;
+    } runs[] = {{PRECISION_SINGLE, 60000, 1000000},
+                {PRECISION_STRICT, 20000, 200000},
+                {PRECISION_DOUBLE, 20000, 200000}};
+    random_state = 1;
+    Scene scene = random_scene(few_or_many(1000, 10000));
+    size_t most = few_or_many(runs[0].few, runs[0].many);
+    ProbeRay *rays = memory_allocate(most, sizeof *rays);
+    ProbeHit *on = memory_allocate(most, sizeof *on), *off = memory_allocate(most, sizeof *off);
+    rays_fill(rays, most, &scene);
+    for (size_t run = 0; run < sizeof runs / sizeof *runs; run++) {
+        if (!probe_has(runs[run].precision)) continue;
+        size_t count = few_or_many(runs[run].few, runs[run].many), hit_count = 0, different = 0;
+        trace(&scene, runs[run].precision, BVH_ON, rays, count, on);
+        trace(&scene, runs[run].precision, BVH_OFF, rays, count, off);
+        for (size_t i = 0; i < count; i++) {
+            bool same = on[i].object == off[i].object &&
+                        (off[i].object == UINT32_MAX || memcmp(&on[i].t, &off[i].t, sizeof on[i].t) == 0);
+            hit_count += off[i].object != UINT32_MAX;
+            if (same || different++ >= 10) continue;
+            const ProbeRay *ray = &rays[i];
+            print_error(
+                "%s, ray %zu from %.9g %.9g %.9g along %.9g %.9g %.9g: object %d at %.17g with the tree, "
+                "%d (a %s) at %.17g without\n",
+                precision_names[runs[run].precision], i, ray->origin[0], ray->origin[1], ray->origin[2],
+                ray->direction[0], ray->direction[1], ray->direction[2], (int)on[i].object, on[i].t,
+                (int)off[i].object,
+                off[i].object == UINT32_MAX ? "miss" : shape_names[scene.objects.items[off[i].object].kind],
+                off[i].t);
+        }
+        assert_int_equal(different, 0);
+        assert_true(hit_count > count / 3);
+    }
+    free(rays);
+    free(on);
+    free(off);
+    scene_free(&scene);
+}
+
+// Closed meshes
+
+enum { LEVELS = 5, CLOSED_TRIANGLES = 20 << (2 * LEVELS), CLOSED_VERTICES = CLOSED_TRIANGLES / 2 + 2 };
+
+static uint32_t vertex_between(Mesh *mesh, uint32_t (*middles)[2], uint32_t a, uint32_t b)
+{
+    // each edge's middle is asked for twice, with its ends the other way round
+    uint32_t low = a < b ? a : b, high = a < b ? b : a, slot = (low * 73856093u ^ high * 19349663u) & 0xffff;
+    for (; middles[slot][1] != 0; slot = (slot + 1) & 0xffff) {
+        Vector3 middle = vector_normalize(vector_add(mesh->vertices[low], mesh->vertices[high]));
+        Vector3 known = mesh->vertices[middles[slot][1]];
+        if (middles[slot][0] == low && known.x == middle.x && known.y == middle.y && known.z == middle.z)
+            return middles[slot][1];
+    }
+    uint32_t index = (uint32_t)mesh->vertex_count++;
+    mesh->vertices[index] = vector_normalize(vector_add(mesh->vertices[low], mesh->vertices[high]));
+    middles[slot][0] = low;
+    middles[slot][1] = index;
+    return index;
+}
+
+static void mesh_subdivide(Mesh *mesh)
+{
+    uint32_t(*middles)[2] = memory_allocate_zeroed(1 << 16, sizeof *middles);
+    size_t count = mesh->triangle_count;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t a = mesh->triangles[i][0], b = mesh->triangles[i][1], c = mesh->triangles[i][2];
+        uint32_t ab = vertex_between(mesh, middles, a, b), bc = vertex_between(mesh, middles, b, c),
+                 ca = vertex_between(mesh, middles, c, a);
+        const uint32_t parts[4][3] = {{ab, bc, ca}, {a, ab, ca}, {b, bc, ab}, {c, ca, bc}};
+        memcpy(mesh->triangles[i], parts[0], sizeof parts[0]);
+        memcpy(mesh->triangles[mesh->triangle_count], parts[1], 3 * sizeof parts[0]);
+        mesh->triangle_count += 3;
+    }
+    free(middles);
+}
+
+// An icosahedron cut four times each way, its vertices' radii changed by up to a fifth.
+static Scene closed_scene(Vector3 center, double radius)
+{
+    const double g = (1 + sqrt(5)) / 2;
+    static const uint32_t faces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                          {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                          {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                          {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+    const Vector3 corners[12] = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                                 {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+    Mesh mesh = {
+        .vertices = memory_allocate(CLOSED_VERTICES, sizeof *mesh.vertices),
+        .triangles = memory_allocate(CLOSED_TRIANGLES, sizeof *mesh.triangles),
+        .vertex_count = 12,
+        .triangle_count = 20,
+    };
+    for (int i = 0; i < 12; i++)
+        mesh.vertices[i] = vector_normalize(corners[i]);
+    memcpy(mesh.triangles, faces, sizeof faces);
+    for (int level = 0; level < LEVELS; level++)
+        mesh_subdivide(&mesh);
+    assert_int_equal(mesh.triangle_count, CLOSED_TRIANGLES);
+    assert_int_equal(mesh.vertex_count, CLOSED_VERTICES);
+    for (size_t i = 0; i < CLOSED_VERTICES; i++)
+        mesh.vertices[i] =
+            vector_add(center, vector_scale(mesh.vertices[i], radius * random_between(0.8, 1.2)));
+    Scene scene = {0};
+    array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
+    array_push(scene.meshes, mesh);
+    array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+    return scene;
+}
+
+// From inside, two fifths each at vertices and at edges, as the kernel's precision has them.
+static void rays_at_seams(ProbeRay *rays, size_t count, const Mesh *mesh, Vector3 center, bool wide)
+{
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t *corners = mesh->triangles[random_bits() % mesh->triangle_count];
+        Vector3 a = mesh->vertices[corners[0]], b = mesh->vertices[corners[1]];
+        Vector3 origin = vector_add(center, random_in_cube(0.15));
+        if (!wide) {
+            a = (Vector3){(float)a.x, (float)a.y, (float)a.z};
+            b = (Vector3){(float)b.x, (float)b.y, (float)b.z};
+            origin = (Vector3){(float)origin.x, (float)origin.y, (float)origin.z};
+        }
+        Vector3 target = a;
+        if (i % 5 > 1) target = vector_add(a, vector_scale(vector_subtract(b, a), random_between(0, 1)));
+        Vector3 direction = i % 5 == 4 ? random_direction() : vector_subtract(target, origin);
+        rays[i] = ray_of(origin, direction);
+    }
+}
+
+static void closed_meshes_do_not_leak(void **state)
+{
+    (void)state;
+    static const Vector3 centers[] = {{0, 0, 0}, {148376, 1234, -223423}};
+    static const double radii[] = {1, 2};
+    random_state = 31;
+    size_t count = few_or_many(6000, 1000000), plain_count = few_or_many(320, 20000);
+    ProbeRay *rays = memory_allocate(count, sizeof *rays);
+    ProbeHit *hits = memory_allocate(count, sizeof *hits);
+    for (size_t place = 0; place < 2; place++) {
+        Scene scene = closed_scene(centers[place], radii[place]);
+        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+            if (!probe_has(precision)) continue;
+            rays_at_seams(rays, count, &scene.meshes.items[0], centers[place], precision == PRECISION_DOUBLE);
+            for (BvhChoice bvh = BVH_ON; bvh <= BVH_OFF; bvh++) {
+                size_t ray_count = bvh == BVH_ON ? count : plain_count, miss_count = 0;
+                trace(&scene, precision, bvh, rays, ray_count, hits);
+                for (size_t i = 0; i < ray_count; i++)
+                    miss_count += hits[i].object == UINT32_MAX;
+                if (miss_count > 0)
+                    fail_msg("%zu of %zu rays leak at %s, tree %s, mesh %zu", miss_count, ray_count,
+                             precision_names[precision], bvh_choice_names[bvh], place);
+            }
+        }
+        scene_free(&scene);
+    }
+    free(rays);
+    free(hits);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(any_boxes_make_a_tree),
+        cmocka_unit_test(few_boxes_make_a_tree),
+        cmocka_unit_test(no_hit_depends_on_the_tree),
+        cmocka_unit_test(closed_meshes_do_not_leak),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}

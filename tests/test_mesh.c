@@ -1,0 +1,377 @@
+// Meshes: what a file's triangles become, where they stand, what is refused, and which ids they get.
+#include "host/render/flatten.h"
+#include "host/scene/mesh.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#define CAMERA_AND_LIGHT                                                                                     \
+    "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"                                                   \
+    "lights: [{point: {position: [0, 0, -5]}}]\n"
+
+static char folder[] = "/tmp/glint-mesh-XXXXXX";
+
+static int folder_open(void **state)
+{
+    return mkdtemp(folder) && chdir(folder) == 0 ? probe_open(state) : -1;
+}
+
+static int folder_close(void **state)
+{
+    static const char *const names[] = {"a.obj", "a.mtl", "a.ply", "a.stl", "a.gltf"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        unlink(names[i]);
+    probe_close(state);
+    return chdir("/") == 0 ? rmdir(folder) : -1;
+}
+
+static void file_write(const char *name, const char *text)
+{
+    FILE *file = fopen(name, "w");
+    assert_non_null(file);
+    assert_true(fputs(text, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
+// A scene whose only objects are `objects`, one a line.
+static Scene scene_of_objects(const char *objects)
+{
+    Text text = {0};
+    text_appendf(&text, CAMERA_AND_LIGHT "objects:\n%s", objects);
+    Scene scene = scene_of_text("scene.yaml", text_c(&text));
+    text_free(&text);
+    return scene;
+}
+
+static const char square[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+
+static void vertices_are_joined(void **state)
+{
+    (void)state;
+    file_write("a.obj", square);
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    assert_int_equal(scene.objects.count, 1);
+    assert_int_equal(scene.meshes.count, 1);
+    const Mesh *mesh = &scene.meshes.items[0];
+    assert_int_equal(mesh->vertex_count, 4);
+    assert_int_equal(mesh->triangle_count, 2);
+    assert_null(mesh->normals);
+    assert_int_equal(scene_primitive_count(&scene), 2);
+    size_t unbounded_count;
+    Bounds bounds = scene_bounds(&scene, &unbounded_count);
+    assert_vector(bounds.min, 0, 0, 0);
+    assert_vector(bounds.max, 1, 1, 0);
+    scene_free(&scene);
+}
+
+static Vector3 only_corner(const Scene *scene, int corner)
+{
+    const Mesh *mesh = &scene->meshes.items[0];
+    return mesh->vertices[mesh->triangles[0][corner]];
+}
+
+static void transforms_scale_then_turn_then_move(void **state)
+{
+    (void)state;
+    file_write("a.obj", "v 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
+    Scene scene =
+        scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [2, 3, 4], rotate: [90, 0, 90], "
+                         "translate: [10, 20, 30]}}\n");
+    assert_vector(only_corner(&scene, 0), 10, 22, 30);
+    assert_vector(only_corner(&scene, 1), 10, 20, 33);
+    assert_vector(only_corner(&scene, 2), 14, 20, 30);
+    scene_free(&scene);
+}
+
+// The outer side is where the corners are seen counterclockwise; a mirror keeps it outside.
+static void mirrored_mesh_keeps_its_outer_side(void **state)
+{
+    (void)state;
+    file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [-1, 1, 1]}}\n");
+    Vector3 a = only_corner(&scene, 0), b = only_corner(&scene, 1), c = only_corner(&scene, 2);
+    Vector3 normal = vector_cross(vector_subtract(b, a), vector_subtract(c, a));
+    assert_vector(normal, 0, 0, 1);
+    scene_free(&scene);
+}
+
+static const char octahedron[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
+                                 "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
+
+static void normals_come_from_the_triangles(void **state)
+{
+    (void)state;
+    file_write("a.obj", octahedron);
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true, transform: {scale: [3, 3, -3]}}\n");
+    const Mesh *mesh = &scene.meshes.items[0];
+    assert_int_equal(mesh->vertex_count, 6);
+    assert_non_null(mesh->normals);
+    for (size_t i = 0; i < 6; i++) {
+        Vector3 outward = vector_scale(mesh->vertices[i], 1 / 3.0);
+        assert_vector(mesh->normals[i], outward.x, outward.y, outward.z);
+    }
+    scene_free(&scene);
+}
+
+// Four corners of one square, whose two triangles have as much of a say as the others' one.
+static void normals_do_not_see_the_cut_of_a_polygon(void **state)
+{
+    (void)state;
+    file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 4 3 2\nf 1 2 5\nf 1 5 4\n");
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true}\n");
+    const Mesh *mesh = &scene.meshes.items[0];
+    double third = -1 / sqrt(3);
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        if (vector_is_zero(mesh->vertices[i])) assert_vector(mesh->normals[i], third, third, third);
+    scene_free(&scene);
+}
+
+static void normals_of_the_file_are_taken(void **state)
+{
+    (void)state;
+    file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 3 4\nf 1//1 2//1 3//1\n");
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [1, 2, 1]}}\n");
+    assert_non_null(scene.meshes.items[0].normals);
+    Vector3 normal = scene.meshes.items[0].normals[0]; // along (0, 3 / 2, 4)
+    assert_true(fabs(normal.y * 8 - normal.z * 3) < 1e-7);
+    assert_true(fabs(vector_length(normal) - 1) < 1e-7);
+    scene_free(&scene);
+    scene = scene_of_objects("  - mesh: {file: a.obj, smooth: false}\n");
+    assert_null(scene.meshes.items[0].normals);
+    scene_free(&scene);
+}
+
+static const Material *material_of_triangle(const Scene *scene, size_t triangle)
+{
+    return &scene->materials.items[scene->meshes.items[0].materials[triangle]];
+}
+
+static void materials_come_from_the_file(void **state)
+{
+    (void)state;
+    file_write(
+        "a.mtl",
+        "newmtl red\nKd 0.75 0.25 0\nKs 0.5 0.5 0.5\nNs 40\nillum 2\nnewmtl glass\nKd 0 0 0\nd 0.25\n");
+    file_write("a.obj",
+               "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl glass\nf 1 3 2\n");
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    assert_int_equal(scene.meshes.items[0].triangle_count, 2);
+    const Material *red = material_of_triangle(&scene, 0), *glass = material_of_triangle(&scene, 1);
+    assert_vector(red->color, 0.75, 0.25, 0);
+    assert_number(red->specular, 0.5);
+    assert_number(red->shininess, 40);
+    assert_number(red->transmission, 0);
+    assert_number(glass->transmission, 0.75);
+    scene_free(&scene);
+
+    scene = scene_of_objects("  - mesh: {file: a.obj, material: {color: [0, 0, 1]}}\n");
+    assert_null(scene.meshes.items[0].materials);
+    assert_vector(scene.materials.items[scene.objects.items[0].material].color, 0, 0, 1);
+    scene_free(&scene);
+}
+
+static void material_is_white_where_the_file_has_none(void **state)
+{
+    (void)state;
+    file_write("a.obj", square);
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    assert_vector(material_of_triangle(&scene, 0)->color, 1, 1, 1);
+    scene_free(&scene);
+}
+
+#define PLY_OF(y, index)                                                                                     \
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"        \
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 " y                 \
+    " 0\n3 0 1 " index "\n"
+#define STL_OF(y)                                                                                            \
+    "solid part\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 " y                    \
+    " 0\nendloop\nendfacet\nendsolid part\n"
+
+// One triangle, moved by its node.
+static const char gltf[] =
+    "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}],\n"
+    "\"nodes\": [{\"children\": [1], \"translation\": [1, 2, 3]}, {\"mesh\": 0, \"scale\": [2, 2, 2]}],\n"
+    "\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}],\n"
+    "\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\",\n"
+    "\"min\": [0, 0, 0], \"max\": [1, 1, 0]}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36}],\n"
+    "\"buffers\": [{\"byteLength\": 36, \"uri\": \"data:application/octet-stream;base64,"
+    "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}\n";
+
+static void every_format_is_read(void **state)
+{
+    (void)state;
+    file_write("a.ply", PLY_OF("1", "2"));
+    file_write("a.stl", STL_OF("1"));
+    file_write("a.gltf", gltf);
+    Scene scene =
+        scene_of_objects("  - mesh: {file: a.ply}\n  - mesh: {file: a.stl}\n  - mesh: {file: a.gltf}\n");
+    assert_int_equal(scene.meshes.count, 3);
+    for (size_t i = 0; i < 3; i++) {
+        const Mesh *mesh = &scene.meshes.items[i];
+        assert_int_equal(mesh->triangle_count, 1);
+        Vector3 b = mesh->vertices[mesh->triangles[0][1]], c = mesh->vertices[mesh->triangles[0][2]];
+        if (i < 2) {
+            assert_vector(b, 1, 0, 0);
+            assert_vector(c, 0, 1, 0);
+        } else {
+            assert_vector(b, 3, 2, 3);
+            assert_vector(c, 1, 4, 3);
+        }
+    }
+    scene_free(&scene);
+}
+
+static void faults_name_file_and_vertex(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *text, *message;
+    } cases[] = {
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n",
+         "a.obj: line 3: vertex 3: 'nan' for y is not a finite number"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 0 -inf\nf 1 2 3\n",
+         "a.obj: line 3: vertex 3: '-inf' for z is not a finite number"},
+        {"a.obj", "v 0 0 0\nv 1e35 0 0\nv 0 1 0\nf 1 2 3\n",
+         "a.obj: line 2: vertex 2: '1e35' for x is too large"},
+        {"a.obj", "v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 3\n", "a.obj: line 2: vertex 2: '' for z is missing"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
+         "a.obj: line 4: a face names vertex '4'; there are 3"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n",
+         "a.obj: line 4: a face names vertex '0'; there are 3"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 2 3\n",
+         "a.obj: line 4: a face names vertex '-4'; there are 3"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "a.obj: no triangles"},
+        {"a.ply", PLY_OF("nan", "2"), "a.ply: vertex 2 (from 0) of '' is not finite or too large"},
+        {"a.ply", PLY_OF("1", "7"), "a.ply: triangle 0 (from 0) names vertex 7, which is not there"},
+        {"a.stl", STL_OF("inf"), "a.stl: vertex 2 (from 0) of 'part' is not finite or too large"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        file_write(cases[i].name, cases[i].text);
+        Text scene = {0}, expected = {0};
+        text_appendf(&scene, CAMERA_AND_LIGHT "objects:\n  - mesh: {file: %s}\n", cases[i].name);
+        text_appendf(&expected, "4:18: error: %s\n", cases[i].message);
+        assert_messages("scene.yaml", text_c(&scene), text_c(&expected));
+        text_free(&scene);
+        text_free(&expected);
+    }
+}
+
+static void scene_file_is_told_what_is_wrong(void **state)
+{
+    (void)state;
+    file_write("a.obj", square);
+#define REFUSED(mesh, expected)                                                                              \
+    assert_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: " mesh "\n", expected)
+    REFUSED("{file: none.obj}", "4:18: error: none.obj: No such file or directory\n");
+    REFUSED("{file: .obj/}", "4:18: error: .obj/: a mesh's name ends in .obj, .ply, .stl, .gltf or .glb\n");
+    REFUSED("{file: [1]}", "4:18: error: 'file' must be the name of a file, not a list of 1\n");
+    REFUSED("{smooth: true}", "4:11: error: mesh lacks 'file'\n");
+    REFUSED("{file: a.obj, smooth: 1}", "4:33: error: 'smooth' must be true or false, not '1'\n");
+    REFUSED("{file: a.obj, transform: {scale: [1, 0, 1]}}", "4:44: error: 'scale' must not be zero\n");
+    REFUSED("{file: a.obj, transform: {rotate: 90}}",
+            "4:45: error: 'rotate' must be three numbers, not '90'\n");
+    REFUSED("{file: a.obj, transform: {turn: 90}}", "4:37: error: unknown transform key 'turn'\n");
+}
+
+static void ids_count_the_triangles(void **state)
+{
+    (void)state;
+    file_write("a.obj", octahedron);
+    Scene scene = scene_of_objects("  - sphere: {center: [9, 0, 0], radius: 1}\n"
+                                   "  - mesh: {file: a.obj}\n"
+                                   "  - triangle: {vertices: [[0, 0, 5], [1, 0, 5], [0, 1, 5]]}\n"
+                                   "  - sphere: {center: [-9, 0, 0], radius: 1}\n");
+    FlatScene flat;
+    flatten(&flat, &scene, &(FlattenSettings){.width = 1, .height = 1, .sample_count = 1});
+    assert_int_equal(flat.arrays[FLAT_OBJECTS].count, 11);
+    const ObjectEntry *entries = flat.arrays[FLAT_OBJECTS].items;
+    for (uint32_t id = 0; id < 11; id++) {
+        uint4 entry = entries[id].kind_index_material;
+        assert_int_equal(entry.x, id == 0 || id == 10 ? KIND_SPHERES : KIND_TRIANGLES);
+        assert_int_equal(flat_id(&flat.arrays[FLAT_FIRST_SHAPE + entry.x], entry.y), id);
+    }
+    flat_scene_free(&flat);
+    scene_free(&scene);
+}
+
+enum { GRID = 64 };
+
+// Down on the unit square, from a little outside of it too, every other ray through a point of the line from
+// (0.1, 0.1, 1) to (0.7, 0.7, 1).
+static void rays_down(ProbeRay *rays)
+{
+    for (size_t i = 0; i < GRID * GRID; i++) {
+        double x = (double)(i % GRID) / 50 - 0.125, y = (double)(i / GRID) / 50 - 0.125;
+        double along = 0.1 + 0.6 * (double)i / (GRID * GRID);
+        rays[i] = (ProbeRay){{x, y, 4}, {0.0625, 0.03125, -1}, 0, INFINITY};
+        if (i % 2 == 1) memcpy(rays[i].direction, (double[3]){along - x, along - y, -3}, sizeof(double[3]));
+    }
+}
+
+// A repeated corner, three corners in a line and a needle lie among the square's triangles.
+static void triangles_without_area_are_never_hit(void **state)
+{
+    (void)state;
+    static ProbeRay rays[GRID * GRID];
+    static ProbeHit clean[GRID * GRID], hits[GRID * GRID];
+    rays_down(rays);
+    const char *objects = "  - mesh: {file: a.obj, material: {}}\n";
+    static const char degenerate[] = "v 0.1 0.1 1\nv 0.7 0.7 1\nv 0.4 0.4 1\nv 0.25 0.25 1\n"
+                                     "f 5 6 5\nf 5 6 7\nf 5 8 6\nf 5 5 5\n";
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        if (!probe_has(precision)) continue;
+        file_write("a.obj", square);
+        Scene scene = scene_of_objects(objects);
+        assert_true(probe_trace(&scene, precision, 0, rays, GRID * GRID, clean));
+        scene_free(&scene);
+
+        Text text = {0};
+        text_appendf(&text, "%s%s", square, degenerate);
+        file_write("a.obj", text_c(&text));
+        text_free(&text);
+        MessageList messages = {0};
+        Text source = {0};
+        text_appendf(&source, CAMERA_AND_LIGHT "objects:\n%s", objects);
+        assert_true(scene_read_text(&scene, "scene.yaml", &source, false, &messages));
+        text_free(&source);
+        assert_int_equal(messages.count, 1);
+        assert_non_null(strstr(messages.items[0].text, "a.obj: triangles without area"));
+        message_list_free(&messages);
+        assert_true(probe_trace(&scene, precision, 0, rays, GRID * GRID, hits));
+        scene_free(&scene);
+
+        size_t hit_count = 0;
+        for (size_t i = 0; i < GRID * GRID; i++) {
+            assert_int_equal(hits[i].object, clean[i].object);
+            if (clean[i].object == UINT32_MAX) continue;
+            hit_count++;
+            assert_true(hits[i].t == clean[i].t);
+        }
+        assert_true(hit_count > 1000);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(vertices_are_joined),
+        cmocka_unit_test(transforms_scale_then_turn_then_move),
+        cmocka_unit_test(mirrored_mesh_keeps_its_outer_side),
+        cmocka_unit_test(normals_come_from_the_triangles),
+        cmocka_unit_test(normals_do_not_see_the_cut_of_a_polygon),
+        cmocka_unit_test(normals_of_the_file_are_taken),
+        cmocka_unit_test(materials_come_from_the_file),
+        cmocka_unit_test(material_is_white_where_the_file_has_none),
+        cmocka_unit_test(every_format_is_read),
+        cmocka_unit_test(faults_name_file_and_vertex),
+        cmocka_unit_test(scene_file_is_told_what_is_wrong),
+        cmocka_unit_test(ids_count_the_triangles),
+        cmocka_unit_test(triangles_without_area_are_never_hit),
+    };
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
+}
