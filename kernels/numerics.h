@@ -43,6 +43,16 @@ static inline real real_sqrt(real a)
     return root;
 }
 
+// The power of two at or below a > 0; 0 for 0.
+static inline real real_power_below(real a)
+{
+#if IS_DOUBLE
+    return real_from_bits(bits_from_real(a) & (integer)(0x7ff0000000000000L));
+#else
+    return real_from_bits(bits_from_real(a) & (integer)(0x7f800000));
+#endif
+}
+
 // a b - c d to 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of Kahan's
 // algorithm for the accurate computation of 2x2 determinants, Math. Comp. 82, 2013).
 static inline real product_difference(real a, real b, real c, real d)
