@@ -97,7 +97,8 @@ typedef struct {
         side; // where the ray is inside the endless surface: between the roots, or, if `outer`, outside them
     mask outer;
     mask real_roots;
-    Roots slab; // where it is between the ends
+    Roots slab;  // where it is between the ends
+    Vector m, q; // at t the point is |m + t q| / |w| from the axis
 } RevolutionCrossings;
 
 // A root is taken as q / a only where that is below the largest number; a = 0 is a ray along the side, which
@@ -106,6 +107,8 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
 {
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     RevolutionCrossings crossings;
+    crossings.m = quadric.m;
+    crossings.q = quadric.q;
 
     real root = real_sqrt(real_max(quadric.discriminant, (real)(0)));
     mask ahead = quadric.b < (real)(0);
@@ -118,7 +121,11 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric.c, lanes_select(zero, (real)(1), q)));
     if (sloped && !IS_COMPENSATED) {
         c_over_q = revolution_polish(&quadric, c_over_q);
-        q_over_a = revolution_polish(&quadric, q_over_a);
+        // where a is nearly 0 a step may lead through infinity, and what lay outside the roots would lie
+        // inside
+        real polished = revolution_polish(&quadric, q_over_a);
+        mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
+        q_over_a = lanes_select(same_side, polished, q_over_a);
     }
     crossings.side = (Roots){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
     crossings.outer = quadric.a < (real)(0);
@@ -155,6 +162,21 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     return crossings;
 }
 
+// Whether the point at t is as near to the axis as any of a finite shape's, but for 8 u of the way there. A
+// ray along a cone's side has one root near infinity; its sign is noise, and the wrong one takes outside for
+// inside.
+static inline mask revolution_reaches(const Revolution *shape, const RevolutionCrossings *crossings,
+                                      const Ray *ray, real t)
+{
+    scalar first = shape->base_radius.w;
+    scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
+    Vector way = vector_scale(ray->direction, t);
+    real size =
+        vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_magnitude(way);
+    real error = (real)(8 * UNIT_ROUNDOFF * shape->range.y) * size;
+    return vector_length(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
+}
+
 // A capped solid is hit where the ray is inside the side and between the ends at once: one comparison decides
 // both surfaces, so that no ray passes between side and cap. An open or endless one is hit at a root between
 // the ends.
@@ -175,6 +197,8 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
         *t = lanes_select(near_counts, side.near, side.far);
         hit = hit & (*t >= slab.near) & (*t <= slab.far);
     }
+    if (sloped && (shape->id.y & REVOLUTION_FINITE))
+        hit = hit & revolution_reaches(shape, &crossings, ray, *t);
     return hit & (*t > ray->near) & (*t < (real)(LARGEST));
 }
 

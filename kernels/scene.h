@@ -15,10 +15,13 @@ typedef struct {
     global const SceneHeader *header;
     SHAPE_LIST(SCENE_SHAPE_MEMBER)
     global const TriangleNormals *triangle_normals;
+    global const TriangleUvs *triangle_uvs;
     global const BvhNode *nodes;
     global const ObjectEntry *objects;
     global const Material *materials;
     global const Light *lights;
+    global const TextureLevel *texture_levels;
+    global const Texel *texels;
     global uint *ray_counts; // of each RAYS_…; NULL unless rays are counted
 } Scene;
 
@@ -28,12 +31,14 @@ typedef struct {
 #define SCENE_ARGUMENTS                                                                                      \
     global const SceneHeader *header,                                                                        \
         SHAPE_LIST(SCENE_SHAPE_ARGUMENT) global const TriangleNormals *triangle_normals,                     \
-        global const BvhNode *nodes, global const ObjectEntry *objects, global const Material *materials,    \
-        global const Light *lights
+        global const TriangleUvs *triangle_uvs, global const BvhNode *nodes,                                 \
+        global const ObjectEntry *objects, global const Material *materials, global const Light *lights,     \
+        global const TextureLevel *texture_levels, global const Texel *texels
 #define SCENE_SHAPE_VALUE(feature, Type, name, names) names,
 #define SCENE_FROM_ARGUMENTS                                                                                 \
     {                                                                                                        \
-        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, nodes, objects, materials, lights, 0         \
+        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, nodes, objects, materials,     \
+            lights, texture_levels, texels, 0                                                                \
     }
 
 // Adds the lanes to a count, in a counting build only.
@@ -184,7 +189,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 // distance between the ray's start and the shape, across the ray and along it.
 static inline void ray_prepare_for_bvh(Ray *ray, global const SceneHeader *header)
 {
-    real slack = (real)(32 * UNIT_ROUNDOFF) * (vector_magnitude(ray->origin) + (real)(header->extent.x));
+    real slack = (real)(64 * UNIT_ROUNDOFF) * (vector_magnitude(ray->origin) + (real)(header->extent.x));
     ray->origin_up = (Vector){ray->origin.x + slack, ray->origin.y + slack, ray->origin.z + slack};
     ray->origin_down = (Vector){ray->origin.x - slack, ray->origin.y - slack, ray->origin.z - slack};
 }

@@ -306,7 +306,8 @@ enum { GRID = 64 };
 static void rays_down(ProbeRay *rays)
 {
     for (size_t i = 0; i < GRID * GRID; i++) {
-        double x = (double)(i % GRID) / 50 - 0.125, y = (double)(i / GRID) / 50 - 0.125;
+        size_t column = i % GRID, row = i / GRID;
+        double x = (double)column / 50 - 0.125, y = (double)row / 50 - 0.125;
         double along = 0.1 + 0.6 * (double)i / (GRID * GRID);
         rays[i] = (ProbeRay){{x, y, 4}, {0.0625, 0.03125, -1}, 0, INFINITY};
         if (i % 2 == 1) memcpy(rays[i].direction, (double[3]){along - x, along - y, -3}, sizeof(double[3]));

@@ -137,8 +137,8 @@ static Split split_find(const Builder *builder, Range range, const BinMap *map)
     Split best = {.cost = FLT_MAX};
     for (int axis = 0; axis < 3; axis++) {
         if (map->scale[axis] <= 0) continue;
-        float right_areas[BIN_COUNT];
-        uint32_t right_counts[BIN_COUNT];
+        float right_areas[BIN_COUNT] = {0};
+        uint32_t right_counts[BIN_COUNT] = {0};
         BuildBox box = empty_box;
         uint32_t count = 0;
         for (int bin = map->bin_count - 1; bin > 0; bin--) {
