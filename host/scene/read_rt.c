@@ -51,17 +51,27 @@ static bool element_end(RtReader *reader)
     return true;
 }
 
+static bool word_is_number(Word word)
+{
+    double number;
+    return word.length && number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
+}
+
+// Whether specular and shininess follow. With --lenient a number alone is a field of some other meaning.
+static bool finish_follows(const RtReader *reader)
+{
+    Line ahead = reader->line;
+    return word_is_number(line_word(&ahead)) && (!reader->lenient || word_is_number(line_peek(&ahead)));
+}
+
 // What ends an object's line: perhaps specular and shininess, nothing else.
 static bool read_finish(RtReader *reader, Material *material)
 {
     Line *line = &reader->line;
-    Word word = line_peek(line);
-    double number;
-    if (word.length && number_read(word.text, word.length, &number) != NUMBER_MALFORMED) {
-        if (!line_number(line, "specular", &range_unit, &material->specular) ||
-            !line_number(line, "shininess", &range_not_negative, &material->shininess))
-            return false;
-    }
+    if (finish_follows(reader) &&
+        !(line_number(line, "specular", &range_unit, &material->specular) &&
+          line_number(line, "shininess", &range_not_negative, &material->shininess)))
+        return false;
     return element_end(reader);
 }
 
