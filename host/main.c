@@ -15,6 +15,8 @@ static const struct {
     {"trace", command_trace, "shoot explicit rays at a scene"},
     {"check", command_check, "read a scene and say what is in it"},
     {"devices", command_devices, "list the OpenCL devices"},
+    {"diff", command_diff, "tell how far apart two pictures are"},
+    {"bench", command_bench, "tell how fast this device renders scenes"},
 };
 
 enum { COMMAND_COUNT = sizeof commands / sizeof *commands };

@@ -5,3 +5,5 @@ int command_render(int argument_count, char **arguments);
 int command_trace(int argument_count, char **arguments);
 int command_check(int argument_count, char **arguments);
 int command_devices(int argument_count, char **arguments);
+int command_diff(int argument_count, char **arguments);
+int command_bench(int argument_count, char **arguments);

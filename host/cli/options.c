@@ -2,6 +2,7 @@
 
 #include "host/base/fault.h"
 #include "host/base/text.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -159,6 +160,15 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
     bool loaded = scene_load(scene, path, &(SceneOptions){.lenient = common->lenient}, &messages);
     messages_tell(&messages, path);
     return loaded;
+}
+
+void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
+{
+    if (*width > 0) return;
+    *width = scene->width > 0 ? scene->width : 1280;
+    double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
+    double fitting = fmax(1, fmin(round(*width / aspect), PICTURE_SIDE_LARGEST));
+    *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
 }
 
 bool device_open(OpenDevice *open, const char *wish)

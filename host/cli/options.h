@@ -62,6 +62,10 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
 // Prints and frees messages; a fault in an .rt file is headed by the line that miniRT's testers look for.
 void messages_tell(MessageList *messages, const char *path);
 
+// A picture's size where the user gave none (width 0): the scene's own, else 1280 wide at the frame's shape
+// or 16:9.
+void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height);
+
 typedef struct {
     DeviceList devices;
     Compute compute;

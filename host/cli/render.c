@@ -8,7 +8,6 @@
 #include "host/cli/timing.h"
 #include <errno.h>
 #include <getopt.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -145,19 +144,9 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
     return EXIT_DONE;
 }
 
-// The picture's size: as asked for, else the scene's own, else 1280 wide at the frame's shape or 16:9.
-static void size_choose(RenderOptions *options, const Scene *scene)
-{
-    if (options->width > 0) return;
-    options->width = scene->width > 0 ? scene->width : 1280;
-    double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
-    double height = fmax(1, fmin(round(options->width / aspect), PICTURE_SIDE_LARGEST));
-    options->height = scene->height > 0 ? scene->height : (uint32_t)height;
-}
-
 static bool settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
 {
-    size_choose(options, scene);
+    picture_size_choose(scene, &options->width, &options->height);
     if (!options->has_region) {
         options->region[2] = options->width;
         options->region[3] = options->height;

@@ -34,15 +34,6 @@ static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
     return sum;
 }
 
-// Why event times are not to be believed, or NULL.
-static const char *launch_doubt(const LaunchTime *time)
-{
-    if (time->trusted) return NULL;
-    if (time->start_seconds == 0 && time->end_seconds == 0) return "the runtime reports no times for events";
-    if (time->end_seconds <= time->start_seconds) return "the event ends no later than it starts";
-    return "the event is longer than the host waited for it";
-}
-
 // A command that waited this long before it ran: the driver was doing something else, such as compiling.
 static double launch_delay(const LaunchTime *time)
 {
@@ -65,7 +56,7 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
     for (size_t i = 0; i < count && i < SHOWN_LARGEST; i++) {
         const LaunchTime *time = &launches[i].time;
-        const char *doubt = launch_doubt(time);
+        const char *doubt = launch_time_doubt(time);
         fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms%s%s\n", launches[i].name, 1e3 * time->event_seconds,
                 1e3 * time->host_seconds, doubt ? "; not trusted: " : "", doubt ? doubt : "");
         if (launch_delay(time) > 0)
@@ -111,7 +102,7 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
         else
             json_null(json, "event_ms");
         json_number(json, "host_ms", 1e3 * time->host_seconds);
-        if (!time->trusted) json_text(json, "doubt", launch_doubt(time));
+        if (!time->trusted) json_text(json, "doubt", launch_time_doubt(time));
         json_end(json);
     }
     json_end(json);

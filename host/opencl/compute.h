@@ -67,6 +67,7 @@ typedef struct {
     double queued_seconds, start_seconds, end_seconds; // device clock, from an arbitrary moment
     double event_seconds;                              // end - start; 0 where the runtime reports zeros
     double host_seconds;                               // from enqueue to completion seen by the host
+    double host_start_seconds;                         // clock_seconds() before the enqueue
     bool trusted; // false: zeros, end before start, or event longer than the host saw
 } LaunchTime;
 
@@ -74,6 +75,9 @@ typedef struct {
 // be longer than the host saw by the timer's resolution and 1 %, no more.
 LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, double host_seconds,
                              double resolution_seconds);
+
+// Why the event's times are not to be believed, or NULL where they are.
+const char *launch_time_doubt(const LaunchTime *time);
 
 // Enqueues over global (rounded up by the caller) and waits. `local` NULL: the runtime's choice.
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *global,

@@ -19,6 +19,14 @@ LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, doub
     return time;
 }
 
+const char *launch_time_doubt(const LaunchTime *time)
+{
+    if (time->trusted) return NULL;
+    if (time->start_seconds == 0 && time->end_seconds == 0) return "the runtime reports no times for events";
+    if (time->end_seconds <= time->start_seconds) return "the event ends no later than it starts";
+    return "the event is longer than the host waited for it";
+}
+
 // Zero where the runtime cannot say.
 static cl_ulong event_moment(cl_event event, cl_profiling_info what)
 {
@@ -52,6 +60,7 @@ LaunchTime event_time(cl_event event, double host_start)
     LaunchTime time = launch_time_judge(
         event_moment(event, CL_PROFILING_COMMAND_QUEUED), event_moment(event, CL_PROFILING_COMMAND_START),
         event_moment(event, CL_PROFILING_COMMAND_END), host_seconds, event_resolution(event));
+    time.host_start_seconds = host_start;
     cl_must(clReleaseEvent(event));
     return time;
 }

@@ -96,3 +96,5 @@ typedef struct {
     } launches, reads;
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
+// Forgets launches, reads and counted rays, so that the next picture has a report of its own.
+void renderer_report_restart(Renderer *renderer);

@@ -7,6 +7,9 @@ _glint_options() {
     trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient -h --help" ;;
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
+    diff) echo "--heatmap --json -h --help" ;;
+    bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --tolerance --device" \
+        "--lenient -h --help" ;;
     *) echo "--version --help" ;;
     esac
 }
@@ -15,7 +18,7 @@ _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
     if [ "$COMP_CWORD" -eq 1 ]; then
-        mapfile -t COMPREPLY < <(compgen -W "render trace check devices $(_glint_options)" -- "$word")
+        mapfile -t COMPREPLY < <(compgen -W "render trace check devices diff bench $(_glint_options)" -- "$word")
         return
     fi
     # bash splits --option=value into three words.
@@ -29,7 +32,7 @@ _glint() {
     --device) words="cpu gpu" ;;
     --aov) words="t normal position object shadow color" ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
-    --size | --samples | --region | --bounces) return ;;
+    --size | --samples | --region | --bounces | --seconds | --tolerance) return ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

@@ -51,12 +51,40 @@ _glint_devices() {
         '(- *)'{-h,--help}'[list the options]'
 }
 
+_glint_diff() {
+    _arguments \
+        '--heatmap[picture of the differences]:picture:_files -g "*.(png|ppm|exr|npy)"' \
+        '--json[for programs]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '1:reference:_files -g "*.(png|ppm|exr|npy)"' \
+        '2:picture:_files -g "*.(png|ppm|exr|npy)"'
+}
+
+_glint_bench() {
+    _arguments \
+        '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
+        '--lanes[pixels a work-item carries]:list:_sequence compadd - 1 4 8 16' \
+        '--bvh[use a hierarchy]:list:_sequence compadd - auto on off' \
+        '--size[width and height in pixels]:WxH:' \
+        '--seconds[end the runs after so long]:seconds:' \
+        '--launches[list the launches of the last runs]' \
+        '--json[for programs]' \
+        '--compare[hold against an earlier report]:report:_files -g "*.json"' \
+        '--tolerance[new time over old that passes]:ratio:' \
+        '--device[device to render on]:device:(cpu gpu)' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '*:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
+}
+
 _glint() {
     local -a subcommands=(
         'render:render a picture'
         'trace:shoot explicit rays'
         'check:read a scene without rendering it'
         'devices:list the OpenCL devices'
+        'diff:tell how far apart two pictures are'
+        'bench:tell how fast this device renders scenes'
     )
     if ((CURRENT == 2)); then
         _describe -o option "('--version:print the version' '--help:list the subcommands')"

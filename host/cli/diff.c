@@ -1,0 +1,210 @@
+// glint diff: how far apart two pictures are.
+#include "host/base/fault.h"
+#include "host/base/json.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include "host/measure/flip.h"
+#include "host/measure/heatmap.h"
+#include "host/measure/image_metrics.h"
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON };
+
+static const struct option long_options[] = {
+    {"heatmap", required_argument, NULL, OPTION_HEATMAP},
+    {"json", no_argument, NULL, OPTION_JSON},
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint diff REFERENCE PICTURE [OPTIONS]\n\n"
+    "Compares two pictures (PNG, PPM, EXR or NPY) of one size and kind. Exit status 0: equal; 3: not.\n\n"
+    "      --heatmap FILE    a picture of the differences: .png, .ppm, .exr or .npy\n"
+    "      --json            for programs\n"
+    "  -h, --help            this text\n";
+
+typedef struct {
+    const char *reference_path, *test_path, *heatmap_path;
+    bool as_json;
+} DiffOptions;
+
+typedef struct {
+    Image reference, test;
+    ImageMetrics metrics;
+} Comparison;
+
+static const float *worst_values(const Comparison *comparison, const Image *image)
+{
+    const ImageMetrics *metrics = &comparison->metrics;
+    return image->values + ((size_t)metrics->worst_y * image->width + metrics->worst_x) * image->channels;
+}
+
+static void values_json(Json *json, const char *key, const float *values, uint32_t count)
+{
+    json_begin_array(json, key);
+    for (uint32_t i = 0; i < count; i++)
+        json_number(json, NULL, (double)values[i]);
+    json_end(json);
+}
+
+static void json_report(const DiffOptions *options, const Comparison *comparison)
+{
+    const ImageMetrics *metrics = &comparison->metrics;
+    const Image *reference = &comparison->reference;
+    Json *json = json_open();
+    json_integer(json, "schema", 1);
+    json_text(json, "reference", options->reference_path);
+    json_text(json, "picture", options->test_path);
+    json_begin_array(json, "size");
+    json_integer(json, NULL, reference->width);
+    json_integer(json, NULL, reference->height);
+    json_end(json);
+    json_integer(json, "channels", reference->channels);
+    json_text(json, "kind", reference->display ? "display" : "linear");
+    json_boolean(json, "equal", metrics->differing_count == 0);
+    json_integer(json, "differing_values", (int64_t)metrics->differing_count);
+    json_begin_object(json, "nonfinite_pixels");
+    json_integer(json, "reference", (int64_t)metrics->nonfinite_reference);
+    json_integer(json, "picture", (int64_t)metrics->nonfinite_test);
+    json_end(json);
+    json_begin_object(json, "linear");
+    json_integer(json, "values", (int64_t)metrics->linear.count);
+    json_number(json, "max_abs", metrics->linear.largest);
+    json_number(json, "rmse", metrics->linear.rmse);
+    json_number(json, "bias", metrics->linear.bias);
+    json_number(json, "p99_9", metrics->linear.percentile_999);
+    json_number(json, "psnr", metrics->linear.psnr);
+    json_number(json, "rel_mse", metrics->linear.rel_mse);
+    json_end(json);
+    if (metrics->has_color) {
+        json_begin_object(json, "srgb8");
+        json_number(json, "psnr", metrics->srgb_psnr);
+        json_integer(json, "off_by_1", (int64_t)metrics->off_by_1);
+        json_integer(json, "off_by_2_or_more", (int64_t)metrics->off_by_more);
+        json_end(json);
+        json_begin_object(json, "flip");
+        json_number(json, "mean", metrics->flip_mean);
+        json_number(json, "max", metrics->flip_max);
+        json_integer(json, "pixels_per_degree", FLIP_PIXELS_PER_DEGREE);
+        json_end(json);
+    }
+    json_begin_object(json, "worst");
+    json_integer(json, "x", metrics->worst_x);
+    json_integer(json, "y", metrics->worst_y);
+    values_json(json, "reference", worst_values(comparison, reference), reference->channels);
+    values_json(json, "picture", worst_values(comparison, &comparison->test), reference->channels);
+    json_end(json);
+    if (options->heatmap_path) {
+        json_begin_object(json, "heatmap");
+        json_text(json, "file", options->heatmap_path);
+        json_number(json, "white", metrics->linear.largest);
+        json_number(json, "black", metrics->linear.largest * pow(10, -HEATMAP_DECADES));
+        json_end(json);
+    }
+    json_print(json, stdout);
+}
+
+static void values_print(const float *values, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++)
+        printf(" %.9g", (double)values[i]);
+}
+
+static void text_print(const DiffOptions *options, const Comparison *comparison)
+{
+    const ImageMetrics *metrics = &comparison->metrics;
+    const ErrorSummary *linear = &metrics->linear;
+    const Image *reference = &comparison->reference;
+    size_t value_count = (size_t)reference->width * reference->height * reference->channels;
+    printf("%s, %s: %ux%u, %u %s of %s\n", options->reference_path, options->test_path, reference->width,
+           reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
+           reference->display ? "display values" : "linear light");
+    if (metrics->differing_count == 0)
+        printf("  equal, bit for bit\n");
+    else
+        printf("  %zu of %zu values differ\n", metrics->differing_count, value_count);
+    if (metrics->nonfinite_reference + metrics->nonfinite_test > 0)
+        printf("  pixels not finite: %zu and %zu; they are left out of the light's numbers\n",
+               metrics->nonfinite_reference, metrics->nonfinite_test);
+    if (metrics->differing_count == 0) return;
+    printf("  light      max %.4g, RMSE %.4g, bias %+.4g, 99.9 %% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
+           linear->largest, linear->rmse, linear->bias, linear->percentile_999, linear->rel_mse,
+           linear->psnr);
+    if (metrics->has_color) {
+        printf("  8-bit sRGB %zu values differ by 1, %zu by more, PSNR %.2f dB\n", metrics->off_by_1,
+               metrics->off_by_more, metrics->srgb_psnr);
+        printf("  FLIP       mean %.6f, max %.6f at %d pixels per degree\n", metrics->flip_mean,
+               metrics->flip_max, FLIP_PIXELS_PER_DEGREE);
+    }
+    printf("  worst      pixel %u,%u:", metrics->worst_x, metrics->worst_y);
+    values_print(worst_values(comparison, reference), reference->channels);
+    printf(" and");
+    values_print(worst_values(comparison, &comparison->test), reference->channels);
+    printf("\n");
+    if (options->heatmap_path)
+        printf("  heat map   %s: logarithmic, white %.3g, black %.3g or less, red not finite\n",
+               options->heatmap_path, linear->largest, linear->largest * pow(10, -HEATMAP_DECADES));
+}
+
+static bool heatmap_make(const DiffOptions *options, const Comparison *comparison, MessageList *messages)
+{
+    const Image *reference = &comparison->reference;
+    float *errors = memory_allocate((size_t)reference->width * reference->height, sizeof *errors);
+    image_errors(reference, &comparison->test, errors);
+    bool written = heatmap_write(options->heatmap_path, errors, reference->width, reference->height,
+                                 comparison->metrics.linear.largest, messages);
+    free(errors);
+    return written;
+}
+
+static bool pictures_compare(const DiffOptions *options, Comparison *comparison, MessageList *messages)
+{
+    if (!image_read(&comparison->reference, options->reference_path, messages) ||
+        !image_read(&comparison->test, options->test_path, messages) ||
+        !image_comparable(&comparison->reference, &comparison->test, messages))
+        return false;
+    comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
+    return !options->heatmap_path || heatmap_make(options, comparison, messages);
+}
+
+int command_diff(int argument_count, char **arguments)
+{
+    DiffOptions options = {0};
+    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
+        switch (option) {
+        case OPTION_HEATMAP:
+            options.heatmap_path = optarg;
+            break;
+        case OPTION_JSON:
+            options.as_json = true;
+            break;
+        case 'h':
+            fputs(help_text, stdout);
+            return EXIT_DONE;
+        default:
+            return EXIT_USER;
+        }
+    }
+    if (optind + 2 != argument_count) return option_usage_fault("diff", "it takes two pictures");
+    options.reference_path = arguments[optind];
+    options.test_path = arguments[optind + 1];
+    if (options.heatmap_path && image_format_of(options.heatmap_path) == IMAGE_UNKNOWN)
+        return option_usage_fault("diff", "the heat map must end in .png, .ppm, .exr or .npy");
+
+    Comparison comparison = {0};
+    MessageList messages = {0};
+    bool compared = pictures_compare(&options, &comparison, &messages);
+    messages_tell(&messages, NULL);
+    if (compared && options.as_json)
+        json_report(&options, &comparison);
+    else if (compared)
+        text_print(&options, &comparison);
+    image_free(&comparison.reference);
+    image_free(&comparison.test);
+    if (!compared) return EXIT_USER;
+    return comparison.metrics.differing_count == 0 ? EXIT_DONE : EXIT_CHECK;
+}

@@ -1,0 +1,66 @@
+// How fast one variant renders one scene: times of repeated runs, and what follows from them.
+#pragma once
+
+#include "host/measure/peak.h"
+#include "host/measure/series.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+// A number, or why it cannot be had.
+typedef struct {
+    double value;
+    const char *why_not; // NULL: there is a value
+} Figure;
+
+// Times of the runs of one variant; zeroed: none yet.
+typedef struct {
+    Series frame;       // seconds from a run's first enqueue to its pixels in the host's memory
+    Series event, host; // seconds of a run's launches, by their events and by the host's clock
+    const char *doubt;  // why the events are not to be believed, as seen in some launch; NULL: they are
+    double run_event, run_host; // sums of the run at work
+    // where the device's and the host's clock stood at the first launch's start and the last one's end
+    double device_first, device_last, host_first, host_last;
+} BenchTimes;
+
+// For each launch of a run, then once for the run.
+void bench_add_launch(BenchTimes *times, const LaunchTime *launch);
+void bench_end_run(BenchTimes *times, double frame_seconds);
+void bench_times_free(BenchTimes *times);
+
+// Why the host's clock is used for the launches, or NULL where their events' times are: every event agreed
+// with the host's clock, and the device's clock did not drift from it over all the runs.
+const char *bench_doubt(const BenchTimes *times);
+// Of the runs' launches, by events or by the host's clock as bench_doubt says.
+Summary bench_kernel(const BenchTimes *times);
+// Whether more runs would tell little: there are `enough`, and half of them lie close around the median.
+bool bench_settled(const BenchTimes *times, size_t enough);
+
+// What tells a row from the others.
+typedef struct {
+    const char *scene, *precision, *bvh;
+    uint32_t lanes, width, height;
+} BenchKey;
+
+enum { BENCH_CAMERA, BENCH_CAMERA_HITS, BENCH_REFLECTED, BENCH_REFRACTED, BENCH_SHADOW, BENCH_RAY_KINDS };
+extern const char *const bench_ray_names[BENCH_RAY_KINDS];
+
+typedef struct {
+    BenchKey key;
+    char *failure; // why there is nothing but the key; NULL: there is
+    BenchTimes times;
+    Figure build_cold, build_cached; // seconds
+    uint64_t rays[BENCH_RAY_KINDS];
+    bool wide, hierarchy; // computes in double; rays went through a hierarchy
+    double flops_per_ray; // as work.h counts
+    double picture_bytes;
+} BenchRow;
+
+void bench_row_free(BenchRow *row);
+
+// Rays of every kind for each second of the launches.
+double bench_rays_per_second(const BenchRow *row);
+// Of the device's arithmetic: what the rays that look for their closest hit need at least (work.h) against
+// what it could do in that time. Shadow rays, which may stop at the first object, and colors come on top.
+Figure bench_peak_fraction(const BenchRow *row, const Peak *peak);
+// Of the device's bandwidth: writing the picture, the least that must go through memory.
+double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak);

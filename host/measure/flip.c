@@ -1,0 +1,307 @@
+#include "host/measure/flip.h"
+
+#include "host/base/fault.h"
+#include "host/measure/srgb.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The paper's constants: exponents of the color and feature differences (sections 4.1.3 and 4.2.1), the point
+// where large color differences are compressed (4.1.3), and the width of the feature detectors (4.2).
+static const double color_exponent = 0.7, feature_exponent = 0.5;
+static const double compressed_from = 0.4, compressed_to = 0.95;
+static const double feature_width_degrees = 0.082;
+
+// Sensitivity of the eye to contrast, as sums of Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees
+// (table 1): luminance, red-green, blue-yellow.
+static const struct {
+    double a[2], b[2];
+} sensitivity[3] = {
+    {{1, 0}, {0.0047, 1}},
+    {{1, 0}, {0.0053, 1}},
+    {{34.1, 13.5}, {0.04, 0.025}},
+};
+static const double widest_sensitivity = 0.04;
+
+static const double pi = 3.14159265358979323846;
+
+typedef struct {
+    double x, y, z;
+} Triple;
+
+// sRGB's primaries (IEC 61966-2-1:1999) and the white x 0.31271, y 0.32902 (D65, CIE 15:2004), and back.
+static const double xyz_from_rgb[3][3] = {{0.41238656, 0.35759149, 0.18045049},
+                                          {0.21263682, 0.71518298, 0.0721802},
+                                          {0.01933062, 0.11919716, 0.95037259}};
+static const double rgb_from_xyz[3][3] = {{3.24100323, -1.53739897, -0.49861588},
+                                          {-0.96922425, 1.87592998, 0.04155423},
+                                          {0.05563942, -0.20401121, 1.05714898}};
+static const Triple white = {0.95042854, 1, 1.0889004};
+
+static Triple transform(const double matrix[3][3], Triple v)
+{
+    return (Triple){matrix[0][0] * v.x + matrix[0][1] * v.y + matrix[0][2] * v.z,
+                    matrix[1][0] * v.x + matrix[1][1] * v.y + matrix[1][2] * v.z,
+                    matrix[2][0] * v.x + matrix[2][1] * v.y + matrix[2][2] * v.z};
+}
+
+// Linear RGB to YCxCz, a linear relative of L*a*b* (section 4.1.1), and back.
+static Triple ycc_from_rgb(Triple rgb)
+{
+    Triple xyz = transform(xyz_from_rgb, rgb);
+    Triple ratio = {xyz.x / white.x, xyz.y / white.y, xyz.z / white.z};
+    return (Triple){116 * ratio.y - 16, 500 * (ratio.x - ratio.y), 200 * (ratio.y - ratio.z)};
+}
+
+static Triple rgb_from_ycc(Triple ycc)
+{
+    double y = (ycc.x + 16) / 116;
+    return transform(rgb_from_xyz,
+                     (Triple){white.x * (y + ycc.y / 500), white.y * y, white.z * (y - ycc.z / 200)});
+}
+
+static double lab_root(double ratio)
+{
+    const double delta = 6.0 / 29;
+    return ratio > delta * delta * delta ? cbrt(ratio) : ratio / (3 * delta * delta) + 4.0 / 29;
+}
+
+// Linear RGB to L*a*b* (CIE 15:2004), with colors fading in the dark (Hunt; section 4.1.3).
+static Triple hunt_lab(Triple rgb)
+{
+    Triple xyz = transform(xyz_from_rgb, rgb);
+    double x = lab_root(xyz.x / white.x), y = lab_root(xyz.y / white.y), z = lab_root(xyz.z / white.z);
+    double lightness = 116 * y - 16;
+    return (Triple){lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
+}
+
+// The distance HyAB (Abasi, Tehran, Fairchild 2020; section 4.1.3).
+static double color_distance(Triple p, Triple q)
+{
+    return pow(fabs(p.x - q.x) + hypot(p.y - q.y, p.z - q.z), color_exponent);
+}
+
+// One number a pixel.
+typedef struct {
+    uint32_t width, height;
+    float *values;
+} Plane;
+
+static Plane plane_open(uint32_t width, uint32_t height)
+{
+    return (Plane){width, height, memory_allocate((size_t)width * height, sizeof(float))};
+}
+
+static void plane_close(Plane *plane)
+{
+    free(plane->values);
+}
+
+static float *plane_row(const Plane *plane, uint32_t y)
+{
+    return plane->values + (size_t)y * plane->width;
+}
+
+// Weights of the neighbors -radius..radius, the same across and down.
+enum { RADIUS_LARGEST = 15 };
+typedef struct {
+    int radius;
+    float weights[2 * RADIUS_LARGEST + 1];
+} Filter;
+
+// Outside the picture its border goes on.
+static void filter_across(const Filter *filter, const Plane *in, Plane *out)
+{
+    size_t width = in->width, radius = (size_t)filter->radius;
+    float *padded = memory_allocate(width + 2 * radius, sizeof *padded);
+    for (uint32_t y = 0; y < in->height; y++) {
+        const float *row = plane_row(in, y);
+        memcpy(padded + radius, row, width * sizeof *row);
+        for (size_t i = 0; i < radius; i++) {
+            padded[i] = row[0];
+            padded[radius + width + i] = row[width - 1];
+        }
+        float *result = plane_row(out, y);
+        memset(result, 0, width * sizeof *result);
+        for (size_t tap = 0; tap <= 2 * radius; tap++)
+            for (size_t x = 0; x < width; x++)
+                result[x] += filter->weights[tap] * padded[x + tap];
+    }
+    free(padded);
+}
+
+static void filter_down(const Filter *filter, const Plane *in, Plane *out)
+{
+    for (uint32_t y = 0; y < in->height; y++) {
+        float *result = plane_row(out, y);
+        memset(result, 0, in->width * sizeof *result);
+        for (int tap = -filter->radius; tap <= filter->radius; tap++) {
+            int64_t at = (int64_t)y + tap;
+            int64_t clamped = at < 0 ? 0 : at >= in->height ? in->height - 1 : at;
+            const float *row = plane_row(in, (uint32_t)clamped);
+            for (uint32_t x = 0; x < in->width; x++)
+                result[x] += filter->weights[tap + filter->radius] * row[x];
+        }
+    }
+}
+
+static Plane plane_filter(const Plane *in, const Filter *across, const Filter *down)
+{
+    Plane between = plane_open(in->width, in->height), out = plane_open(in->width, in->height);
+    filter_across(across, in, &between);
+    filter_down(down, &between, &out);
+    plane_close(&between);
+    return out;
+}
+
+// Weights shape(x, deviation) for the pixels x around, scaled so that the positive ones sum to 1 and so do
+// the negative ones.
+static Filter filter_make(double (*shape)(double x, double deviation), double deviation, int radius)
+{
+    if (radius > RADIUS_LARGEST) fault("a filter of FLIP is too wide: %d", radius);
+    double weights[2 * RADIUS_LARGEST + 1] = {0}, positive = 0, negative = 0;
+    for (int x = -radius; x <= radius; x++) {
+        double weight = shape(x, deviation);
+        weights[x + radius] = weight;
+        *(weight > 0 ? &positive : &negative) += fabs(weight);
+    }
+    Filter filter = {.radius = radius};
+    for (int i = 0; i <= 2 * radius; i++)
+        filter.weights[i] = (float)(weights[i] / (weights[i] > 0 ? positive : negative));
+    return filter;
+}
+
+static double gaussian(double x, double deviation)
+{
+    return exp(-x * x / (2 * deviation * deviation));
+}
+
+static double gaussian_slope(double x, double deviation)
+{
+    return -x * gaussian(x, deviation);
+}
+
+static double gaussian_bend(double x, double deviation)
+{
+    return (x * x / (deviation * deviation) - 1) * gaussian(x, deviation);
+}
+
+// In pixels, of exp(-pi^2 x^2 / b).
+static double sensitivity_deviation(double b)
+{
+    return sqrt(b / (2 * pi * pi)) * FLIP_PIXELS_PER_DEGREE;
+}
+
+// What the eye resolves of one of YCxCz (section 4.1.2). Each Gaussian is a product of one across and one
+// down; the weights of a sum of them go by their volumes.
+static void plane_blur(Plane *plane, int component)
+{
+    int radius = (int)ceil(3 * sensitivity_deviation(widest_sensitivity));
+    Plane parts[2] = {0};
+    double volumes[2] = {0};
+    for (int i = 0; i < 2; i++) {
+        double a = sensitivity[component].a[i], b = sensitivity[component].b[i];
+        if (a == 0) continue;
+        double deviation = sensitivity_deviation(b), length = 0;
+        for (int x = -radius; x <= radius; x++)
+            length += gaussian(x, deviation);
+        volumes[i] = a * sqrt(pi / b) * length * length;
+        Filter filter = filter_make(gaussian, deviation, radius);
+        parts[i] = plane_filter(plane, &filter, &filter);
+    }
+    double volume = volumes[0] + volumes[1];
+    for (size_t i = 0; i < (size_t)plane->width * plane->height; i++) {
+        double sum = volumes[0] * (double)parts[0].values[i];
+        if (volumes[1] > 0) sum += volumes[1] * (double)parts[1].values[i];
+        plane->values[i] = (float)(sum / volume);
+    }
+    plane_close(&parts[0]);
+    plane_close(&parts[1]);
+}
+
+// How strong an edge (`shape` the slope of a Gaussian) or a point (its bend) is at each pixel of the
+// luminance (section 4.2).
+static Plane feature_strength(const Plane *gray, double (*shape)(double x, double deviation))
+{
+    double deviation = 0.5 * feature_width_degrees * FLIP_PIXELS_PER_DEGREE;
+    int radius = (int)ceil(3 * deviation);
+    Filter detector = filter_make(shape, deviation, radius),
+           smooth = filter_make(gaussian, deviation, radius);
+    Plane across = plane_filter(gray, &detector, &smooth), down = plane_filter(gray, &smooth, &detector);
+    for (size_t i = 0; i < (size_t)gray->width * gray->height; i++)
+        across.values[i] = hypotf(across.values[i], down.values[i]);
+    plane_close(&down);
+    return across;
+}
+
+// A picture as the eye has it.
+typedef struct {
+    Plane ycc[3]; // blurred
+    Plane edges, points;
+} Seen;
+
+static Seen seen_open(const float *picture, uint32_t width, uint32_t height)
+{
+    Seen seen;
+    Plane gray = plane_open(width, height);
+    for (int i = 0; i < 3; i++)
+        seen.ycc[i] = plane_open(width, height);
+    for (size_t i = 0; i < (size_t)width * height; i++) {
+        const float *pixel = picture + 3 * i;
+        Triple ycc = ycc_from_rgb((Triple){srgb_decode((double)pixel[0]), srgb_decode((double)pixel[1]),
+                                           srgb_decode((double)pixel[2])});
+        seen.ycc[0].values[i] = (float)ycc.x;
+        seen.ycc[1].values[i] = (float)ycc.y;
+        seen.ycc[2].values[i] = (float)ycc.z;
+        gray.values[i] = (float)((ycc.x + 16) / 116);
+    }
+    seen.edges = feature_strength(&gray, gaussian_slope);
+    seen.points = feature_strength(&gray, gaussian_bend);
+    plane_close(&gray);
+    for (int i = 0; i < 3; i++)
+        plane_blur(&seen.ycc[i], i);
+    return seen;
+}
+
+static void seen_close(Seen *seen)
+{
+    for (int i = 0; i < 3; i++)
+        plane_close(&seen->ycc[i]);
+    plane_close(&seen->edges);
+    plane_close(&seen->points);
+}
+
+static double clipped(double value)
+{
+    return fmax(0, fmin(value, 1));
+}
+
+static Triple seen_color(const Seen *seen, size_t i)
+{
+    Triple rgb = rgb_from_ycc((Triple){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
+                                       (double)seen->ycc[2].values[i]});
+    return hunt_lab((Triple){clipped(rgb.x), clipped(rgb.y), clipped(rgb.z)});
+}
+
+// The part of 0..1 up to compressed_to is for the smaller distances, the rest for those up to the largest.
+static double compressed(double distance, double largest)
+{
+    double knee = compressed_from * largest;
+    if (distance < knee) return distance / knee * compressed_to;
+    return compressed_to + (distance - knee) / (largest - knee) * (1 - compressed_to);
+}
+
+void flip_map(const float *reference, const float *test, uint32_t width, uint32_t height, float *map)
+{
+    Seen seen = seen_open(reference, width, height), other = seen_open(test, width, height);
+    double largest = color_distance(hunt_lab((Triple){0, 1, 0}), hunt_lab((Triple){0, 0, 1}));
+    for (size_t i = 0; i < (size_t)width * height; i++) {
+        double color = compressed(color_distance(seen_color(&seen, i), seen_color(&other, i)), largest);
+        double edge = fabs((double)seen.edges.values[i] - (double)other.edges.values[i]);
+        double point = fabs((double)seen.points.values[i] - (double)other.points.values[i]);
+        double feature = pow(fmax(edge, point) / sqrt(2), feature_exponent);
+        map[i] = (float)pow(color, 1 - fmin(feature, 1)); // section 4.3
+    }
+    seen_close(&seen);
+    seen_close(&other);
+}

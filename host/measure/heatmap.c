@@ -1,0 +1,63 @@
+#include "host/measure/heatmap.h"
+
+#include "host/base/fault.h"
+#include "host/image/image.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+// Cubehelix with the author's standard start, rotations, hue and gamma (Green: "A colour scheme for the
+// display of astronomical intensity images", Bulletin of the Astronomical Society of India 39, 2011, section
+// 3).
+void heatmap_color(double fraction, float color[3])
+{
+    const double tau = 6.28318530717958647692, start = 0.5, rotations = -1.5, hue = 1;
+    double angle = tau * (start / 3 + 1 + rotations * fraction);
+    double amplitude = hue * fraction * (1 - fraction) / 2;
+    double c = amplitude * cos(angle), s = amplitude * sin(angle);
+    color[0] = (float)fmax(0, fmin(fraction - 0.14861 * c + 1.78277 * s, 1));
+    color[1] = (float)fmax(0, fmin(fraction - 0.29227 * c - 0.90649 * s, 1));
+    color[2] = (float)fmax(0, fmin(fraction + 1.97294 * c, 1));
+}
+
+static void error_color(double error, double largest, float color[3])
+{
+    if (!isfinite(error)) {
+        color[0] = 1;
+        color[1] = color[2] = 0;
+        return;
+    }
+    double fraction = error > 0 ? 1 + log10(error / largest) / HEATMAP_DECADES : 0;
+    heatmap_color(fmax(0, fmin(fraction, 1)), color);
+}
+
+bool heatmap_write(const char *path, const float *errors, uint32_t width, uint32_t height, double largest,
+                   MessageList *messages)
+{
+    char scale[120];
+    snprintf(scale, sizeof scale, "logarithmic; white %.3g, black %.3g or less, red not finite", largest,
+             largest * pow(10, -HEATMAP_DECADES));
+    ImageHeader header = {
+        .format = image_format_of(path),
+        .width = width,
+        .height = height,
+        .channels = 3,
+        .transfer = TRANSFER_NONE, // the colors are display values already
+        .bits = 8,
+        .npy_type = 'f',
+        .notes = (const ImageNote[]){{"Title", "heat map of errors"}, {"Scale", scale}, {NULL, NULL}},
+    };
+    ImageWriter *writer = image_writer_open(path, &header, messages);
+    if (!writer) return false;
+    float *row = memory_allocate(width, 3 * sizeof *row);
+    bool written = true;
+    for (uint32_t y = 0; y < height && written; y++) {
+        for (uint32_t x = 0; x < width; x++)
+            error_color((double)errors[(size_t)y * width + x], largest, row + 3 * (size_t)x);
+        written = image_writer_rows(writer, row, 1, messages);
+    }
+    free(row);
+    if (written) return image_writer_commit(writer, messages);
+    image_writer_abandon(writer);
+    return false;
+}

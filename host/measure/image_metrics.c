@@ -1,0 +1,207 @@
+#include "host/measure/image_metrics.h"
+
+#include "host/base/fault.h"
+#include "host/measure/flip.h"
+#include "host/measure/srgb.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static size_t pixel_count(const Image *image)
+{
+    return (size_t)image->width * image->height;
+}
+
+static size_t value_count(const Image *image)
+{
+    return pixel_count(image) * image->channels;
+}
+
+// The value at `rank` (from 0) of the sorted magnitudes. The bits of floats that are not negative order them:
+// first the upper half of the bits is found by counting, then the lower among those that share it.
+static float rank_select(const float *magnitudes, size_t count, size_t rank)
+{
+    size_t *counts = memory_allocate(1u << 16, sizeof *counts);
+    uint32_t found = 0;
+    for (unsigned shift = 16;; shift = 0) {
+        memset(counts, 0, (1u << 16) * sizeof *counts);
+        for (size_t i = 0; i < count; i++) {
+            uint32_t bits;
+            memcpy(&bits, &magnitudes[i], sizeof bits);
+            if (shift == 16 || bits >> 16 == found >> 16) counts[bits >> shift & 0xffff]++;
+        }
+        uint32_t half = 0;
+        for (; rank >= counts[half]; half++)
+            rank -= counts[half];
+        found |= half << shift;
+        if (shift == 0) break;
+    }
+    free(counts);
+    float value;
+    memcpy(&value, &found, sizeof value);
+    return value;
+}
+
+ErrorSummary error_summarize(const float *reference, const float *test, size_t count)
+{
+    ErrorSummary summary = {.psnr = INFINITY};
+    float *magnitudes = memory_allocate(count + 1, sizeof *magnitudes);
+    double sum = 0, square_sum = 0, relative_sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(reference[i]) || !isfinite(test[i])) continue;
+        double expected = (double)reference[i], difference = (double)test[i] - expected;
+        double square = difference * difference;
+        sum += difference;
+        square_sum += square;
+        relative_sum += square / (expected * expected + 0.01);
+        summary.largest = fmax(summary.largest, fabs(difference));
+        magnitudes[summary.count++] = (float)fabs(difference);
+    }
+    if (summary.count > 0) {
+        double compared = (double)summary.count;
+        summary.bias = sum / compared;
+        summary.rmse = sqrt(square_sum / compared);
+        summary.rel_mse = relative_sum / compared;
+        summary.psnr = -20 * log10(summary.rmse);
+        size_t rank = (size_t)ceil(0.999 * compared) - 1;
+        summary.percentile_999 = (double)rank_select(magnitudes, summary.count, rank);
+    }
+    free(magnitudes);
+    return summary;
+}
+
+bool image_comparable(const Image *reference, const Image *test, MessageList *messages)
+{
+    if (reference->width != test->width || reference->height != test->height ||
+        reference->channels != test->channels) {
+        message_add(messages, MESSAGE_ERROR,
+                    "the pictures differ in size: %ux%u with %u %s, and %ux%u with %u", reference->width,
+                    reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
+                    test->width, test->height, test->channels);
+        return false;
+    }
+    if (reference->display != test->display) {
+        message_add(messages, MESSAGE_ERROR,
+                    "the pictures differ in kind: the %s holds display values, the other linear light",
+                    reference->display ? "first" : "second");
+        return false;
+    }
+    return true;
+}
+
+// What the screen or the file says is there as light. Caller frees.
+static float *linear_values(const Image *image)
+{
+    size_t count = value_count(image);
+    float *values = memory_allocate(count, sizeof *values);
+    for (size_t i = 0; i < count; i++)
+        values[i] = image->display ? (float)srgb_decode((double)image->values[i]) : image->values[i];
+    return values;
+}
+
+void image_errors(const Image *reference, const Image *test, float *errors)
+{
+    float *expected = linear_values(reference), *found = linear_values(test);
+    for (size_t i = 0; i < pixel_count(reference); i++) {
+        errors[i] = 0;
+        for (size_t k = i * reference->channels; k < (i + 1) * reference->channels; k++) {
+            if (isfinite(expected[k]) && isfinite(found[k]))
+                errors[i] = fmaxf(errors[i], fabsf(found[k] - expected[k]));
+            else if (isfinite(expected[k]) || isfinite(found[k]))
+                errors[i] = INFINITY;
+        }
+    }
+    free(expected);
+    free(found);
+}
+
+static size_t nonfinite_pixels(const Image *image)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < pixel_count(image); i++) {
+        bool finite = true;
+        for (size_t k = 0; k < image->channels; k++)
+            finite &= isfinite(image->values[i * image->channels + k]) != 0;
+        count += !finite;
+    }
+    return count;
+}
+
+static uint32_t display_step(const Image *image, size_t i)
+{
+    return image_quantize(image->values[i], image->display ? TRANSFER_NONE : TRANSFER_SRGB, 8);
+}
+
+static void steps_compare(ImageMetrics *metrics, const Image *reference, const Image *test)
+{
+    double square_sum = 0;
+    for (size_t i = 0; i < value_count(reference); i++) {
+        double difference = (double)display_step(test, i) - (double)display_step(reference, i);
+        metrics->off_by_1 += fabs(difference) == 1;
+        metrics->off_by_more += fabs(difference) > 1;
+        square_sum += difference * difference;
+    }
+    metrics->srgb_psnr = -10 * log10(square_sum / (double)value_count(reference) / (255 * 255));
+}
+
+// Three sRGB values a pixel within 0..1; what is no number is black. Caller frees.
+static float *display_values(const Image *image)
+{
+    float *values = memory_allocate(pixel_count(image), 3 * sizeof *values);
+    for (size_t i = 0; i < 3 * pixel_count(image); i++) {
+        double value = (double)image->values[image->channels == 3 ? i : i / 3];
+        double clipped = value > 0 ? fmin(value, 1) : 0;
+        values[i] = (float)(image->display ? clipped : srgb_encode(clipped));
+    }
+    return values;
+}
+
+static void flip_compare(ImageMetrics *metrics, const Image *reference, const Image *test)
+{
+    size_t count = pixel_count(reference);
+    float *expected = display_values(reference), *found = display_values(test);
+    float *map = memory_allocate(count, sizeof *map);
+    flip_map(expected, found, reference->width, reference->height, map);
+    double sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        sum += (double)map[i];
+        metrics->flip_max = fmax(metrics->flip_max, (double)map[i]);
+    }
+    metrics->flip_mean = sum / (double)count;
+    free(expected);
+    free(found);
+    free(map);
+}
+
+static void worst_find(ImageMetrics *metrics, const Image *reference, const Image *test)
+{
+    float *errors = memory_allocate(pixel_count(reference), sizeof *errors);
+    image_errors(reference, test, errors);
+    size_t worst = 0;
+    for (size_t i = 1; i < pixel_count(reference); i++)
+        if (errors[i] > errors[worst]) worst = i;
+    metrics->worst_x = (uint32_t)(worst % reference->width);
+    metrics->worst_y = (uint32_t)(worst / reference->width);
+    free(errors);
+}
+
+ImageMetrics image_metrics(const Image *reference, const Image *test)
+{
+    ImageMetrics metrics = {
+        .nonfinite_reference = nonfinite_pixels(reference),
+        .nonfinite_test = nonfinite_pixels(test),
+        .has_color = reference->channels == 3 || (reference->channels == 1 && reference->display),
+    };
+    for (size_t i = 0; i < value_count(reference); i++)
+        metrics.differing_count += memcmp(&reference->values[i], &test->values[i], sizeof(float)) != 0;
+    float *expected = linear_values(reference), *found = linear_values(test);
+    metrics.linear = error_summarize(expected, found, value_count(reference));
+    free(expected);
+    free(found);
+    worst_find(&metrics, reference, test);
+    if (metrics.has_color) {
+        steps_compare(&metrics, reference, test);
+        flip_compare(&metrics, reference, test);
+    }
+    return metrics;
+}

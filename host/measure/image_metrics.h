@@ -1,0 +1,41 @@
+// How far a picture is from a reference, in numbers.
+#pragma once
+
+#include "host/base/message.h"
+#include "host/image/image.h"
+
+// Of the differences test - reference of many values; those that are not finite in both are left out.
+typedef struct {
+    size_t count;               // values compared
+    double largest, rmse, bias; // bias: the mean with its sign
+    double percentile_999;      // 99.9 % of the magnitudes are no larger; the smallest such magnitude
+    double psnr;                // dB for a peak of 1; infinite where nothing differs
+    // mean of difference^2 / (reference^2 + 0.01) (Rousselle, Knaus, Zwicker: "Adaptive Sampling and
+    // Reconstruction using Greedy Error Minimization", 2011)
+    double rel_mse;
+} ErrorSummary;
+
+ErrorSummary error_summarize(const float *reference, const float *test, size_t count);
+
+typedef struct {
+    size_t differing_count;                     // values whose bits differ
+    size_t nonfinite_reference, nonfinite_test; // pixels
+    ErrorSummary linear;
+    uint32_t worst_x, worst_y; // where the largest difference is, or one of a number to none
+    // of colors only
+    bool has_color;
+    double srgb_psnr;             // of 8-bit display values, dB
+    size_t off_by_1, off_by_more; // 8-bit display values
+    double flip_mean, flip_max;
+} ImageMetrics;
+
+// False, with an error message, where the two differ in size or kind, so that there is nothing to compare.
+bool image_comparable(const Image *reference, const Image *test, MessageList *messages);
+
+// Of comparable pictures. Display values are compared as light: with the sRGB curve undone, whatever curve
+// they were written with, because a screen does so. A picture of 1 channel of display values is gray.
+ImageMetrics image_metrics(const Image *reference, const Image *test);
+
+// The largest difference among each pixel's channels, as light; infinite where one is finite and the other is
+// not, 0 where neither is.
+void image_errors(const Image *reference, const Image *test, float *errors);

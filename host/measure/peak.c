@@ -1,0 +1,102 @@
+#include "host/measure/peak.h"
+
+#include "host/base/clock.h"
+#include "host/base/text.h"
+
+static const double launch_seconds = 0.03, total_seconds = 0.3;
+
+enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of CHAIN_COUNT chains
+enum { COPY_BYTES_LARGEST = 128 << 20, COPY_BYTES_OF_ITEM = 16 };
+
+static double launch_length(Peak *peak, const LaunchTime *time)
+{
+    peak->by_events &= time->trusted;
+    return time->trusted ? time->event_seconds : time->host_seconds;
+}
+
+static cl_kernel kernel_open(const Program *program, const char *name)
+{
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program->program, name, &status);
+    cl_check(status, "clCreateKernel");
+    return kernel;
+}
+
+// The best of some launches, each made long enough for its start not to count.
+static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, uint32_t lanes, bool wide)
+{
+    const Device *device = compute->device;
+    // a group has to itself what a unit runs at once: one work-item on a CPU
+    size_t group = device->type == CL_DEVICE_TYPE_CPU ? 1 : 64;
+    size_t items = device->compute_units * group * 64;
+    size_t scalar_size = wide ? sizeof(double) : sizeof(float);
+    cl_mem results = buffer_create(compute, items * scalar_size, NULL, CL_MEM_WRITE_ONLY);
+    // a fixed point near 1, so that no chain overflows or becomes subnormal
+    const double factor = 0.5, addend = 0.5;
+    const float factor_single = 0.5F, addend_single = 0.5F;
+    kernel_argument(kernel, 1, scalar_size, wide ? (const void *)&factor : &factor_single);
+    kernel_argument(kernel, 2, scalar_size, wide ? (const void *)&addend : &addend_single);
+    kernel_argument(kernel, 3, sizeof(cl_mem), &results);
+    cl_uint rounds = 256;
+    double best = 0, start = clock_seconds();
+    while (clock_seconds() - start < total_seconds) {
+        kernel_argument(kernel, 0, sizeof rounds, &rounds);
+        LaunchTime time = kernel_launch(compute, kernel, 1, &items, &group);
+        double seconds = launch_length(peak, &time);
+        double rate = (double)items * lanes * rounds * FLOPS_OF_ROUND / seconds;
+        if (rate > best) best = rate;
+        if (seconds < launch_seconds && rounds < 1u << 28) rounds *= 2;
+    }
+    peak->flops_per_second[wide] = best;
+    cl_must(clReleaseMemObject(results));
+}
+
+static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
+{
+    const Device *device = compute->device;
+    uint64_t size = COPY_BYTES_LARGEST;
+    if (size > device->largest_buffer_bytes / 4) size = device->largest_buffer_bytes / 4;
+    if (size > device->memory_bytes / 16) size = device->memory_bytes / 16;
+    size_t items = (size_t)size / COPY_BYTES_OF_ITEM, bytes = items * COPY_BYTES_OF_ITEM;
+    cl_mem buffers[2];
+    for (cl_uint i = 0; i < 2; i++)
+        buffers[i] = buffer_create(compute, bytes, NULL, CL_MEM_READ_WRITE);
+    double best = 0, start = clock_seconds();
+    // there and back, so that both have been written before what is read counts
+    for (cl_uint turn = 0; turn < 3 || clock_seconds() - start < total_seconds; turn++) {
+        kernel_argument(kernel, 0, sizeof(cl_mem), &buffers[turn % 2]);
+        kernel_argument(kernel, 1, sizeof(cl_mem), &buffers[1 - turn % 2]);
+        LaunchTime time = kernel_launch(compute, kernel, 1, &items, NULL);
+        double rate = 2 * (double)bytes / launch_length(peak, &time);
+        if (turn >= 2 && rate > best) best = rate;
+    }
+    peak->bytes_per_second = best;
+    for (cl_uint i = 0; i < 2; i++)
+        cl_must(clReleaseMemObject(buffers[i]));
+}
+
+// At the device's own width, whatever the renderer's.
+static void program_measure(Peak *peak, Compute *compute, bool wide)
+{
+    uint32_t lanes = device_lanes(compute->device, wide);
+    Text prelude = {0};
+    text_appendf(&prelude, "#define LANES %u\n#define IS_DOUBLE %d\n", lanes, wide);
+    ProgramRequest request = {.root = "peak.cl", .prelude = text_c(&prelude), .options = "-cl-std=CL1.2"};
+    Program program;
+    program_build(compute, &request, &program);
+    cl_kernel arithmetic = kernel_open(&program, "arithmetic"), copy = kernel_open(&program, "copy");
+    arithmetic_measure(peak, compute, arithmetic, lanes, wide);
+    if (!wide) copy_measure(peak, compute, copy);
+    program_store(compute, &request, &program);
+    cl_must(clReleaseKernel(arithmetic));
+    cl_must(clReleaseKernel(copy));
+    program_close(&program);
+    text_free(&prelude);
+}
+
+void peak_measure(Peak *peak, Compute *compute, bool wide)
+{
+    *peak = (Peak){.by_events = true};
+    program_measure(peak, compute, false);
+    if (wide) program_measure(peak, compute, true);
+}

@@ -1,0 +1,49 @@
+#include "host/measure/series.h"
+
+#include "host/base/array.h"
+#include <stdlib.h>
+#include <string.h>
+
+void series_add(Series *series, double value)
+{
+    array_push(*series, value);
+}
+
+static int number_compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// Linear between neighbors (Hyndman, Fan: "Sample Quantiles in Statistical Packages", 1996, definition 7).
+static double sorted_quantile(const double *sorted, size_t count, double fraction)
+{
+    double place = fraction * (double)(count - 1);
+    size_t below = (size_t)place;
+    if (below + 1 == count) return sorted[below];
+    return sorted[below] + (place - (double)below) * (sorted[below + 1] - sorted[below]);
+}
+
+Summary series_summarize(const Series *series)
+{
+    size_t count = series->count;
+    if (count == 0) return (Summary){0};
+    double *sorted = memory_allocate(count, sizeof *sorted);
+    memcpy(sorted, series->items, count * sizeof *sorted);
+    qsort(sorted, count, sizeof *sorted, number_compare);
+    Summary summary = {
+        .min = sorted[0],
+        .median = sorted_quantile(sorted, count, 0.5),
+        .max = sorted[count - 1],
+        .quartile_range = sorted_quantile(sorted, count, 0.75) - sorted_quantile(sorted, count, 0.25),
+        .count = count,
+    };
+    free(sorted);
+    return summary;
+}
+
+void series_free(Series *series)
+{
+    free(series->items);
+    *series = (Series){0};
+}

@@ -1,0 +1,198 @@
+// The numbers of picture differences, where they can be worked out by hand, or were told by the authors' own
+// FLIP (flip-evaluator 1.7 of PyPI); tests/metrics_reference.py looks at more of them.
+#include "host/measure/flip.h"
+#include "host/measure/heatmap.h"
+#include "host/measure/image_metrics.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 64 };
+
+static void assert_near(double value, double expected, double tolerance)
+{
+    if (!(fabs(value - expected) <= tolerance)) fail_msg("%.9g, expected %.9g", value, expected);
+}
+
+// Gray display values, as a PNG holds them.
+static Image gray_image(unsigned step)
+{
+    Image image = {SIDE, SIDE, 3, malloc(SIDE * SIDE * 3 * sizeof(float)), TRANSFER_SRGB, true};
+    assert_non_null(image.values);
+    for (size_t i = 0; i < SIDE * SIDE * 3; i++)
+        image.values[i] = (float)step / 255;
+    return image;
+}
+
+static void test_equal_pictures(void **state)
+{
+    (void)state;
+    Image image = gray_image(128);
+    ImageMetrics metrics = image_metrics(&image, &image);
+    assert_int_equal(metrics.differing_count, 0);
+    assert_int_equal(metrics.off_by_1 + metrics.off_by_more, 0);
+    assert_true(isinf(metrics.linear.psnr) && isinf(metrics.srgb_psnr));
+    assert_true(metrics.flip_mean == 0 && metrics.flip_max == 0 && metrics.linear.largest == 0);
+    image_free(&image);
+}
+
+static void test_one_black_pixel(void **state)
+{
+    (void)state;
+    Image plain = gray_image(128), spot = gray_image(128);
+    for (size_t channel = 0; channel < 3; channel++)
+        spot.values[(20 * SIDE + 40) * 3 + channel] = 0;
+    ImageMetrics metrics = image_metrics(&plain, &spot);
+    assert_int_equal(metrics.differing_count, 3);
+    assert_int_equal(metrics.off_by_1, 0);
+    assert_int_equal(metrics.off_by_more, 3);
+    assert_int_equal(metrics.worst_x, 40);
+    assert_int_equal(metrics.worst_y, 20);
+    const double light = pow((128 / 255.0 + 0.055) / 1.055, 2.4), pixels = SIDE * SIDE;
+    assert_near(metrics.linear.largest, light, 1e-7);
+    assert_near(metrics.linear.rmse, light / sqrt(pixels), 1e-8);
+    assert_near(metrics.linear.bias, -light / pixels, 1e-9);
+    assert_true(metrics.linear.percentile_999 == 0); // 1 of 4096 is less than 0.1 %
+    assert_near(metrics.linear.rel_mse, light * light / (light * light + 0.01) / pixels, 1e-9);
+    assert_near(metrics.srgb_psnr, 10 * log10(pixels * 255 * 255 / (128 * 128)), 1e-9);
+    assert_near(metrics.flip_mean, 0.00041315, 1e-7);
+    assert_near(metrics.flip_max, 0.171734, 2e-6);
+    image_free(&plain);
+    image_free(&spot);
+}
+
+static void test_one_step_lighter(void **state)
+{
+    (void)state;
+    Image plain = gray_image(128), lighter = gray_image(129);
+    ImageMetrics metrics = image_metrics(&plain, &lighter);
+    assert_int_equal(metrics.off_by_1, SIDE * SIDE * 3);
+    assert_int_equal(metrics.off_by_more, 0);
+    assert_near(metrics.srgb_psnr, 48.1308, 1e-4);
+    assert_near(metrics.flip_mean, 0.0298688, 1e-5);
+    assert_near(metrics.flip_max, 0.0298688, 1e-5);
+    image_free(&plain);
+    image_free(&lighter);
+}
+
+static void test_black_and_white(void **state)
+{
+    (void)state;
+    Image black = gray_image(0), white = gray_image(255);
+    ImageMetrics metrics = image_metrics(&black, &white);
+    assert_near(metrics.linear.psnr, 0, 1e-9);
+    assert_near(metrics.linear.rel_mse, 100, 1e-9);
+    assert_near(metrics.flip_mean, 0.967392, 1e-5);
+    image_free(&black);
+    image_free(&white);
+}
+
+static void test_what_is_not_finite(void **state)
+{
+    (void)state;
+    Image plain = gray_image(128), broken = gray_image(128);
+    plain.display = broken.display = false;
+    broken.values[(2 * SIDE + 7) * 3 + 1] = NAN;
+    plain.values[30] = broken.values[30] = INFINITY;
+    ImageMetrics metrics = image_metrics(&plain, &broken);
+    assert_int_equal(metrics.differing_count, 1);
+    assert_int_equal(metrics.nonfinite_reference, 1);
+    assert_int_equal(metrics.nonfinite_test, 2);
+    assert_int_equal(metrics.linear.count, SIDE * SIDE * 3 - 2);
+    assert_true(metrics.linear.largest == 0);
+    assert_int_equal(metrics.worst_x, 7);
+    assert_int_equal(metrics.worst_y, 2);
+    assert_true(metrics.flip_max > 0 && metrics.flip_max <= 1); // the missing number shows as none
+    image_free(&plain);
+    image_free(&broken);
+}
+
+static void test_zeros_of_two_signs_differ(void **state)
+{
+    (void)state;
+    float plus = 0, minus = -0.0F;
+    Image a = {1, 1, 1, &plus, TRANSFER_NONE, false}, b = {1, 1, 1, &minus, TRANSFER_NONE, false};
+    ImageMetrics metrics = image_metrics(&a, &b);
+    assert_int_equal(metrics.differing_count, 1);
+    assert_true(metrics.linear.largest == 0);
+    assert_false(metrics.has_color);
+}
+
+static void test_summary_by_hand(void **state)
+{
+    (void)state;
+    const float expected[] = {0, 1, NAN, 2, 4, 3}, found[] = {1, 1, 5, 2, 2, -INFINITY};
+    ErrorSummary summary = error_summarize(expected, found, 6);
+    assert_int_equal(summary.count, 4);
+    assert_near(summary.largest, 2, 0);
+    assert_near(summary.bias, -0.25, 0);
+    assert_near(summary.rmse, sqrt(1.25), 1e-15);
+    assert_near(summary.psnr, -10 * log10(1.25), 1e-14);
+    assert_near(summary.rel_mse, (1 / 0.01 + 4 / 16.01) / 4, 1e-13);
+    assert_near(summary.percentile_999, 2, 0);
+    assert_int_equal(error_summarize(expected, found, 0).count, 0);
+}
+
+static void test_percentile(void **state)
+{
+    (void)state;
+    enum { COUNT = 5000 };
+    float expected[COUNT] = {0}, found[COUNT];
+    for (int i = 0; i < COUNT; i++) // every number 1e-6 .. 5000e-6 once, in a jumble, of both signs
+        found[i] = (float)((i * 1237 % COUNT + 1) * (i % 2 ? 1e-6 : -1e-6));
+    assert_near(error_summarize(expected, found, COUNT).percentile_999, 4995e-6, 1e-9);
+    assert_near(error_summarize(expected, found, COUNT).largest, 5000e-6, 1e-9);
+}
+
+static void test_kinds_that_do_not_compare(void **state)
+{
+    (void)state;
+    float value[3] = {0};
+    Image image = {1, 1, 3, value, TRANSFER_NONE, false}, other = image;
+    MessageList messages = {0};
+    assert_true(image_comparable(&image, &other, &messages));
+    other.display = true;
+    assert_false(image_comparable(&image, &other, &messages));
+    other = image;
+    other.channels = 1;
+    assert_false(image_comparable(&image, &other, &messages));
+    assert_int_equal(message_count(&messages, MESSAGE_ERROR), 2);
+    message_list_free(&messages);
+}
+
+// Green's construction keeps .30 R + .59 G + .11 B at the fraction wherever no channel is clipped.
+static void test_heatmap_rises(void **state)
+{
+    (void)state;
+    float color[3];
+    double last = -1;
+    for (int i = 0; i <= 1000; i++) {
+        heatmap_color(i / 1000.0, color);
+        double brightness = 0.30 * (double)color[0] + 0.59 * (double)color[1] + 0.11 * (double)color[2];
+        assert_true(brightness > last);
+        assert_near(brightness, i / 1000.0, 0.02);
+        last = brightness;
+    }
+    assert_near((double)color[0] + (double)color[1] + (double)color[2], 3, 1e-6);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_equal_pictures),
+        cmocka_unit_test(test_one_black_pixel),
+        cmocka_unit_test(test_one_step_lighter),
+        cmocka_unit_test(test_black_and_white),
+        cmocka_unit_test(test_what_is_not_finite),
+        cmocka_unit_test(test_zeros_of_two_signs_differ),
+        cmocka_unit_test(test_summary_by_hand),
+        cmocka_unit_test(test_percentile),
+        cmocka_unit_test(test_kinds_that_do_not_compare),
+        cmocka_unit_test(test_heatmap_rises),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
