@@ -17,6 +17,7 @@ static const struct {
     {"devices", command_devices, "list the OpenCL devices"},
     {"diff", command_diff, "tell how far apart two pictures are"},
     {"bench", command_bench, "tell how fast this device renders scenes"},
+    {"verify", command_verify, "run the hard cases on a device"},
 };
 
 enum { COMMAND_COUNT = sizeof commands / sizeof *commands };

@@ -43,13 +43,14 @@ static inline real real_sqrt(real a)
     return root;
 }
 
-// The power of two at or below a > 0; 0 for 0.
-static inline real real_power_below(real a)
+// One over the power of two at or below a > 0; huge for 0.
+static inline real real_inverse_power(real a)
 {
 #if IS_DOUBLE
-    return real_from_bits(bits_from_real(a) & (integer)(0x7ff0000000000000L));
+    return real_from_bits((integer)(0x7fe0000000000000L) -
+                          (bits_from_real(a) & (integer)(0x7ff0000000000000L)));
 #else
-    return real_from_bits(bits_from_real(a) & (integer)(0x7f800000));
+    return real_from_bits((integer)(0x7f000000) - (bits_from_real(a) & (integer)(0x7f800000)));
 #endif
 }
 

@@ -41,7 +41,21 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         roots = quadratic_roots(a.high, exact_b, c.high, discriminant.high);
     } else {
         real c = fma(-radius, radius, vector_dot(f, f));
-        roots = quadratic_roots(ray->squared, b, c, ray->squared * half_chord_squared);
+        real discriminant = ray->squared * half_chord_squared;
+        // Where a ray starts near the surface c cancels, and both roots with it. One that leaves outward
+        // needs none.
+        real squared_radius = radius * radius;
+        mask leaves = (b > (real)(0)) & (c > (real)(8 * UNIT_ROUNDOFF) * squared_radius);
+        mask beside = hit & !leaves & (c < (real)(0x1p-6f) * squared_radius);
+        if (lanes_any(beside)) {
+            PairVector exact_f = pair_vector_difference(ray->origin, center);
+            Pair exact_c = pair_subtract(pair_vector_dot(exact_f, exact_f), pair_product(radius, radius));
+            real exact_b = pair_vector_dot_vector(exact_f, ray->direction).high;
+            b = lanes_select(beside, exact_b, b);
+            c = lanes_select(beside, exact_c.high, c);
+            discriminant = lanes_select(beside, product_difference(b, b, ray->squared, c), discriminant);
+        }
+        roots = quadratic_roots(ray->squared, b, c, discriminant);
     }
     *t = sphere->id.y & ONLY_INSIDE ? roots.far : ray_first(ray, roots.near, roots.far);
     return hit & (*t > ray->near);

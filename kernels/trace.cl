@@ -1,7 +1,12 @@
-// Explicit rays, each with its closest hit. Scene and rays are taken as they are.
-#include "surface.h"
+// Explicit rays, each with its closest hit and what becomes of the ray there. Scene and rays are taken as
+// they are.
+#include "bounce.h"
 
-// rays: origin, direction, tmin, tmax of each. results: t and the geometric normal, facing the ray.
+enum { RAY_SCALARS = 8, RESULT_SCALARS = 21 };
+
+// rays: origin, direction, tmin, tmax of each. results: t; the geometric normal, facing the ray; the point;
+// the mirrored ray's origin and direction; the passed one's; how much of the ray passes; and how much light
+// passes along it from tmin to tmax. Behind t all are without meaning where nothing is hit, but for the last.
 kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, global scalar *results,
                   global int *objects_hit)
 {
@@ -9,27 +14,36 @@ kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, gl
     uint first = (uint)get_global_id(0) * LANES;
     if (first >= ray_count) return;
 
-    RealLanes value[8];
+    RealLanes value[RAY_SCALARS];
     for (uint lane = 0; lane < LANES; lane++) {
         uint index = min(first + lane, ray_count - 1);
-        for (uint i = 0; i < 8; i++)
-            value[i].each[lane] = rays[(size_t)index * 8 + i];
+        for (uint i = 0; i < RAY_SCALARS; i++)
+            value[i].each[lane] = rays[(size_t)index * RAY_SCALARS + i];
     }
     Vector origin = {value[0].all, value[1].all, value[2].all};
     Vector direction = {value[3].all, value[4].all, value[5].all};
     Ray ray = ray_make(origin, direction, value[6].all, value[7].all, mask_all());
     Hit hit = closest_hit(&scene, &ray);
     Surface surface = surface_at(&scene, &ray, &hit);
+    const Color3 white = {(real)(1), (real)(1), (real)(1)};
+    Bounce mirrored = {origin, direction, white}, passed = mirrored;
+    surface_bounce(&surface, &ray, white, &mirrored, &passed);
 
-    RealLanes t = {hit.t};
-    RealLanes x = {surface.normal.x}, y = {surface.normal.y}, z = {surface.normal.z};
+    Vector n = surface.normal, p = surface.position;
+    Vector mo = mirrored.origin, md = mirrored.direction, po = passed.origin, pd = passed.direction;
+    // clang-format off
+    RealLanes result[RESULT_SCALARS] = {
+        {hit.t}, {n.x}, {n.y}, {n.z}, {p.x}, {p.y}, {p.z},
+        {mo.x}, {mo.y}, {mo.z}, {md.x}, {md.y}, {md.z},
+        {po.x}, {po.y}, {po.z}, {pd.x}, {pd.y}, {pd.z},
+        {passed.weight.x}, {light_passing(&scene, &ray)},
+    };
+    // clang-format on
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {
         size_t index = first + lane;
-        results[index * 4] = t.each[lane];
-        results[index * 4 + 1] = x.each[lane];
-        results[index * 4 + 2] = y.each[lane];
-        results[index * 4 + 3] = z.each[lane];
+        for (uint i = 0; i < RESULT_SCALARS; i++)
+            results[index * RESULT_SCALARS + i] = result[i].each[lane];
         objects_hit[index] = (int)object.each[lane];
     }
 }

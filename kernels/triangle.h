@@ -35,23 +35,45 @@ static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *
     return edges;
 }
 
-// Compensated: the depth of the triangle's plane, its normal and height in pairs.
-static inline real triangle_plane_depth(const Triangle *triangle, const Ray *ray, real otherwise)
+// From one vertex to another, divided by a power of two: exact, and the cross product of two sides does not
+// vanish where the triangle is tiny.
+static inline Vector triangle_side(Vector from, Vector to)
 {
-    Vector a = vector_of(triangle->a);
-    PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
-    PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
-    PairVector normal = {pair_product_difference(ab.y, ac.z, ab.z, ac.y),
-                         pair_product_difference(ab.z, ac.x, ab.x, ac.z),
-                         pair_product_difference(ab.x, ac.y, ab.y, ac.x)};
-    real along = pair_vector_dot_vector(normal, ray->along).high;
-    real height = pair_vector_dot(pair_vector_difference(a, ray->origin), normal).high;
-    real depth;
-    mask crosses = plane_quotient(height, along, ray, &depth);
-    return lanes_select(crosses, depth, otherwise);
+    Vector side = vector_subtract(to, from);
+    real largest = real_max(real_max(fabs(side.x), fabs(side.y)), fabs(side.z));
+    return vector_scale(side, real_inverse_power(largest));
 }
 
-// The depth is held between those of the vertices: a sliver seen edge-on would else be hit far outside
+static inline Vector triangle_normal(const Triangle *triangle)
+{
+    Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
+    return vector_cross(triangle_side(a, b), triangle_side(a, c));
+}
+
+// The distance of the triangle's plane. Seen at a low angle both products with the normal cancel, hence twice
+// the precision; compensated, the normal itself is in pairs.
+static inline real triangle_plane_distance(const Triangle *triangle, const Ray *ray, real otherwise)
+{
+    Vector a = vector_of(triangle->a);
+    real along, height;
+    if (IS_COMPENSATED) {
+        PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
+        PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
+        PairVector normal = {pair_product_difference(ab.y, ac.z, ab.z, ac.y),
+                             pair_product_difference(ab.z, ac.x, ab.x, ac.z),
+                             pair_product_difference(ab.x, ac.y, ab.y, ac.x)};
+        along = pair_vector_dot_vector(normal, ray->direction).high;
+        height = pair_vector_dot(pair_vector_difference(a, ray->origin), normal).high;
+    } else {
+        Vector normal = triangle_normal(triangle);
+        along = vector_dot_exactly(normal, ray->direction);
+        height = vector_dot_exactly(normal, vector_subtract(a, ray->origin));
+    }
+    mask crosses = fabs(height) * (real)(SMALLEST_RATIO) < fabs(along);
+    return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), otherwise);
+}
+
+// The distance is held between those of the vertices: a sliver seen edge-on would else be hit far outside
 // itself.
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
@@ -62,14 +84,11 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     mask hit = ray->active & (all_positive | all_negative) & (edges.determinant != zero);
     if (!lanes_any(hit)) return mask_none();
 
-    real inverse = real_divide((real)(1), lanes_select(hit, edges.determinant, (real)(1)));
-    real depth = fma(edges.u * inverse, edges.a_depth,
-                     fma(edges.v * inverse, edges.b_depth, edges.w * inverse * edges.c_depth));
-    real nearest = real_min(real_min(edges.a_depth, edges.b_depth), edges.c_depth);
-    real farthest = real_max(real_max(edges.a_depth, edges.b_depth), edges.c_depth);
-    if (IS_COMPENSATED) depth = triangle_plane_depth(triangle, ray, depth);
-    depth = real_min(real_max(depth, nearest), farthest);
-    *t = real_divide(depth, real_sqrt(ray->squared));
+    real per_depth = real_sqrt(ray->inverse_squared);
+    real nearest = real_min(real_min(edges.a_depth, edges.b_depth), edges.c_depth) * per_depth;
+    real farthest = real_max(real_max(edges.a_depth, edges.b_depth), edges.c_depth) * per_depth;
+    real distance_ = triangle_plane_distance(triangle, ray, (real)(0.5f) * (nearest + farthest));
+    *t = real_min(real_max(distance_, nearest), farthest);
     return hit & (*t > ray->near);
 }
 
@@ -91,20 +110,11 @@ static inline Vector triangle_blend(TriangleWeights weights, Vector a, Vector b,
     return vector_fma(a, weights.a, vector_fma(b, weights.b, vector_scale(c, weights.c)));
 }
 
-// From one vertex to another, divided by a power of two: exact, and the cross product of two sides does not
-// vanish where the triangle is tiny.
-static inline Vector triangle_side(Vector from, Vector to)
-{
-    Vector side = vector_subtract(to, from);
-    real largest = real_max(real_max(fabs(side.x), fabs(side.y)), fabs(side.z));
-    return vector_scale(side, real_inverse_or_zero(real_power_below(largest)));
-}
-
 static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
 {
     (void)t;
     Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
-    Vector normal = vector_normalize(vector_cross(triangle_side(a, b), triangle_side(a, c)));
+    Vector normal = vector_normalize(triangle_normal(triangle));
     real size = real_max(real_max(vector_magnitude(a), vector_magnitude(b)), vector_magnitude(c));
     return patch_make(triangle_blend(triangle_weights(triangle, ray), a, b, c), normal, size);
 }

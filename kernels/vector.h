@@ -51,6 +51,15 @@ static inline real vector_dot(Vector a, Vector b)
     return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
 }
 
+// The dot product as if in twice the precision (Ogita, Rump, Oishi, Accurate sum and dot product, SIAM J.
+// Sci. Comput. 26(6), 2005, algorithm 5.3).
+static inline real vector_dot_exactly(Vector a, Vector b)
+{
+    Pair x = pair_product(a.x, b.x), y = pair_product(a.y, b.y), z = pair_product(a.z, b.z);
+    Pair two = pair_sum(x.high, y.high), three = pair_sum(two.high, z.high);
+    return three.high + (((x.low + y.low) + z.low) + (two.low + three.low));
+}
+
 // Each component to 1.5 ulp.
 static inline Vector vector_cross(Vector a, Vector b)
 {

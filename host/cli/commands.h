@@ -7,3 +7,4 @@ int command_check(int argument_count, char **arguments);
 int command_devices(int argument_count, char **arguments);
 int command_diff(int argument_count, char **arguments);
 int command_bench(int argument_count, char **arguments);
+int command_verify(int argument_count, char **arguments);

@@ -3,7 +3,7 @@
 #include "host/render/renderer_state.h"
 #include <stdlib.h>
 
-enum { PROBE_GROUP = 64, PROBE_RAYS_OF_LAUNCH = 1 << 18, RAY_SCALARS = 8, RESULT_SCALARS = 4 };
+enum { PROBE_GROUP = 64, PROBE_RAYS_OF_LAUNCH = 1 << 18, RAY_SCALARS = 8, RESULT_SCALARS = 21 };
 
 static void scalar_set(void *scalars, size_t index, bool wide, double value)
 {
@@ -16,6 +16,28 @@ static void scalar_set(void *scalars, size_t index, bool wide, double value)
 static double scalar_at(const void *scalars, size_t index, bool wide)
 {
     return wide ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
+}
+
+static void vector_at(const void *scalars, size_t index, bool wide, double vector[3])
+{
+    for (size_t axis = 0; axis < 3; axis++)
+        vector[axis] = scalar_at(scalars, index + axis, wide);
+}
+
+// The scalars of one hit, in the order of kernels/trace.cl.
+static ProbeHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object)
+{
+    ProbeHit hit = {.object = object,
+                    .t = scalar_at(scalars, index, wide),
+                    .passed = scalar_at(scalars, index + 19, wide),
+                    .light = scalar_at(scalars, index + 20, wide)};
+    vector_at(scalars, index + 1, wide, hit.normal);
+    vector_at(scalars, index + 4, wide, hit.position);
+    vector_at(scalars, index + 7, wide, hit.mirrored_origin);
+    vector_at(scalars, index + 10, wide, hit.mirrored_direction);
+    vector_at(scalars, index + 13, wide, hit.passed_origin);
+    vector_at(scalars, index + 16, wide, hit.passed_direction);
+    return hit;
 }
 
 static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count, ProbeHit *hits)
@@ -50,12 +72,8 @@ static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count,
 
     const void *result = renderer_map(renderer, results, result_size);
     const uint32_t *object = renderer_map(renderer, objects, object_size);
-    for (uint32_t i = 0; i < count; i++) {
-        hits[i].object = object[i];
-        hits[i].t = scalar_at(result, (size_t)i * RESULT_SCALARS, wide);
-        for (size_t axis = 0; axis < 3; axis++)
-            hits[i].normal[axis] = scalar_at(result, (size_t)i * RESULT_SCALARS + 1 + axis, wide);
-    }
+    for (uint32_t i = 0; i < count; i++)
+        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, wide, object[i]);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     cl_must(clFinish(compute->queue));

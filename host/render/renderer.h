@@ -4,6 +4,7 @@
 
 #include "host/opencl/compute.h"
 #include "host/render/features.h"
+#include "host/scene/probe.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
 #include <stdint.h>
@@ -66,13 +67,6 @@ typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
 // Renders the region in bands of about band_seconds each. False if the sink stopped it.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
-typedef struct {
-    double origin[3], direction[3], tmin, tmax;
-} ProbeRay;
-typedef struct {
-    uint32_t object; // UINT32_MAX: a miss
-    double t, normal[3];
-} ProbeHit;
 // Closest hits of explicit rays, by the same intersection code that renders.
 void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, ProbeHit *hits);
 

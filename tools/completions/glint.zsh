@@ -51,6 +51,16 @@ _glint_devices() {
         '(- *)'{-h,--help}'[list the options]'
 }
 
+_glint_verify() {
+    _arguments \
+        '--device[device to verify]:device:(cpu gpu)' \
+        '--precision[how exactly to compute]:precision:(fast single strict double)' \
+        '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
+        '--no-cache[build the kernels anew]' \
+        '--json[for programs]' \
+        '(- *)'{-h,--help}'[list the options]'
+}
+
 _glint_diff() {
     _arguments \
         '--heatmap[picture of the differences]:picture:_files -g "*.(png|ppm|exr|npy)"' \
@@ -85,6 +95,7 @@ _glint() {
         'devices:list the OpenCL devices'
         'diff:tell how far apart two pictures are'
         'bench:tell how fast this device renders scenes'
+        'verify:run the hard cases on a device'
     )
     if ((CURRENT == 2)); then
         _describe -o option "('--version:print the version' '--help:list the subcommands')"

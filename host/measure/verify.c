@@ -1,0 +1,276 @@
+#include "host/measure/verify.h"
+
+#include "host/base/array.h"
+#include "host/base/text.h"
+#include "host/measure/verify_run.h"
+#include "host/measure/verify_tables.h"
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { CHECKS_LARGEST = 2, BATCH = 1 << 16 };
+
+// Each has the tables of its name, and its own checks.
+static const struct {
+    const char *name, *title;
+    VerifyCheck *checks[CHECKS_LARGEST];
+} cases[] = {
+    {"S1", "sphere, from 100 to a million radii away", {0}},
+    {"S3", "tiny sphere", {0}},
+    {"S4", "ground sphere, from a millionth of its radius above", {0}},
+    {"S5", "rays an ulp beside a sphere's tangent", {0}},
+    {"S6", "inside a sphere, and leaving it", {verify_scaled_directions, verify_leaving_spheres}},
+    {"P1", "plane up to the horizon", {0}},
+    {"P3", "disc's rim from far away", {0}},
+    {"P4", "rays in a box's faces", {0}},
+    {"P5", "closed room: edges and corners", {verify_points_on_faces}},
+    {"P6", "plate thinner than an epsilon", {0}},
+    {"P7", "coincident faces", {verify_coincident_faces}},
+    {"C1", "along a cylinder's axis", {0}},
+    {"C2", "nearly along a cylinder's axis", {0}},
+    {"C3", "wire, ten million times as long as thick", {0}},
+    {"C4", "seam between a cylinder's side and caps", {0}},
+    {"C5", "cylinder's tangent from far away", {0}},
+    {"C6", "cone's apex", {0}},
+    {"C7", "along a cone's side, and its other nappe", {0}},
+    {"T1", "torus from a thousand radii away", {0}},
+    {"T2", "torus' hole and inner wall", {0}},
+    {"T3", "in a torus' equatorial plane", {0}},
+    {"T4", "a torus' circle of tangents", {0}},
+    {"T5", "thin ring", {0}},
+    {"T6", "torus that failed in production", {0}},
+    {"M1", "closed mesh: edges and vertices", {0}},
+    {"M2", "closed mesh, far from the origin", {verify_far_mesh}},
+    {"M3", "triangles from 2^-40 to 2^40", {verify_scale_ladder}},
+    {"M4", "slivers, and triangles seen edge-on", {verify_within_triangle}},
+    {"M5", "degenerate triangles", {verify_degenerate_meshes}},
+    {"M6", "hierarchy against every object; any hit against the closest", {verify_hierarchy}},
+    {"R4", "total reflection around the critical angle", {verify_critical_angle}},
+    {"R8", "degenerate cameras", {verify_camera_frames}},
+};
+
+bool verify_holds(const VerifyResult *result)
+{
+    return result->wrong + result->leaks + result->unsound + result->differing == 0;
+}
+
+double verify_roundoff(const VerifyRun *run)
+{
+    return verify_is_wide(run) ? 0x1p-53 : 0x1p-24;
+}
+
+double verify_ulp(const VerifyRun *run, double value)
+{
+    int exponent;
+    frexp(value, &exponent);
+    return ldexp(verify_roundoff(run), exponent);
+}
+
+double verify_rounded(const VerifyRun *run, double value)
+{
+    if (verify_is_wide(run)) return value;
+    volatile float narrow = (float)value; // keeps the rounding, as in host/render/flatten.c
+    return narrow;
+}
+
+void verify_round_ray(const VerifyRun *run, ProbeRay *ray)
+{
+    for (size_t axis = 0; axis < 3; axis++) {
+        ray->origin[axis] = verify_rounded(run, ray->origin[axis]);
+        ray->direction[axis] = verify_rounded(run, ray->direction[axis]);
+    }
+    ray->tmin = verify_rounded(run, ray->tmin);
+    ray->tmax = fmin(ray->tmax, verify_is_wide(run) ? DBL_MAX : (double)FLT_MAX);
+}
+
+static bool is_finite(const double vector[3])
+{
+    return isfinite(vector[0]) && isfinite(vector[1]) && isfinite(vector[2]);
+}
+
+static bool is_sound(const VerifyRun *run, const ProbeRay *ray, const ProbeHit *hit)
+{
+    if (!verify_is_hit(hit)) return true;
+    if (!isfinite(hit->t) || !(hit->t > ray->tmin) || !(hit->t < ray->tmax)) return false;
+    if (!is_finite(hit->normal) || !is_finite(hit->position)) return false;
+    if (!is_finite(hit->mirrored_origin) || !is_finite(hit->mirrored_direction)) return false;
+    if (!is_finite(hit->passed_origin) || !is_finite(hit->passed_direction)) return false;
+    if (run->tier == TIER_A) return true;
+    const double *n = hit->normal;
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    return fabs(length - 1) <= 4 * verify_roundoff(run);
+}
+
+static void count_unsound(VerifyRun *run, const ProbeRay *rays, const ProbeHit *hits, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        run->result->unsound += !is_sound(run, &rays[i], &hits[i]);
+    run->result->ray_count += count;
+}
+
+void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const ProbeRay *rays, size_t count,
+                  ProbeHit *hits)
+{
+    void *opened = run->renderer->open(run->renderer->context, scene, hierarchy);
+    run->renderer->trace(opened, rays, count, hits);
+    run->renderer->close(opened);
+    count_unsound(run, rays, hits, count);
+}
+
+bool verify_same_bits(const ProbeHit *a, const ProbeHit *b)
+{
+    if (a->object != b->object || !verify_is_hit(a)) return a->object == b->object;
+    return memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0;
+}
+
+void verify_note_error(VerifyRun *run, double error, double bound)
+{
+    VerifyResult *result = run->result;
+    if (!(error <= bound)) result->wrong++;
+    if (bound == INFINITY) return;
+    double part = bound > 0 ? error / bound : error > 0 ? INFINITY : 0;
+    double worst_part = result->bound > 0 ? result->worst / result->bound : result->worst > 0 ? INFINITY : 0;
+    if (part > worst_part || (result->worst == 0 && bound > result->bound)) {
+        result->worst = error;
+        result->bound = bound;
+    }
+}
+
+Scene verify_scene(const char *objects)
+{
+    Text text = {0};
+    text_appendf(&text, "camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n%s", objects);
+    Source source = {"verify", text_c(&text), text.count};
+    MessageList messages = {0};
+    Scene scene = {0};
+    if (!scene_read_yaml(&scene, &source, &messages))
+        fault("a scene of verify cannot be read:\n%s", source.bytes);
+    message_list_free(&messages);
+    text_free(&text);
+    return scene;
+}
+
+static void judge(VerifyRun *run, const ProbeHit *hit, const Expected *expected)
+{
+    size_t place = verify_is_wide(run) ? 0 : (size_t)run->tier;
+    bool open = expected->open >> place & 1;
+    bool should_hit = expected->object != MISS;
+    if (verify_is_hit(hit) != should_hit) {
+        run->result->wrong += !open;
+        return;
+    }
+    if (!should_hit) return;
+    if (expected->object != ANY_OBJECT && hit->object != expected->object) {
+        run->result->wrong++;
+        return;
+    }
+    double ulp = verify_ulp(run, expected->t);
+    verify_note_error(run, fabs(hit->t - expected->t - expected->rest) / ulp, expected->bounds[place] / ulp);
+}
+
+static double nudged(const VerifyRun *run, double value, double toward)
+{
+    return verify_is_wide(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
+}
+
+typedef struct {
+    ProbeRay *items;
+    size_t count, capacity;
+} RayList;
+
+// The ray and those beside it. A component of 0 has only subnormal numbers beside it, and stays.
+static void rays_add(RayList *rays, const VerifyRun *run, const PlainRay *plain)
+{
+    ProbeRay ray = {.tmin = plain->start, .tmax = INFINITY};
+    memcpy(ray.origin, plain->origin, sizeof ray.origin);
+    memcpy(ray.direction, plain->direction, sizeof ray.direction);
+    verify_round_ray(run, &ray);
+    array_push(*rays, ray);
+    double *const moved[] = {&ray.origin[0], &ray.direction[0]};
+    for (size_t k = 0; k < 2; k++) {
+        double x = *moved[k];
+        if (x == 0) continue;
+        *moved[k] = nudged(run, x, copysign(INFINITY, x));
+        array_push(*rays, ray);
+        *moved[k] = nudged(run, x, 0);
+        array_push(*rays, ray);
+        *moved[k] = x;
+    }
+}
+
+// Rays one by one: hits are exact, and do not depend on the rays' order.
+static void run_rays(VerifyRun *run, const ProbeTable *table, const Scene *scene)
+{
+    RayList rays = {0};
+    for (size_t i = 0; i < table->ray_count; i++)
+        rays_add(&rays, run, &table->rays[i]);
+    size_t width = verify_is_wide(run), count = rays.count;
+    if (count != table->expected_count[width]) fault("case %s has %zu rays", table->name, count);
+    ProbeRay *turned = memory_allocate(count, sizeof *turned);
+    for (size_t i = 0; i < count; i++)
+        turned[i] = rays.items[count - 1 - i];
+    ProbeHit *hits = memory_allocate(2 * count, sizeof *hits);
+    verify_trace(run, scene, false, rays.items, count, hits);
+    verify_trace(run, scene, true, turned, count, hits + count);
+    for (size_t i = 0; i < count; i++) {
+        judge(run, &hits[i], &table->expected[width][i]);
+        run->result->differing += !verify_same_bits(&hits[i], &hits[2 * count - 1 - i]);
+    }
+    free(rays.items);
+    free(turned);
+    free(hits);
+}
+
+static void run_family(VerifyRun *run, const ProbeTable *table, const Scene *scene)
+{
+    size_t width = verify_is_wide(run);
+    ProbeRay *rays = memory_allocate(BATCH, sizeof *rays);
+    ProbeHit *hits = memory_allocate(BATCH, sizeof *hits);
+    void *opened = run->renderer->open(run->renderer->context, scene, table->scene_make != NULL);
+    for (size_t first = 0; first < table->ray_count; first += BATCH) {
+        size_t count = table->ray_count - first < BATCH ? table->ray_count - first : BATCH;
+        for (size_t i = 0; i < count; i++) {
+            rays[i] = table->family(first + i);
+            verify_round_ray(run, &rays[i]);
+        }
+        run->renderer->trace(opened, rays, count, hits);
+        count_unsound(run, rays, hits, count);
+        for (size_t i = 0; i < count; i++) {
+            run->result->leaks += table->closed && !verify_is_hit(&hits[i]);
+            if (first + i < table->expected_count[width])
+                judge(run, &hits[i], &table->expected[width][first + i]);
+        }
+    }
+    run->renderer->close(opened);
+    free(rays);
+    free(hits);
+}
+
+static void run_table(VerifyRun *run, const ProbeTable *table)
+{
+    Scene scene;
+    if (table->scene_make) {
+        scene = scene_empty();
+        table->scene_make(&scene);
+    } else {
+        scene = verify_scene(table->scene);
+    }
+    if (table->rays)
+        run_rays(run, table, &scene);
+    else
+        run_family(run, table, &scene);
+    scene_free(&scene);
+}
+
+void verify_run(const VerifyRenderer *renderer, VerifyTier tier, VerifySink sink, void *context)
+{
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        VerifyResult result = {.name = cases[i].name, .title = cases[i].title};
+        VerifyRun run = {renderer, tier, &result};
+        for (size_t k = 0; k < probe_table_count; k++)
+            if (strcmp(probe_tables[k].name, result.name) == 0) run_table(&run, &probe_tables[k]);
+        for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
+            cases[i].checks[k](&run);
+        sink(context, &result);
+    }
+}

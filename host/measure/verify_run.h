@@ -1,0 +1,52 @@
+// Inside a run of the hard cases: what its parts share.
+#pragma once
+
+#include "host/measure/verify.h"
+
+typedef struct {
+    const VerifyRenderer *renderer;
+    VerifyTier tier;
+    VerifyResult *result;
+} VerifyRun;
+
+// What of a case is not in the tables. Counts what is wrong in the run's result.
+typedef void VerifyCheck(VerifyRun *run);
+
+VerifyCheck verify_scaled_directions; // S6
+VerifyCheck verify_leaving_spheres;   // S6
+VerifyCheck verify_points_on_faces;   // P5
+VerifyCheck verify_coincident_faces;  // P7
+VerifyCheck verify_far_mesh;          // M2
+VerifyCheck verify_scale_ladder;      // M3
+VerifyCheck verify_within_triangle;   // M4
+VerifyCheck verify_degenerate_meshes; // M5
+VerifyCheck verify_hierarchy;         // M6
+VerifyCheck verify_critical_angle;    // R4
+VerifyCheck verify_camera_frames;     // R8
+
+static inline bool verify_is_wide(const VerifyRun *run)
+{
+    return run->tier == TIER_D;
+}
+
+double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1
+double verify_ulp(const VerifyRun *run, double value);
+double verify_rounded(const VerifyRun *run, double value);
+void verify_round_ray(const VerifyRun *run, ProbeRay *ray);
+
+static inline bool verify_is_hit(const ProbeHit *hit)
+{
+    return hit->object != UINT32_MAX;
+}
+
+// Hits of rays at a scene, the hierarchy used or not. The sound ones are told from the others, which are
+// counted.
+void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const ProbeRay *rays, size_t count,
+                  ProbeHit *hits);
+bool verify_same_bits(const ProbeHit *a, const ProbeHit *b); // object, distance and normal
+
+// Notes an error of t, in ulp of it, and counts it as wrong where it is beyond the bound.
+void verify_note_error(VerifyRun *run, double error, double bound);
+
+// Reads a scene of objects, without a camera, that the program itself carries.
+Scene verify_scene(const char *objects);

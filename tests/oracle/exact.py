@@ -1,0 +1,343 @@
+"""Closest hits in exact rationals, certified roots and 300-bit balls; nothing here cancels, so that every formula is the
+textbook's own.
+
+A solid is a set of points with an exact membership test and, for a line, the places where it may begin or end. The
+line's places are sorted, a rational point between each two tells whether the stretch lies inside, and the crossings are
+where that changes. Surfaces without an inside (plane, disc, triangle) have one crossing at most.
+"""
+
+from fractions import Fraction
+from math import inf, sqrt
+
+from flint import arb, ctx, fmpq, fmpq_poly
+
+ctx.prec = 300
+SAME = fmpq(1, 2**200)  # places nearer than this are one: far below what roots of such small numbers can differ by
+
+
+def rational(number):
+    exact = Fraction(number)
+    return fmpq(exact.numerator, exact.denominator)
+
+
+def fraction(number):
+    """An fmpq, or the middle of a ball, as a Fraction."""
+    if isinstance(number, arb):
+        mantissa, exponent = number.mid().man_exp()
+        return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+    return Fraction(int(number.p), int(number.q))
+
+
+def middle(number):
+    exact = fraction(number)
+    return fmpq(exact.numerator, exact.denominator)
+
+
+def vector(numbers):
+    return [rational(number) for number in numbers]
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def subtract(a, b):
+    return [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+
+
+def floats(a):
+    return [float(fraction(x)) for x in a]
+
+
+def length(a):
+    return sqrt(float(fraction(dot(a, a))))
+
+
+class Ray:
+    def __init__(self, origin, direction, start=0):
+        self.origin, self.direction, self.start = vector(origin), vector(direction), rational(start)
+        self.scale = length(self.direction)
+
+    def at(self, t):
+        return [o + t * d for o, d in zip(self.origin, self.direction)]
+
+
+def polynomial_roots(coefficients):
+    """Real roots of a polynomial with rational coefficients, constant first, as 300-bit rationals."""
+    poly = fmpq_poly(coefficients)
+    if poly.degree() < 1:
+        return []
+    return [middle(root.real) for root, _ in poly.numer().complex_roots() if root.imag == 0]
+
+
+class Shape:
+    """center, size: for tolerances; radius: what the distance to the decision's boundary is measured in."""
+
+    def crossings(self, ray):
+        """(t, outward normal's cosine with the ray) of each crossing of a line, ascending."""
+        places = []
+        for t in sorted(self.places(ray)):
+            if not places or t - places[-1] > SAME:
+                places.append(t)
+        if not places:
+            return []
+        between = [places[0] - 1] + [(a + b) / 2 for a, b in zip(places, places[1:])] + [places[-1] + 1]
+        inside = [self.contains(ray.at(t)) for t in between]
+        return [t for i, t in enumerate(places) if inside[i] != inside[i + 1]]
+
+    def hit(self, ray):
+        """The first t beyond the ray's start, or None."""
+        return next((t for t in self.crossings(ray) if t > ray.start), None)
+
+    def cosine(self, ray, t):
+        normal = self.normal(ray.at(t))
+        return abs(float(fraction(dot(normal, ray.direction)))) / max(length(normal) * ray.scale, 1e-300)
+
+    def distance(self, ray):
+        return length(subtract(ray.origin, self.center))
+
+    def margin(self, ray):
+        """How deep the ray gets into the solid, as a part of the radius; below 0: how far it passes.
+
+        The largest depth is looked for in double along the line as it runs past the center, which is exact enough to
+        tell which side of a band it is on."""
+        toward = subtract(self.center, ray.origin)
+        squared = dot(ray.direction, ray.direction)
+        nearest = dot(toward, ray.direction) / squared
+        point = floats(subtract(ray.at(nearest), self.center))
+        step = [x / ray.scale for x in floats(ray.direction)]
+        start = max(float(fraction(ray.start - nearest)) * ray.scale, -self.reach)
+
+        def depth(s):
+            return self.depth([x + s * y for x, y in zip(point, step)])
+
+        if start >= self.reach:
+            return -inf
+        count = 400
+        marks = [start + (self.reach - start) * i / count for i in range(count + 1)] + ([0.0] if start < 0 else [])
+        marks.sort()
+        depths = [depth(s) for s in marks]
+        deepest = -inf
+        for i, value in enumerate(depths):
+            left, right = max(i - 1, 0), min(i + 1, len(marks) - 1)
+            if value < max(depths[left], depths[right]):
+                continue
+            low, high = marks[left], marks[right]
+            for _ in range(90):
+                a, b = low + (high - low) / 3, high - (high - low) / 3
+                low, high = (a, high) if depth(a) < depth(b) else (low, b)
+            deepest = max(deepest, value, depth((low + high) / 2))
+        return deepest
+
+
+class Sphere(Shape):
+    def __init__(self, center, radius):
+        self.center, self.squared = vector(center), rational(radius) ** 2
+        self.radius = self.size = float(radius)
+        self.reach = 2 * self.radius
+
+    def places(self, ray):
+        f = subtract(ray.origin, self.center)
+        return polynomial_roots([dot(f, f) - self.squared, 2 * dot(f, ray.direction), dot(ray.direction, ray.direction)])
+
+    def contains(self, point):
+        p = subtract(point, self.center)
+        return dot(p, p) <= self.squared
+
+    def normal(self, point):
+        return subtract(point, self.center)
+
+    def depth(self, p):
+        return 1 - (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (self.radius * self.radius)
+
+
+class Box(Shape):
+    def __init__(self, low, high):
+        self.low, self.high = vector(low), vector(high)
+        self.center = [(a + b) / 2 for a, b in zip(self.low, self.high)]
+        self.half = floats([(b - a) / 2 for a, b in zip(self.low, self.high)])
+        self.size = self.radius = sqrt(sum(x * x for x in self.half))
+        self.reach = 2 * self.size
+
+    def places(self, ray):
+        return [
+            (face - o) / d
+            for low, high, o, d in zip(self.low, self.high, ray.origin, ray.direction)
+            if d != 0
+            for face in (low, high)
+        ]
+
+    def contains(self, point):
+        return all(a <= x <= b for a, x, b in zip(self.low, point, self.high))
+
+    def normal(self, point):
+        faces = [min(abs(x - a), abs(x - b)) for a, x, b in zip(self.low, point, self.high)]
+        return [rational(int(face == min(faces))) for face in faces]
+
+    def cosine(self, ray, t):
+        # at an edge any of the faces that meet there may be told: the one crossed most steeply
+        faces = [min(abs(x - a), abs(x - b)) for a, x, b in zip(self.low, ray.at(t), self.high)]
+        return max(abs(float(fraction(d))) for d, face in zip(ray.direction, faces) if face == min(faces)) / ray.scale
+
+    def margin(self, ray):
+        # two zero components leave a comparison of given numbers: nothing is open
+        if sum(d == 0 for d in ray.direction) == 2:
+            return inf
+        return super().margin(ray)
+
+    def depth(self, p):
+        return min((half - abs(x)) / self.radius for half, x in zip(self.half, p))
+
+
+class Revolution(Shape):
+    """A capped cylinder or cone from one point to another, or an endless cylinder along `axis`."""
+
+    def __init__(self, base, axis, radii, endless=False):
+        self.base, self.axis = vector(base), vector(axis)
+        self.radii, self.endless = [rational(r) for r in radii], endless
+        self.along = dot(self.axis, self.axis)
+        self.axis_length = length(self.axis)
+        self.center = self.base if endless else [b + a / 2 for b, a in zip(self.base, self.axis)]
+        self.radius = float(max(map(fraction, self.radii)))
+        self.size = self.radius if endless else sqrt(self.radius**2 + self.axis_length**2 / 4)
+        self.reach = 4 * self.size
+
+    def places(self, ray):
+        # (|p|^2 - h^2 / |w|^2) = (r + (R - r) h / |w|^2)^2 with h = p . w, times |w|^4
+        f, d, w, ww = subtract(ray.origin, self.base), ray.direction, self.axis, self.along
+        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+        height = fmpq_poly([dot(f, w), dot(d, w)])
+        radius = self.radii[0] * ww + (self.radii[1] - self.radii[0]) * height
+        side = p_p * ww**2 - height * height * ww - radius * radius
+        found = polynomial_roots(side.coeffs())
+        if not self.endless and dot(d, w) != 0:
+            found += [(end - dot(f, w)) / dot(d, w) for end in (fmpq(0), ww)]
+        return found
+
+    def contains(self, point):
+        p = subtract(point, self.base)
+        height = dot(p, self.axis)
+        if not self.endless and not 0 <= height <= self.along:
+            return False
+        radius = self.radii[0] * self.along + (self.radii[1] - self.radii[0]) * height
+        return (dot(p, p) * self.along - height**2) * self.along <= radius**2
+
+    def normal(self, point):
+        p = subtract(point, self.base)
+        height = dot(p, self.axis) / self.along
+        if not self.endless and min(abs(height), abs(height - 1)) < SAME:
+            return self.axis
+        across = [x - height * a for x, a in zip(p, self.axis)]
+        radius = self.radii[0] + (self.radii[1] - self.radii[0]) * height
+        lean = radius * (self.radii[1] - self.radii[0]) / self.along
+        normal = [x - lean * a for x, a in zip(across, self.axis)]
+        return normal if any(normal) else self.axis
+
+    def depth(self, p):
+        w = [x / self.axis_length for x in floats(self.axis)]
+        q = [x + y for x, y in zip(p, floats(subtract(self.center, self.base)))]
+        height = sum(x * y for x, y in zip(q, w))
+        across = sum((x - height * y) ** 2 for x, y in zip(q, w))
+        if self.endless:
+            return 1 - across / self.radius**2
+        start, end = floats(self.radii)
+        radius = start + (end - start) * height / self.axis_length
+        ends = min(height, self.axis_length - height) / self.radius
+        if ends < 0:
+            return ends
+        return min(ends, 1 - across / max(radius * radius, 1e-300))
+
+
+class Torus(Shape):
+    """Around the z axis."""
+
+    def __init__(self, center, major, minor):
+        self.center, self.major, self.minor = vector(center), rational(major), rational(minor)
+        self.radius, self.size = float(minor), float(major) + float(minor)
+        self.reach = 1.5 * self.size
+
+    def places(self, ray):
+        f, d = subtract(ray.origin, self.center), ray.direction
+        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+        flat = fmpq_poly([f[0] ** 2 + f[1] ** 2, 2 * (f[0] * d[0] + f[1] * d[1]), d[0] ** 2 + d[1] ** 2])
+        sum_ = p_p + (self.major**2 - self.minor**2)
+        return polynomial_roots((sum_ * sum_ - 4 * self.major**2 * flat).coeffs())
+
+    def contains(self, point):
+        p = subtract(point, self.center)
+        return (dot(p, p) + self.major**2 - self.minor**2) ** 2 <= 4 * self.major**2 * (p[0] ** 2 + p[1] ** 2)
+
+    def normal(self, point):
+        p = subtract(point, self.center)
+        flat = middle(arb(p[0] ** 2 + p[1] ** 2).sqrt())
+        if flat == 0:
+            return p
+        return [p[0] * (1 - self.major / flat), p[1] * (1 - self.major / flat), p[2]]
+
+    def depth(self, p):
+        off = sqrt(p[0] ** 2 + p[1] ** 2) - float(fraction(self.major))
+        return 1 - (off * off + p[2] * p[2]) / self.radius**2
+
+
+class Plane(Shape):
+    def __init__(self, point, normal):
+        self.center, self.direction = vector(point), vector(normal)
+        self.size = self.radius = 0.0
+
+    def crossings(self, ray):
+        along = dot(self.direction, ray.direction)
+        return [] if along == 0 else [dot(self.direction, subtract(self.center, ray.origin)) / along]
+
+    def normal(self, point):
+        return self.direction
+
+    def margin(self, ray):
+        return inf
+
+
+class Disc(Plane):
+    def __init__(self, center, normal, radius):
+        super().__init__(center, normal)
+        self.squared = rational(radius) ** 2
+        self.size = self.radius = float(radius)
+
+    def off(self, ray, t):
+        v = subtract(ray.at(t), self.center)
+        return dot(v, v)
+
+    def crossings(self, ray):
+        return [t for t in super().crossings(ray) if self.off(ray, t) <= self.squared]
+
+    def margin(self, ray):
+        crossed = super().crossings(ray)
+        return float(fraction(1 - self.off(ray, crossed[0]) / self.squared)) if crossed else 0.0
+
+
+class Triangle(Plane):
+    def __init__(self, a, b, c):
+        self.vertices = [vector(a), vector(b), vector(c)]
+        self.center = self.vertices[0]
+        self.sides = [subtract(self.vertices[(i + 1) % 3], self.vertices[i]) for i in range(3)]
+        self.direction = cross(self.sides[0], self.sides[1])
+        self.size = self.radius = max(map(length, self.sides))
+
+    def edges(self, ray):
+        """Of each edge, six times the volume it spans with the ray."""
+        seen = [subtract(v, ray.origin) for v in self.vertices]
+        return [dot(ray.direction, cross(seen[i], seen[(i + 1) % 3])) for i in range(3)]
+
+    def crossings(self, ray):
+        edges = self.edges(ray)
+        return [] if min(edges) < 0 < max(edges) else super().crossings(ray)
+
+    def margin(self, ray):
+        """The smallest edge function as a part of the lengths it is made of, in units where 16 u are open."""
+        least = inf
+        for edge, side, vertex in zip(self.edges(ray), self.sides, self.vertices):
+            spread = length(side) * length(subtract(vertex, ray.origin)) * ray.scale
+            least = min(least, abs(float(fraction(edge))) / spread)
+        return least
