@@ -357,6 +357,43 @@ static void triangles_without_area_are_never_hit(void **state)
     }
 }
 
+// The only message, an error, of a renderer that is not opened.
+static void assert_refused(Compute *compute, const Scene *scene, const char *expected)
+{
+    MessageList messages = {0};
+    const RenderSettings settings = {.width = 1, .height = 1, .sample_count = 1};
+    assert_null(renderer_open(compute, scene, &settings, &messages));
+    assert_int_equal(messages.count, 1);
+    assert_int_equal(messages.items[0].severity, MESSAGE_ERROR);
+    assert_non_null(strstr(messages.items[0].text, expected));
+    message_list_free(&messages);
+}
+
+static void too_many_triangles_are_refused(void **state)
+{
+    (void)state;
+    Mesh mesh = {.triangle_count = ((size_t)1 << 28) + 1};
+    Object object = {.kind = SHAPE_MESH};
+    Scene scene = {.meshes = {&mesh, 1, 1}, .objects = {&object, 1, 1}};
+    assert_refused(&probe_compute, &scene, "268435457 objects and triangles, more than 268435456");
+}
+
+static void device_without_room_is_told(void **state)
+{
+    (void)state;
+    file_write("a.obj", octahedron);
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    Device small = *probe_compute.device;
+    Compute compute = probe_compute;
+    compute.device = &small;
+    small.largest_buffer_bytes = 64;
+    assert_refused(&compute, &scene, "the scene needs 0.0 MiB on the device");
+    small = *probe_compute.device;
+    small.memory_bytes = 64;
+    assert_refused(&compute, &scene, "the scene needs 0.0 MiB on the device");
+    scene_free(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -373,6 +410,8 @@ int main(void)
         cmocka_unit_test(scene_file_is_told_what_is_wrong),
         cmocka_unit_test(ids_count_the_triangles),
         cmocka_unit_test(triangles_without_area_are_never_hit),
+        cmocka_unit_test(too_many_triangles_are_refused),
+        cmocka_unit_test(device_without_room_is_told),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);
 }
