@@ -177,17 +177,21 @@ static void node_place(Importer *importer, const struct aiNode *node, const Affi
         node_place(importer, node->mChildren[i], &affine);
 }
 
-static Color color_of(const struct aiMaterial *material, const char *key, Color otherwise)
+// Key, type and index are what assimp's AI_MATKEY_… stand for.
+static Color color_of(const struct aiMaterial *material, const char *key, unsigned type, unsigned index,
+                      Color otherwise)
 {
     struct aiColor4D color;
-    if (aiGetMaterialColor(material, key, 0, 0, &color) != aiReturn_SUCCESS) return otherwise;
+    if (aiGetMaterialColor(material, key, type, index, &color) != aiReturn_SUCCESS) return otherwise;
     return (Color){fmax(color.r, 0), fmax(color.g, 0), fmax(color.b, 0)};
 }
 
-static double number_of(const struct aiMaterial *material, const char *key, double otherwise)
+static double number_of(const struct aiMaterial *material, const char *key, unsigned type, unsigned index,
+                        double otherwise)
 {
     ai_real number;
-    if (aiGetMaterialFloatArray(material, key, 0, 0, &number, NULL) != aiReturn_SUCCESS) return otherwise;
+    if (aiGetMaterialFloatArray(material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
+        return otherwise;
     return isfinite(number) && number >= 0 ? number : otherwise;
 }
 
@@ -195,12 +199,12 @@ static double number_of(const struct aiMaterial *material, const char *key, doub
 static Material material_of(const struct aiMaterial *file_material)
 {
     Material material = material_default();
-    Color specular = color_of(file_material, "$clr.specular", (Color){0, 0, 0});
-    material.color = color_of(file_material, "$clr.diffuse", material.color);
+    Color specular = color_of(file_material, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
+    material.color = color_of(file_material, AI_MATKEY_COLOR_DIFFUSE, material.color);
     material.specular = (specular.x + specular.y + specular.z) / 3;
-    material.shininess = number_of(file_material, "$mat.shininess", material.shininess);
-    material.transmission = fmax(0, 1 - number_of(file_material, "$mat.opacity", 1));
-    double ior = number_of(file_material, "$mat.refracti", 0);
+    material.shininess = number_of(file_material, AI_MATKEY_SHININESS, material.shininess);
+    material.transmission = fmax(0, 1 - number_of(file_material, AI_MATKEY_OPACITY, 1));
+    double ior = number_of(file_material, AI_MATKEY_REFRACTI, 0);
     if (ior > 0) material.ior = ior;
     return material;
 }
