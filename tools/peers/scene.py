@@ -1,0 +1,148 @@
+"""Reads what a YAML scene of spheres, planes and meshes holds, for the writers of other programs' formats."""
+import math
+import pathlib
+import re
+from dataclasses import dataclass, field
+
+import yaml
+
+SPHERE = re.compile(r"- sphere: {center: \[([^,]+), ([^,]+), ([^\]]+)\], radius: ([^,]+), material: (\w+)}\s*$")
+
+
+@dataclass
+class Mesh:
+    vertices: list
+    faces: list     # triples of indices of vertices
+    normals: list   # one a vertex, or none: flat
+    material: str
+
+
+@dataclass
+class Scene:
+    camera: dict
+    background: list
+    ambient: list
+    lights: list    # of (position, color)
+    materials: dict
+    spheres: list = field(default_factory=list)  # of (center, radius, material)
+    planes: list = field(default_factory=list)   # of (point, normal, material)
+    meshes: list = field(default_factory=list)
+
+    def half_tangent(self):
+        """Of the vertical field of view."""
+        return math.tan(math.radians(self.camera.get("fov", 50)) / 2)
+
+    def view(self):
+        return subtract(self.camera["look_at"], self.camera["position"])
+
+    def up(self):
+        return self.camera.get("up", [0, 1, 0])
+
+
+def subtract(a, b):
+    return [p - q for p, q in zip(a, b)]
+
+
+def cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def dot(a, b):
+    return sum(p * q for p, q in zip(a, b))
+
+
+def unit(a):
+    length = math.hypot(*a)
+    return [part / length for part in a] if length else [0, 0, 0]
+
+
+def triple(values):
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def item_texts(text):
+    """The items of the list of objects, one text each. One starts where a line starts with two blanks and a dash."""
+    item = []
+    for line in text.splitlines():
+        if line.startswith("  - ") and item:
+            yield "\n".join(item)
+            item = []
+        if line.strip() and not line.lstrip().startswith("#"):
+            item.append(line)
+    if item:
+        yield "\n".join(item)
+
+
+def rotation(degrees):
+    """About x, then y, then z."""
+    (sx, cx), (sy, cy), (sz, cz) = ((math.sin(a), math.cos(a)) for a in map(math.radians, degrees))
+    return [[cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+            [-sy, cy * sx, cy * cx]]
+
+
+def smooth_normals(vertices, faces):
+    """The mean of the normals around a vertex, weighted by the angle there."""
+    normals = [[0.0, 0.0, 0.0] for _ in vertices]
+    for face in faces:
+        corners = [vertices[i] for i in face]
+        normal = unit(cross(subtract(corners[1], corners[0]), subtract(corners[2], corners[0])))
+        for k in range(3):
+            a, b = subtract(corners[(k + 1) % 3], corners[k]), subtract(corners[(k + 2) % 3], corners[k])
+            angle = math.atan2(math.hypot(*cross(a, b)), dot(a, b))
+            total = normals[face[k]]
+            for axis in range(3):
+                total[axis] += angle * normal[axis]
+    return [unit(normal) for normal in normals]
+
+
+def read_mesh(keys, folder):
+    """An OBJ of triangles without normals of its own."""
+    transform = keys.get("transform", {})
+    scale = transform.get("scale", 1)
+    scale = scale if isinstance(scale, list) else [scale] * 3
+    turn, move = rotation(transform.get("rotate", [0, 0, 0])), transform.get("translate", [0, 0, 0])
+    vertices, faces = [], []
+    with open(folder / keys["file"]) as lines:
+        for line in lines:
+            words = line.split()
+            if words[:1] == ["v"]:
+                scaled = [float(word) * by for word, by in zip(words[1:4], scale)]
+                vertices.append([dot(row, scaled) + by for row, by in zip(turn, move)])
+            elif words[:1] == ["f"] and len(words) == 4:
+                faces.append([int(word.split("/")[0]) - 1 for word in words[1:]])
+            elif words[:1] in (["f"], ["vn"]):
+                raise ValueError(f"{keys['file']}: only triangles without normals are compared")
+    normals = smooth_normals(vertices, faces) if keys.get("smooth") else []
+    return Mesh(vertices, faces, normals, keys["material"])
+
+
+def read_scene(path):
+    path = pathlib.Path(path)
+    head, objects = path.read_text().split("\nobjects:\n")
+    data = yaml.safe_load(head)
+    lights = []
+    for light in data["lights"]:
+        point = light["point"]
+        color = [part * point.get("intensity", 1) for part in point.get("color", [1, 1, 1])]
+        lights.append((point["position"], color))
+    scene = Scene(data["camera"], data.get("background", [0, 0, 0]), data.get("ambient", [0, 0, 0]), lights,
+                  data["materials"])
+    for text in item_texts(objects):
+        quick = SPHERE.match(text.strip())  # yaml takes minutes for a million
+        if quick:
+            *numbers, material = quick.groups()
+            *center, radius = map(float, numbers)
+            scene.spheres.append((center, radius, material))
+            continue
+        (item,) = yaml.safe_load(text)
+        ((kind, keys),) = item.items()
+        if kind == "sphere":
+            scene.spheres.append((keys["center"], keys["radius"], keys["material"]))
+        elif kind == "plane":
+            scene.planes.append((keys["point"], keys["normal"], keys["material"]))
+        elif kind == "mesh":
+            scene.meshes.append(read_mesh(keys, path.parent))
+        else:
+            raise ValueError(f"{path}: only spheres, planes and meshes are compared, not a {kind}")
+    return scene

@@ -1,0 +1,69 @@
+"""Writes a scene in Tachyon's format (John Stone, Tachyon, Debian package tachyon) and runs it."""
+import re
+
+from scene import triple
+
+
+def place(values):
+    """Of a point or direction: Tachyon's coordinates are left-handed, so x is turned over."""
+    return triple([-values[0], *values[1:]])
+
+
+def frustum(scene, size):
+    """The picture's left, right, bottom and top at a distance of 1, half a pixel off to the left and down: Tachyon's
+    rays go through the upper right corners of the pixels, those of the others through the centers."""
+    top, half_pixel = scene.half_tangent(), scene.half_tangent() / size[1]
+    right = top * size[0] / size[1]
+    return [side - half_pixel for side in (-right, right, -top, top)]
+
+
+def texture(material, ambient):
+    return (f"Ambient {ambient:.9g} Diffuse {material.get('diffuse', 1)} Specular 0 Opacity 1 "
+            f"Phong Plastic {material.get('specular', 0)} Phong_size {material.get('shininess', 32)} "
+            f"Color {triple(material.get('color', [1, 1, 1]))} TexFunc 0")
+
+
+def write_mesh(write, mesh):
+    places = [place(vertex) for vertex in mesh.vertices]
+    normals = [place(normal) for normal in mesh.normals]
+    for a, c, b in mesh.faces:  # a mirrored triangle turns the other way round
+        corners = f"V0 {places[a]} V1 {places[b]} V2 {places[c]}"
+        if normals:
+            write(f"STri {corners} N0 {normals[a]} N1 {normals[b]} N2 {normals[c]} {mesh.material}\n")
+        else:
+            write(f"Tri {corners} {mesh.material}\n")
+
+
+def write_scene(scene, path, size):
+    if len(set(scene.ambient)) != 1:
+        raise ValueError("Tachyon has gray ambient light only")
+    with open(path, "w") as file:
+        write = file.write
+        write(f"Begin_Scene\nResolution {size[0]} {size[1]}\nCamera\nZoom 1\n"
+              "Aspectratio 1\nAntialiasing 0\nRaydepth 1\n"
+              f"Center {place(scene.camera['position'])}\nViewDir {place(scene.view())}\n"
+              f"UpDir {place(scene.up())}\n"
+              f"Frustum {triple(frustum(scene, size))}\nEnd_Camera\nBackground {triple(scene.background)}\n")
+        for position, color in scene.lights:
+            write(f"Light Center {place(position)} Rad 0.01 Color {triple(color)}\n")
+        for name, material in scene.materials.items():
+            write(f"TexDef {name} {texture(material, scene.ambient[0] * material.get('ambient', 1))}\n")
+        for point, normal, material in scene.planes:
+            write(f"Plane Center {place(point)} Normal {place(normal)} {material}\n")
+        for center, radius, material in scene.spheres:
+            write(f"Sphere Center {place(center)} Rad {radius:.9g} {material}\n")
+        for mesh in scene.meshes:
+            write_mesh(write, mesh)
+        write("End_Scene\n")
+
+
+def command(scene_path, picture, size):
+    """Depth 6, the eye's ray counted, is glint's five bounces."""
+    return ["tachyon", scene_path, "-res", str(size[0]), str(size[1]), "-shade_phong", "-raydepth", "6",
+            "-format", "PPM", "-o", picture]
+
+
+def stage_seconds(stdout, _stderr):
+    """What the program tells of its own time: (read, prepare, trace)."""
+    names = "Scene Parsing", "Preprocessing", "Ray Tracing"
+    return tuple(float(re.search(name + r" Time:\s*([0-9.]+)", stdout).group(1)) for name in names)
