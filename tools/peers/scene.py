@@ -112,17 +112,29 @@ def read_mesh(keys, folder):
             elif words[:1] == ["f"] and len(words) == 4:
                 faces.append([int(word.split("/")[0]) - 1 for word in words[1:]])
             elif words[:1] in (["f"], ["vn"]):
-                raise ValueError(f"{keys['file']}: only triangles without normals are compared")
+                raise ValueError(f"{keys['file']}: only triangles without normals can be compared")
     normals = smooth_normals(vertices, faces) if keys.get("smooth") else []
     return Mesh(vertices, faces, normals, keys["material"])
 
 
+def refuse_other_keys(what, mapping, known):
+    for key in mapping:
+        if key not in known:
+            raise ValueError(f"{what} with '{key}' cannot be compared, only with {', '.join(known)}")
+
+
 def read_scene(path):
     path = pathlib.Path(path)
-    head, objects = path.read_text().split("\nobjects:\n")
+    head, found, objects = path.read_text().partition("\nobjects:\n")
+    if not found:
+        raise ValueError("no list of objects at the end")
     data = yaml.safe_load(head)
+    refuse_other_keys("a camera", data["camera"], ["position", "look_at", "up", "fov"])
+    for material in data["materials"].values():
+        refuse_other_keys("a material", material, ["color", "ambient", "diffuse", "specular", "shininess"])
     lights = []
     for light in data["lights"]:
+        refuse_other_keys("a light", light, ["point"])
         point = light["point"]
         color = [part * point.get("intensity", 1) for part in point.get("color", [1, 1, 1])]
         lights.append((point["position"], color))
@@ -144,5 +156,5 @@ def read_scene(path):
         elif kind == "mesh":
             scene.meshes.append(read_mesh(keys, path.parent))
         else:
-            raise ValueError(f"{path}: only spheres, planes and meshes are compared, not a {kind}")
+            raise ValueError(f"only spheres, planes and meshes can be compared, not a {kind}")
     return scene
