@@ -6,7 +6,7 @@ CFLAGS ?= -O2 -g
 BUILD  ?= build
 PREFIX ?= /usr/local
 
-packages := libfyaml libpng OpenEXR assimp OpenCL
+packages := libfyaml libpng libturbojpeg OpenEXR assimp OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
 ifneq ($(shell pkg-config --exists $(packages) && echo found),found)
 $(error Libraries are missing; tools/setup installs or lists them)
@@ -19,7 +19,8 @@ endif
 OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Werror \
             $(patsubst -I%,-isystem %,$(shell pkg-config --cflags $(packages))) $(sanitize)
 # Of OpenEXR only the library with the C interface.
-LIBS     := $(shell pkg-config --libs libfyaml libpng assimp OpenCL) $(shell pkg-config --libs-only-L OpenEXR) \
+LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp OpenCL) \
+            $(shell pkg-config --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) -lm -lpthread
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
@@ -106,9 +107,10 @@ install: all
 	install -D -m 644 tools/completions/glint.bash $(data)/bash-completion/completions/glint
 	install -D -m 644 tools/completions/glint.zsh $(data)/zsh/site-functions/_glint
 	install -D -m 644 tools/completions/glint.fish $(data)/fish/vendor_completions.d/glint.fish
-	install -d $(data)/glint/scenes/meshes
+	install -d $(data)/glint/scenes/meshes $(data)/glint/scenes/images
 	install -m 644 scenes/*.* $(data)/glint/scenes
 	install -m 644 scenes/meshes/* $(data)/glint/scenes/meshes
+	install -m 644 scenes/images/* $(data)/glint/scenes/images
 
 uninstall:
 	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \

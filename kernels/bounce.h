@@ -10,6 +10,7 @@ typedef struct {
     Vector origin, direction; // unit
     Color3 weight;
     uint depth;
+    real travelled; // from the eye
 } Bounce;
 
 static inline mask bounce_counts(const Bounce *bounce)
@@ -19,7 +20,9 @@ static inline mask bounce_counts(const Bounce *bounce)
 
 static inline Ray bounce_ray(const Bounce *bounce)
 {
-    return ray_make(bounce->origin, bounce->direction, (real)(0), (real)(LARGEST), bounce_counts(bounce));
+    Ray ray = ray_make(bounce->origin, bounce->direction, (real)(0), (real)(LARGEST), bounce_counts(bounce));
+    ray.travelled = bounce->travelled;
+    return ray;
 }
 
 static inline Vector ray_unit_direction(const Ray *ray)
@@ -65,6 +68,7 @@ static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3
     mirrored->direction = reflected_direction(direction, surface->shading_normal);
     mirrored->origin = surface_leave(surface, false);
     mirrored->weight = vector_scale(weight, reflection);
+    mirrored->travelled = passed->travelled = surface->travelled;
 }
 
 #endif

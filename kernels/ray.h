@@ -12,6 +12,7 @@ typedef struct {
     real inverse_squared;
     real near, far; // hits lie strictly between
     mask active;    // the lanes that carry a ray at all
+    real travelled; // from the eye to the origin, for pictures on surfaces
     // for boxes: 1 / direction; huge where the component is 0
     Vector inverse;
     // for the hierarchy: the origin moved both ways along each axis by what hits may be off
@@ -68,6 +69,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     ray.inverse_squared = real_inverse_or_zero(ray.squared);
     ray.near = near;
     ray.far = far;
+    ray.travelled = (real)(0);
     ray.active = active & (ray.squared > (real)(0));
     if (HAS_BOXES || HAS_BVH)
         ray.inverse = (Vector){real_inverse_or_huge(direction.x), real_inverse_or_huge(direction.y),

@@ -41,7 +41,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray)
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) return seen;
         color = color_add_weighted(color, weight, vector_select(ray.active, seen, black));
 
-        Bounce next = {ray.origin, ray.direction, black, depth + 1}, other = next;
+        Bounce next = {ray.origin, ray.direction, black, depth + 1, ray.travelled}, other = next;
         if (any_found && depth < scene->header->bounces.x)
             surface_bounce(&surface, &ray, weight, &next, &other);
         rays_count(scene, RAYS_REFLECTED, bounce_counts(&next));

@@ -2,7 +2,7 @@
 #ifndef SURFACE_H
 #define SURFACE_H
 
-#include "scene.h"
+#include "texture.h"
 
 typedef Vector Color3;
 
@@ -26,7 +26,8 @@ typedef struct {
     Color3 color, diffuse;
     real ambient, specular, shininess;
     real reflection, transmission, ior;
-    mask entering; // the ray runs into the solid, against its outward normal
+    mask entering;  // the ray runs into the solid, against its outward normal
+    real travelled; // from the eye, along unit rays
 } Surface;
 
 static inline Patch shape_patch(const Scene *scene, uint kind, uint index, const Ray *ray, real t)
@@ -86,6 +87,8 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
     surface.reflection = surface.transmission = (real)(0);
     surface.ior = (real)(1);
 
+    surface.travelled = ray->travelled + hit->t;
+
     const integer settled = (integer)(INT_MAX);
     integer pending = lanes_select(surface.found, hit->object, settled);
     for (;;) {
@@ -106,6 +109,8 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
             mask odd = checker_odd(scene, entry.x, entry.y, &found, inward, material.grid);
             color = vector_select(odd, vector_of(material.other_color), color);
         }
+        if (HAS_IMAGES && material.image.x > 0)
+            color = picture_color(scene, entry.x, entry.y, &material, &found, ray, surface.travelled, same);
         surface.color = vector_select(same, color, surface.color);
         surface.diffuse = vector_select(same, vector_of(material.diffuse), surface.diffuse);
         surface.ambient = lanes_select(same, (real)(material.color.w), surface.ambient);

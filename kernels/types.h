@@ -34,7 +34,7 @@ enum { ONLY_INSIDE = 8 };
 typedef struct {
     scalar4 point;
     scalar4 normal;
-    scalar4 grid_u, grid_v; // checker squares along the plane: u = xyz . p + w
+    scalar4 grid_u, grid_v; // checker squares, or pictures, along the plane: u = xyz . p + w
     uint4 id;
 } Plane;
 
@@ -72,13 +72,20 @@ typedef struct {
 
 typedef struct {
     scalar4 a, b, c;
-    uint4 id; // y: 1 + the index of its TriangleNormals, 0 where it is flat
+    uint4 id; // y: 1 + the index of its TriangleNormals, 0 where it is flat; z: 1 + that of its TriangleUvs,
+              // or 0
 } Triangle;
 
 // Apart from the triangle, which is read for each ray that comes near it: these only where one is seen.
 typedef struct {
     scalar4 a, b, c; // unit
 } TriangleNormals;
+
+// Where a picture lies on it.
+typedef struct {
+    scalar4 a_b;       // u and v of a, u and v of b
+    scalar4 c_density; // u and v of c; z: texels of the full picture per unit of length
+} TriangleUvs;
 
 // Every shape: its feature, its struct, its name and its array's. Adding one begins here:
 // docs/adding-a-shape.md.
@@ -117,12 +124,23 @@ typedef struct {
     scalar4 diffuse;      // kd rgb, w: ks
     scalar4 other_color;  // the checker's second color, w: shininess
     scalar4 grid;         // xyz: where the eye stands among the checker's cells, w: cells per unit; 0: plain
-    scalar4 mirror_glass; // x: reflection, y: transmission, z: index of refraction
+    scalar4 mirror_glass; // x: reflection, y: transmission, z: index of refraction; w: texels of the picture
+                          // per unit of length, on planes and discs
     // How much light a shadow ray loses here, as -log2(transmission) in whole steps, whose sum does not
     // depend on the order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of
     // 2^-48, for double.
     uint4 opacity;
+    uint4 image; // x: 1 + the index of its picture's first level, 0: none; y: number of levels
 } Material;
+
+// A picture, full or halved again and again down to one texel.
+typedef struct {
+    uint4 place; // x: index of its first texel, the top left one; y: width, z: height
+} TextureLevel;
+
+typedef struct {
+    uint4 color; // xyz: the bits of red, green and blue as floats
+} Texel;
 
 enum { OPAQUE = 0x7fffffff }; // in x: no light passes
 
@@ -144,10 +162,11 @@ typedef struct {
     scalar4 background, ambient;
     // A picture's ray: forward + x right + y up, x and y in half pixels from the picture's center.
     scalar4 forward, right, up;
-    scalar4 extent;          // x: no coordinate of a bounded primitive is larger
-    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;           // x: of a ray, at most
-    uint4 counts[2];         // of each KIND_…, in its order
+    scalar4 extent;  // x: no coordinate of a bounded primitive is larger; y: width of a sample's share of a
+                     // pixel, at distance 1
+    uint4 picture;   // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;   // x: of a ray, at most
+    uint4 counts[2]; // of each KIND_…, in its order
     uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
 } SceneHeader;
 

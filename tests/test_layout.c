@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/opencl/compose.h"
 #include "host/render/hierarchy.h"
+#include "host/render/textures.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
@@ -61,6 +62,8 @@
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, b)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
+    REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, a_b)                      \
+    REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, c_density)                \
     REALS(FLAT_NODES, BvhNode, BvhNode, low_0)                                   \
     REALS(FLAT_NODES, BvhNode, BvhNode, high_0)                                  \
     REALS(FLAT_NODES, BvhNode, BvhNode, low_1)                                   \
@@ -73,11 +76,14 @@
     REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, mirror_glass)                  \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, opacity)                    \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, image)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
     REALS(FLAT_LIGHTS, Light, FlatLight, cone)                                   \
-    INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)
+    INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)                                \
+    INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
+    INTEGERS(FLAT_TEXELS, Texel, Texel, color)
 // clang-format on
 
 typedef struct {
@@ -94,7 +100,7 @@ typedef struct {
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY)};
 enum { MEMBER_COUNT = sizeof members / sizeof *members };
 
-// One object of every shape, so that flatten shows every struct's layout.
+// One object of every shape and a picture, so that flatten shows every struct's layout.
 static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
                                  "lights: [{point: {position: [1, 2, 3]}}]\n"
                                  "objects:\n"
@@ -106,7 +112,9 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
                                  "  - torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, minor: 1}\n"
                                  "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], normals: [[0, "
-                                 "0, 1], [0, 0, 1], [0, 0, 1]]}\n";
+                                 "0, 1], [0, 0, 1], [0, 0, 1]]}\n"
+                                 "  - mesh: {file: tests/textures/quad.obj, material: {image: "
+                                 "scenes/images/globe.png}}\n";
 
 static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
 {
@@ -115,6 +123,9 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
     const FlattenSettings settings = {
         .width = 1, .height = 1, .sample_count = 1, .shift_to_eye = true, .wide = wide};
     flatten(&flat, &scene, &settings);
+    MessageList messages = {0};
+    assert_true(textures_hang(&flat, &scene, &settings, &messages));
+    message_list_free(&messages);
     hierarchy_hang(&flat);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         assert_true(flat.arrays[kind].count > 0);

@@ -62,14 +62,9 @@ void message_add(MessageList *list, MessageSeverity severity, const char *format
     array_push(*list, message);
 }
 
-void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
-                    const char *format, ...)
+Message message_place(const Source *source, size_t offset)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    Message message = {.severity = severity, .text = message_format(format, arguments)};
-    va_end(arguments);
-
+    Message message = {0};
     if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
     if (offset > source->length) offset = source->length;
     // A byte order mark is no character of the first line.
@@ -89,7 +84,39 @@ void message_add_at(MessageList *list, MessageSeverity severity, const Source *s
     message.column = 1 + (unsigned)character_count(source->bytes + start, offset - start);
     if (message.column <= CHARACTERS_SHOWN)
         message.source_line = printable_copy(source->bytes + start, end - start, CHARACTERS_SHOWN, true);
+    return message;
+}
+
+void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
+                    const char *format, ...)
+{
+    Message message = message_place(source, offset);
+    message.severity = severity;
+    va_list arguments;
+    va_start(arguments, format);
+    message.text = message_format(format, arguments);
+    va_end(arguments);
     array_push(*list, message);
+}
+
+void message_add_placed(MessageList *list, MessageSeverity severity, const Message *place, const char *format,
+                        ...)
+{
+    Message message = {.severity = severity, .line = place->line, .column = place->column};
+    if (place->file) message.file = memory_copy_text(place->file);
+    if (place->source_line) message.source_line = memory_copy_text(place->source_line);
+    va_list arguments;
+    va_start(arguments, format);
+    message.text = message_format(format, arguments);
+    va_end(arguments);
+    array_push(*list, message);
+}
+
+void message_free(Message *message)
+{
+    free(message->file);
+    free(message->text);
+    free(message->source_line);
 }
 
 size_t message_count(const MessageList *list, MessageSeverity severity)
@@ -131,11 +158,8 @@ void message_list_print(const MessageList *list, FILE *stream)
 
 void message_list_free(MessageList *list)
 {
-    for (size_t i = 0; i < list->count; i++) {
-        free(list->items[i].file);
-        free(list->items[i].text);
-        free(list->items[i].source_line);
-    }
+    for (size_t i = 0; i < list->count; i++)
+        message_free(&list->items[i]);
     free(list->items);
     *list = (MessageList){0};
 }

@@ -37,6 +37,7 @@ bool png_decode(Image *image, const ImageFile *file);
 bool ppm_decode(Image *image, const ImageFile *file);
 bool exr_decode(Image *image, const ImageFile *file);
 bool npy_decode(Image *image, const ImageFile *file);
+bool jpeg_decode(Image *image, const ImageFile *file);
 
 // Adds `cannot read 'path': …` and returns false.
 bool image_refuse(const ImageFile *file, const char *format, ...) __attribute__((format(printf, 2, 3)));

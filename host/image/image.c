@@ -120,16 +120,17 @@ static bool image_decode(Image *image, const ImageFile *file)
         const char *start;
         bool (*decode)(Image *image, const ImageFile *file);
     } known[] = {
-        {"\x89PNG", png_decode},   {"P2", ppm_decode}, {"P3", ppm_decode},
-        {"P5", ppm_decode},        {"P6", ppm_decode}, {"\x76\x2F\x31\x01", exr_decode},
-        {"\x93NUMPY", npy_decode},
+        {"\x89PNG", png_decode},   {"P2", ppm_decode},
+        {"P3", ppm_decode},        {"P5", ppm_decode},
+        {"P6", ppm_decode},        {"\x76\x2F\x31\x01", exr_decode},
+        {"\x93NUMPY", npy_decode}, {"\xFF\xD8\xFF", jpeg_decode},
     };
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         size_t length = strlen(known[i].start);
         if (file->length >= length && memcmp(file->bytes, known[i].start, length) == 0)
             return known[i].decode(image, file);
     }
-    return image_refuse(file, "neither PNG, PPM, EXR nor NPY");
+    return image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
 }
 
 bool image_read(Image *image, const char *path, MessageList *messages)

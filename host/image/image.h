@@ -46,5 +46,5 @@ typedef struct {
     Transfer transfer;
     bool display; // 8 or 16 bit display values, scaled to 0..1, curve not undone
 } Image;
-bool image_read(Image *image, const char *path, MessageList *messages); // PNG, PPM, EXR, NPY
+bool image_read(Image *image, const char *path, MessageList *messages); // PNG, JPEG, PPM, EXR, NPY
 void image_free(Image *image);

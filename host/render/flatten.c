@@ -13,10 +13,13 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_FIRST_SHAPE + KIND_##feature] = {sizeof(Type), offsetof(Type, id) / sizeof(scalar4), 1},
     SHAPE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = {sizeof(TriangleNormals), sizeof(TriangleNormals) / sizeof(scalar4), 0},
+    [FLAT_TRIANGLE_UVS] = {sizeof(TriangleUvs), sizeof(TriangleUvs) / sizeof(scalar4), 0},
     [FLAT_NODES] = {sizeof(BvhNode), offsetof(BvhNode, children) / sizeof(scalar4), 1},
     [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
-    [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 1},
+    [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 2},
     [FLAT_LIGHTS] = {sizeof(FlatLight), offsetof(FlatLight, kind) / sizeof(scalar4), 1},
+    [FLAT_TEXTURE_LEVELS] = {sizeof(TextureLevel), 0, 1},
+    [FLAT_TEXELS] = {sizeof(Texel), 0, 1},
 };
 // clang-format on
 

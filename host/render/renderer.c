@@ -3,6 +3,7 @@
 #include "host/base/fault.h"
 #include "host/render/hierarchy.h"
 #include "host/render/renderer_state.h"
+#include "host/render/textures.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -146,11 +147,13 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
 
     double start = clock_seconds();
     FlatScene flat;
-    flatten(&flat, scene,
-            &(FlattenSettings){settings->width, settings->height, settings->sample_count,
-                               settings->bounce_count, settings->shift_to_eye, report->wide});
+    const FlattenSettings flattening = {settings->width,        settings->height,
+                                        settings->sample_count, settings->bounce_count,
+                                        settings->shift_to_eye, report->wide};
+    flatten(&flat, scene, &flattening);
+    bool textured = textures_hang(&flat, scene, &flattening, messages);
     report->flatten_seconds = clock_seconds() - start;
-    if (!scene_fits(&flat, renderer, messages)) {
+    if (!textured || !scene_fits(&flat, renderer, messages)) {
         flat_scene_free(&flat);
         free(renderer);
         return NULL;

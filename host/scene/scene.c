@@ -21,7 +21,8 @@ Material material_default(void)
                       .diffuse = {1, 1, 1},
                       .shininess = 32,
                       .ior = 1.5,
-                      .checker_size = 1};
+                      .checker_size = 1,
+                      .image_size = 1};
 }
 
 uint32_t scene_add_material(Scene *scene, const Material *material, const char *name)
@@ -74,6 +75,11 @@ void scene_free(Scene *scene)
     for (size_t i = 0; i < scene->meshes.count; i++)
         mesh_free(&scene->meshes.items[i]);
     free(scene->meshes.items);
+    for (size_t i = 0; i < scene->images.count; i++) {
+        free(scene->images.items[i].path);
+        message_free(&scene->images.items[i].place);
+    }
+    free(scene->images.items);
     *scene = (Scene){0};
 }
 

@@ -41,7 +41,15 @@ typedef struct {
     bool checker;
     Color checker_colors[2]; // in place of color
     double checker_size;     // side of a square, > 0, in scene units
+    uint32_t image;          // in place of color: 1 + index into the scene's images; 0: none
+    double image_size;       // width of a picture on a plane or disc, > 0, in scene units
 } Material;
+
+// A picture that lies on surfaces; who renders the scene reads it.
+typedef struct {
+    char *path;
+    Message place; // of its name in the scene file, without a text
+} SceneImage;
 
 typedef enum {
     SHAPE_SPHERE,
@@ -146,6 +154,10 @@ typedef struct {
         Mesh *items;
         size_t count, capacity;
     } meshes;
+    struct {
+        SceneImage *items;
+        size_t count, capacity;
+    } images;
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own picture size, or 0
 } Scene;

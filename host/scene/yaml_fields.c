@@ -102,7 +102,7 @@ bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
             mixed = true;
         if (index < field_count) seen[index] = true;
     }
-    unsigned chosen = forms & FORM_FIRST ? FORM_FIRST : FORM_SECOND;
+    unsigned chosen = forms & -forms; // the first
     for (size_t i = 0; i < field_count && !mixed; i++) {
         if (fields[i].required && (fields[i].forms & chosen) && !seen[i])
             report_error(&reader->report, mapping->offset, "%s lacks '%s'", what, fields[i].name);

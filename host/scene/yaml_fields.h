@@ -30,7 +30,7 @@ typedef struct Field Field;
 typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode *node, void *target);
 
 // The ways a mapping can be written; keys of different forms exclude each other.
-typedef enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_ANY = 3 } Form;
+typedef enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_ANY = 7 } Form;
 
 enum { OPTIONAL = false, REQUIRED = true };
 

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// So that a wrong name in a hostile file costs little.
-enum { NAMES_COMPARED = 1000 };
+// So that wrong names and many pictures in a hostile file cost little.
+enum { NAMES_COMPARED = 1000, IMAGES_LARGEST = 1000 };
 
 typedef struct {
     Color colors[2];
@@ -32,11 +32,51 @@ static bool read_checker(YamlReader *reader, const Field *field, const YamlNode 
     return true;
 }
 
+char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
+{
+    if (node->kind != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
+        expected_report(reader, name, "the name of a file", node);
+        return NULL;
+    }
+    const char *scene_file = reader->report.source->file, *file = yaml_text(&reader->tree, node);
+    const char *slash = strrchr(scene_file, '/');
+    int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - scene_file) : 0;
+    Text path = {0};
+    text_appendf(&path, "%.*s%s", folder_length, scene_file, file);
+    return path.items;
+}
+
+// Materials with the same picture share it.
+static bool read_image(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Scene *scene = reader->scene;
+    char *path = yaml_read_path(reader, field->name, node);
+    if (!path) return false;
+    size_t index = 0;
+    while (index < scene->images.count && strcmp(scene->images.items[index].path, path) != 0)
+        index++;
+    if (index == IMAGES_LARGEST) {
+        report_error(&reader->report, node->offset, "more than %d pictures", IMAGES_LARGEST);
+        free(path);
+        return false;
+    }
+    if (index == scene->images.count) {
+        SceneImage image = {path, message_place(reader->report.source, node->offset)};
+        array_push(scene->images, image);
+    } else {
+        free(path);
+    }
+    *(uint32_t *)target = (uint32_t)index + 1;
+    return true;
+}
+
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
         {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL, NULL},
         {"checker", read_checker, 0, FORM_SECOND, OPTIONAL, NULL},
+        {"image", read_image, offsetof(Material, image), FORM_THIRD, REQUIRED, NULL},
+        {"size", read_number, offsetof(Material, image_size), FORM_THIRD, OPTIONAL, &range_positive},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
         {"diffuse", read_factors, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
         {"specular", read_number, offsetof(Material, specular), FORM_ANY, OPTIONAL, &range_not_negative},
@@ -118,6 +158,28 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
     }
     *index = name->material;
     return true;
+}
+
+bool material_fits(YamlReader *reader, const YamlNode *mapping, const Object *object)
+{
+    const Scene *scene = reader->scene;
+    if (scene->materials.items[object->material].image == 0) return true;
+    const YamlNode *place = field_node(reader, mapping, "material");
+    switch (object->kind) {
+    case SHAPE_SPHERE:
+    case SHAPE_PLANE:
+    case SHAPE_DISC:
+        return true;
+    case SHAPE_MESH:
+        if (scene->meshes.items[object->as.mesh.index].uvs) return true;
+        report_error(&reader->report, place->offset, "the mesh has no uv for the material's image");
+        return false;
+    default:
+        report_error(&reader->report, place->offset,
+                     "an image lies on a sphere, plane, disc or mesh, not on a %s",
+                     shape_names[object->kind]);
+        return false;
+    }
 }
 
 uint32_t material_default_index(YamlReader *reader)

@@ -4,7 +4,6 @@
 #include "host/scene/yaml_scene.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 typedef struct {
     const YamlNode *file;
@@ -38,16 +37,6 @@ static bool read_transform(YamlReader *reader, const Field *field, const YamlNod
     return fields_read(reader, node, field->name, fields, COUNT_OF(fields), target, NULL);
 }
 
-// A relative name starts where the scene file lies. Caller frees.
-static char *path_beside(const char *scene_file, const char *name)
-{
-    const char *slash = strrchr(scene_file, '/');
-    int folder_length = slash && name[0] != '/' ? (int)(slash + 1 - scene_file) : 0;
-    Text path = {0};
-    text_appendf(&path, "%.*s%s", folder_length, scene_file, name);
-    return path.items;
-}
-
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
 {
     static const Field fields[] = {
@@ -58,14 +47,11 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
     };
     MeshFields read = {.transform.scale = {1, 1, 1}, .material = UINT32_MAX};
     if (!fields_read(reader, mapping, "mesh", fields, COUNT_OF(fields), &read, NULL)) return;
-    if (read.file->kind != YAML_SCALAR || !yaml_text(&reader->tree, read.file)[0]) {
-        expected_report(reader, "file", "the name of a file", read.file);
-        return;
-    }
+    char *path = yaml_read_path(reader, "file", read.file);
+    if (!path) return;
     MeshSmoothing smoothing = SMOOTH_AS_FILE;
     if (field_node(reader, mapping, "smooth") != mapping)
         smoothing = read.smooth ? SMOOTH_ALWAYS : SMOOTH_NEVER;
-    char *path = path_beside(reader->report.source->file, yaml_text(&reader->tree, read.file));
     const MeshImport import = {
         .path = path,
         .transform = read.transform,
@@ -75,7 +61,7 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
     Object object = {.kind = SHAPE_MESH, .material = read.material};
     if (mesh_import(reader->scene, &import, &reader->report, read.file->offset, &object.as.mesh.index)) {
         if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-        array_push(reader->scene->objects, object);
+        if (material_fits(reader, mapping, &object)) array_push(reader->scene->objects, object);
     }
     free(path);
 }

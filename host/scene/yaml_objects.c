@@ -185,6 +185,7 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         return;
     if (shape->finish && !shape->finish(reader, mapping, form, &object)) return;
     if (object.material == UINT32_MAX) object.material = material_default_index(reader);
+    if (!material_fits(reader, mapping, &object)) return;
     array_push(reader->scene->objects, object);
 }
 

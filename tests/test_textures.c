@@ -1,0 +1,452 @@
+// Pictures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
+// out here in double; the same bits at every width; and the messages for those that cannot be used.
+#include "host/base/fault.h"
+#include "host/image/image.h"
+#include "tests/frame.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <turbojpeg.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char folder[] = "/tmp/glint-textures-XXXXXX";
+static char picture_path[64];
+
+static int textures_open(void **state)
+{
+    if (!mkdtemp(folder)) return -1;
+    snprintf(picture_path, sizeof picture_path, "%s/picture.npy", folder);
+    return probe_open(state);
+}
+
+static int textures_close(void **state)
+{
+    unlink(picture_path);
+    rmdir(folder);
+    return probe_close(state);
+}
+
+typedef struct {
+    uint32_t width, height;
+    float colors[64][3]; // rows from the top
+} TestPicture;
+
+// Every texel has a color of its own, of eighths.
+static TestPicture picture_make(uint32_t width, uint32_t height)
+{
+    TestPicture picture = {width, height, {{0}}};
+    for (uint32_t i = 0; i < width * height; i++) {
+        picture.colors[i][0] = (float)(i * 5 % 8) / 8;
+        picture.colors[i][1] = (float)(i % 8) / 8;
+        picture.colors[i][2] = (float)(i / 8 % 8) / 8;
+    }
+    return picture;
+}
+
+static void picture_write(const TestPicture *picture)
+{
+    const ImageHeader header = {.format = IMAGE_NPY,
+                                .width = picture->width,
+                                .height = picture->height,
+                                .channels = 3,
+                                .npy_type = 'f'};
+    MessageList messages = {0};
+    ImageWriter *writer = image_writer_open(picture_path, &header, &messages);
+    assert_non_null(writer);
+    assert_true(image_writer_rows(writer, picture->colors, picture->height, &messages));
+    assert_true(image_writer_commit(writer, &messages));
+}
+
+// A scene that shows colors as they are, with `material` in place of MATERIAL: the picture's.
+static Scene scene_make(const char *camera, const char *object)
+{
+    Text text = {0};
+    text_appendf(&text, "camera: {%s}\nambient: [1, 1, 1]\nmaterials: {picture: {image: %s, size: 2}}\n",
+                 camera, picture_path);
+    text_appendf(&text, "objects: [{%s material: picture}}]\n", object);
+    Scene scene = scene_of_text("s.yaml", text_c(&text));
+    text_free(&text);
+    return scene;
+}
+
+// One ray along the camera's axis.
+static void check_seen(const char *camera, const char *object, double red, double green, double blue)
+{
+    Scene scene = scene_make(camera, object);
+    RenderSettings settings = frame_settings(1, 1, PRECISION_STRICT);
+    Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
+    const double expected[3] = {red, green, blue};
+    for (size_t i = 0; i < 3; i++)
+        if (!(fabs(frame.colors[i] - expected[i]) < 2e-7))
+            fail_msg("%s: channel %zu is %.9g, not %.9g", camera, i, frame.colors[i], expected[i]);
+    frame_free(&frame);
+    scene_free(&scene);
+}
+
+#define BALL          "sphere: {center: [0, 0, 0], radius: 1,"
+#define FROM(x, y, z) "position: [" #x ", " #y ", " #z "], look_at: [0, 0, 0], fov: 0.01"
+
+static void sphere_shows_east_and_west(void **state)
+{
+    (void)state;
+    const TestPicture picture = {2, 1, {{1, 0, 0.25F}, {0, 1, 0.75F}}}; // west, east
+    picture_write(&picture);
+    check_seen(FROM(-5, 0, 0), BALL, 1, 0, 0.25);
+    check_seen(FROM(5, 0, 0), BALL, 0, 1, 0.75);
+    check_seen(FROM(0, 0, 5), BALL, 0.5, 0.5, 0.5);
+    check_seen(FROM(0, 0, -5), BALL, 0.5, 0.5, 0.5); // the seam
+    check_seen(FROM(3, 0, 3), BALL, 0.25, 0.75, 0.625);
+    check_seen(FROM(-3, 0, -3), BALL, 0.75, 0.25, 0.375);
+}
+
+static void sphere_shows_north_and_south(void **state)
+{
+    (void)state;
+    const TestPicture picture = {
+        4, 2, {{0, 0, 0}, {0, 0, 1}, {0, 1, 0}, {0, 1, 1}, {1, 0, 0}, {1, 0, 1}, {1, 1, 0}, {1, 1, 1}}};
+    picture_write(&picture);
+    check_seen(FROM(0, 5, 0), BALL, 0, 0.5, 0.5);  // north: of longitude 0, the mean of two texels
+    check_seen(FROM(0, -5, 0), BALL, 1, 0.5, 0.5); // south
+    check_seen(FROM(0, 0, 5), BALL, 0.5, 0.5, 0.5);
+    check_seen(FROM(0, 4, 4), BALL, 0, 0.5, 0.5); // latitude 45: the upper row's centers
+    check_seen(FROM(4, -5.656854249492381, 4), BALL, 1, 1,
+               0); // longitude 45, latitude -45: one texel's center
+}
+
+static double picture_at(const TestPicture *picture, long column, long row, bool repeats_upward,
+                         size_t channel)
+{
+    long width = (long)picture->width, height = (long)picture->height;
+    column = (column % width + width) % width;
+    if (repeats_upward) row = (row % height + height) % height;
+    row = row < 0 ? 0 : row >= height ? height - 1 : row;
+    return (double)picture->colors[row * width + column][channel];
+}
+
+static double picture_between(const TestPicture *picture, double u, double v, bool repeats_upward,
+                              size_t channel)
+{
+    double x = u * picture->width - 0.5, y = (1 - v) * picture->height - 0.5;
+    double left = floor(x), top = floor(y), across = x - left, down = y - top;
+    long i = (long)left, j = (long)top;
+    return (1 - down) * ((1 - across) * picture_at(picture, i, j, repeats_upward, channel) +
+                         across * picture_at(picture, i + 1, j, repeats_upward, channel)) +
+           down * ((1 - across) * picture_at(picture, i, j + 1, repeats_upward, channel) +
+                   across * picture_at(picture, i + 1, j + 1, repeats_upward, channel));
+}
+
+enum { WIDTH = 61, HEIGHT = 47 };
+
+typedef void (*PictureMap)(Vector3 position, Vector3 normal, double *u, double *v);
+
+static void map_sphere(Vector3 position, Vector3 normal, double *u, double *v)
+{
+    (void)position;
+    *u = atan2(normal.x, normal.z) / (2 * M_PI) + 0.5;
+    *v = asin(fmin(fmax(normal.y, -1), 1)) / M_PI + 0.5;
+}
+
+// Twice as wide as tall, size 2.
+static void map_wall(Vector3 position, Vector3 normal, double *u, double *v)
+{
+    (void)normal;
+    *u = position.x / 2;
+    *v = position.y;
+}
+
+static void map_wall_from_behind(Vector3 position, Vector3 normal, double *u, double *v)
+{
+    (void)normal;
+    *u = -position.x / 2;
+    *v = position.y;
+}
+
+static void map_floor(Vector3 position, Vector3 normal, double *u, double *v)
+{
+    (void)normal;
+    *u = position.x / 2;
+    *v = -position.z;
+}
+
+static void map_quad(Vector3 position, Vector3 normal, double *u, double *v)
+{
+    (void)normal;
+    *u = (position.x + 2) / 4;
+    *v = (position.y + 2) / 4;
+}
+
+// Each pixel against its place in the picture, where texels are larger than pixels.
+static void check_places(const char *camera, const char *object, PictureMap map, bool repeats_upward)
+{
+    TestPicture picture = picture_make(4, 2);
+    picture_write(&picture);
+    Scene scene = scene_make(camera, object);
+    for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
+        if (!probe_has(precision)) continue;
+        RenderSettings settings = frame_settings(WIDTH, HEIGHT, precision);
+        Frame frame = frame_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_POSITION | AOV_OBJECT);
+        double allowed = precision == PRECISION_DOUBLE ? 0x1p-48 : 0x1p-19, largest = 0;
+        size_t seen = 0;
+        for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
+            if (frame.object[i] == UINT32_MAX) continue;
+            const double *n = &frame.normal[3 * i], *p = &frame.position[3 * i];
+            Vector3 normal = {n[0], n[1], n[2]}, from_eye = {p[0], p[1], p[2]};
+            if (vector_dot(normal, from_eye) > -0.3 * vector_length(from_eye))
+                continue; // foreshortened texels
+            double u, v;
+            map(vector_add(from_eye, scene.camera.position), normal, &u, &v);
+            for (size_t channel = 0; channel < 3; channel++)
+                largest = fmax(largest, fabs(frame.colors[3 * i + channel] -
+                                             picture_between(&picture, u, v, repeats_upward, channel)));
+            seen++;
+        }
+        assert_in_range(seen, WIDTH * HEIGHT / 4, WIDTH * HEIGHT);
+        if (!(largest <= allowed))
+            fail_msg("%s, %s: off by %g, more than %g", object, precision_names[precision], largest, allowed);
+        frame_free(&frame);
+    }
+    scene_free(&scene);
+}
+
+static void sphere_agrees_all_around(void **state)
+{
+    (void)state;
+    check_places("position: [1, 2, 5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, false);
+    check_places("position: [0.1, -0.3, -5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere,
+                 false);                                                                           // the seam
+    check_places("position: [0.1, 5, 0.2], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, false); // a pole
+    check_places("position: [0, -5, 0], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, false);
+}
+
+static void planes_repeat_it(void **state)
+{
+    (void)state;
+    check_places("position: [0.3, 0.2, 3], look_at: [0.5, 0.5, 0]",
+                 "plane: {point: [0, 0, 0], normal: [0, 0, 1],", map_wall, true);
+    check_places("position: [0.3, 0.2, -3], look_at: [0.5, 0.5, 0]",
+                 "plane: {point: [0, 0, 0], normal: [0, 0, -3],", map_wall_from_behind, true);
+    check_places("position: [0.3, 3, 0.5], look_at: [0, 0, 0]",
+                 "plane: {point: [0, 0, 0], normal: [0, 1, 0],", map_floor, true);
+    check_places("position: [0.3, 3, 0.5], look_at: [0, 0, 0]",
+                 "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5,", map_floor, true);
+}
+
+static void meshes_have_it_by_uv(void **state)
+{
+    (void)state;
+    check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/quad.obj,",
+                 map_quad, true);
+}
+
+// Far away, where a pixel sees the whole picture and more, the mean of all texels. 5 x 3 is nowhere a half of
+// anything.
+static void far_away_it_is_its_mean(void **state)
+{
+    (void)state;
+    static const uint32_t sizes[][2] = {{8, 8}, {5, 3}, {7, 1}, {1, 6}, {1, 1}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        TestPicture picture = picture_make(sizes[i][0], sizes[i][1]);
+        uint32_t count = picture.width * picture.height;
+        double mean[3] = {0};
+        for (uint32_t k = 0; k < 3 * count; k++)
+            mean[k % 3] += (double)picture.colors[k / 3][k % 3] / count;
+        picture_write(&picture);
+        const char *far_camera = "position: [0, 0, 1000], look_at: [0, 0, 0], fov: 5";
+        check_seen(far_camera, BALL, mean[0], mean[1], mean[2]);
+        check_seen(far_camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", mean[0], mean[1], mean[2]);
+        check_seen(far_camera, "mesh: {file: tests/textures/quad.obj,", mean[0], mean[1], mean[2]);
+    }
+}
+
+// A pixel sees 3 texels of a row across, halfway between those levels where a texel stands for 2 and for 4.
+static void between_levels_it_blends(void **state)
+{
+    (void)state;
+    TestPicture picture = {8, 8, {{0}}};
+    for (uint32_t i = 0; i < 64; i++)
+        picture.colors[i][0] = i % 8 < 2; // two columns of eight
+    picture_write(&picture);
+    // 0.25 a texel; 2 distance tan(fov / 2) = 0.75. The eye looks at the middle of a texel of 2 columns,
+    // which is the second of the four: black, its neighbors of half the picture's width: the colors 1 and 0.
+    double finer = 0, coarser = 0.5 * (1 - 0.25); // of 4 columns: white in half of the first
+    char camera[128];
+    snprintf(camera, sizeof camera, "position: [0.75, 0.75, 1], look_at: [0.75, 0.75, 0], fov: %.17g",
+             2 * atan(0.375) * 180 / M_PI);
+    check_seen(camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", (finer + coarser) / 2, 0, 0);
+}
+
+// A mirror's picture of a picture is filtered for the whole way to the eye.
+static void mirrors_filter_it_too(void **state)
+{
+    (void)state;
+    TestPicture picture = picture_make(8, 8);
+    double mean[3] = {0};
+    for (uint32_t k = 0; k < 192; k++)
+        mean[k % 3] += (double)picture.colors[k / 3][k % 3] / 64;
+    picture_write(&picture);
+    check_seen("position: [0, 0, 1000], look_at: [0, 0, 0], fov: 5",
+               "plane: {point: [0, 0, 0], normal: [0, 0, 1], material: {color: [0, 0, 0], reflection: 1}}},\n"
+               "  {plane: {point: [0, 0, 1001], normal: [0, 0, -1],",
+               mean[0], mean[1], mean[2]);
+}
+
+static void every_build_gives_the_same_bits(void **state)
+{
+    (void)state;
+    static const uint32_t lane_counts[] = {1, 4, 8, 16};
+    Scene scene = scene_of_file("scenes/globe.yaml");
+    for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
+        RenderSettings settings = frame_settings(71, 41, precision);
+        settings.lanes = 1;
+        Frame expected = frame_render(&probe_compute, &scene, &settings, 0);
+        assert_int_equal(frame_count_faulty(&expected), 0);
+        for (size_t i = 0; i < 4; i++) {
+            settings.lanes = lane_counts[i];
+            settings.bvh = BVH_ON;
+            settings.extra_features = i == 3 ? FEATURE_ALL : 0;
+            Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
+            frame_assert_same(&frame, &expected, precision_names[precision]);
+            frame_free(&frame);
+        }
+        frame_free(&expected);
+    }
+    scene_free(&scene);
+}
+
+static void jpeg_is_read(void **state)
+{
+    (void)state;
+    enum { SIDE = 16 };
+    uint8_t pixels[SIDE * SIDE * 3], *bytes = NULL;
+    for (size_t i = 0; i < sizeof pixels; i++)
+        pixels[i] = (uint8_t[]){200, 120, 40}[i % 3];
+    unsigned long length = 0;
+    tjhandle encoder = tjInitCompress();
+    assert_int_equal(
+        tjCompress2(encoder, pixels, SIDE, 0, SIDE, TJPF_RGB, &bytes, &length, TJSAMP_420, 95, 0), 0);
+    FILE *file = fopen(picture_path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, length, file), length);
+    fclose(file);
+    Image image;
+    MessageList messages = {0};
+    assert_true(image_read(&image, picture_path, &messages));
+    assert_int_equal(image.width, SIDE);
+    assert_int_equal(image.height, SIDE);
+    assert_true(image.display);
+    for (size_t i = 0; i < sizeof pixels; i++)
+        assert_true(fabs((double)image.values[i] * 255 - pixels[i]) <= 2);
+    image_free(&image);
+    // sRGB, made linear
+    double linear[3];
+    for (size_t i = 0; i < 3; i++)
+        linear[i] = pow(((double)pixels[i] / 255 + 0.055) / 1.055, 2.4);
+    Scene scene = scene_make(FROM(0, 0, 5), BALL);
+    RenderSettings settings = frame_settings(1, 1, PRECISION_SINGLE);
+    Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
+    for (size_t i = 0; i < 3; i++)
+        assert_true(fabs(frame.colors[i] - linear[i]) < 0.015);
+    frame_free(&frame);
+    scene_free(&scene);
+
+    assert_int_equal(truncate(picture_path, 20), 0);
+    assert_false(image_read(&image, picture_path, &messages));
+    message_list_free(&messages);
+    tjFree(bytes);
+    tjDestroy(encoder);
+}
+
+#define MATERIALS                                                                                            \
+    "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 5, "                 \
+    "5]}}]\nmaterials:\n"
+
+static void scene_faults_are_told(void **state)
+{
+    (void)state;
+    assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
+                    "4:21: error: 'color' cannot stand beside 'image'\n");
+    assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n", "4:6: error: material lacks 'image'\n");
+    assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
+                    "4:27: error: 'size' must be greater than 0\n");
+    assert_messages("s.yaml", MATERIALS "  a: {image: [1, 2]}\n",
+                    "4:14: error: 'image' must be the name of a file, not a list\n");
+    assert_messages("s.yaml",
+                    MATERIALS
+                    "  a: {image: a.png}\nobjects: [{box: {min: [0, 0, 0], max: [1, 1, 1], material: a}}]\n",
+                    "5:60: error: an image lies on a sphere, plane, disc or mesh, not on a box\n");
+    assert_messages("s.yaml",
+                    MATERIALS
+                    "  a: {image: a.png}\nobjects: [{mesh: {file: tests/textures/bare.obj, material: a}}]\n",
+                    "5:60: error: the mesh has no uv for the material's image\n");
+}
+
+// What renderer_open says about the picture, at its place in the scene file.
+static void check_refused(const char *expected)
+{
+    Scene scene = scene_make(FROM(0, 0, 5), BALL);
+    RenderSettings settings = frame_settings(4, 4, PRECISION_SINGLE);
+    MessageList messages = {0};
+    assert_null(renderer_open(&probe_compute, &scene, &settings, &messages));
+    assert_int_equal(messages.count, 1);
+    Text described = {0};
+    message_describe(&described, &messages.items[0]);
+    if (!strstr(text_c(&described), expected) || strncmp(text_c(&described), "3:30: error: ", 13) != 0)
+        fail_msg("%s lacks %s", text_c(&described), expected);
+    assert_non_null(messages.items[0].source_line);
+    text_free(&described);
+    message_list_free(&messages);
+    scene_free(&scene);
+}
+
+static void picture_faults_are_told(void **state)
+{
+    (void)state;
+    unlink(picture_path);
+    check_refused("No such file");
+    FILE *file = fopen(picture_path, "w");
+    fputs("not a picture", file);
+    fclose(file);
+    check_refused("neither PNG, JPEG, PPM, EXR nor NPY");
+    TestPicture picture = picture_make(3, 2);
+    picture.colors[4][1] = NAN;
+    picture_write(&picture);
+    check_refused("a color is not finite");
+}
+
+static void pictures_are_shared(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text(
+        "there/s.yaml",
+        MATERIALS "  a: {image: a.png}\n  b: {image: b.png}\n  c: {image: a.png}\n  d: {image: /a.png}\n");
+    assert_int_equal(scene.images.count, 3);
+    assert_string_equal(scene.images.items[0].path, "there/a.png");
+    assert_string_equal(scene.images.items[2].path, "/a.png");
+    assert_int_equal(scene.materials.items[2].image, 1);
+    scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sphere_shows_east_and_west),
+        cmocka_unit_test(sphere_shows_north_and_south),
+        cmocka_unit_test(sphere_agrees_all_around),
+        cmocka_unit_test(planes_repeat_it),
+        cmocka_unit_test(meshes_have_it_by_uv),
+        cmocka_unit_test(far_away_it_is_its_mean),
+        cmocka_unit_test(between_levels_it_blends),
+        cmocka_unit_test(mirrors_filter_it_too),
+        cmocka_unit_test(every_build_gives_the_same_bits),
+        cmocka_unit_test(jpeg_is_read),
+        cmocka_unit_test(scene_faults_are_told),
+        cmocka_unit_test(picture_faults_are_told),
+        cmocka_unit_test(pictures_are_shared),
+    };
+    return cmocka_run_group_tests(tests, textures_open, textures_close);
+}
