@@ -63,7 +63,8 @@ PYTHON
 compare() {
     local want=$1 what=$2 baseline=$3 got
     shift 3
-    "$GLINT" bench scenes/article.yaml "${quick[@]}" --lanes 1 --compare "$baseline" "$@" >"$scratch/out" 2>"$scratch/errors"
+    "$GLINT" bench scenes/article.yaml "${quick[@]}" --lanes 1 --compare "$baseline" "$@" \
+        >"$scratch/out" 2>"$scratch/errors"
     got=$?
     if [ $got = "$want" ]; then pass; else fail "$what: exit status $got, expected $want: $(cat "$scratch/errors")"; fi
 }
@@ -85,15 +86,11 @@ compare 0 "against itself" "$scratch/report" --tolerance 1000000
 check "the ratio is told" grep -q 'to the baseline: frame [0-9.]*, kernel [0-9.]*$' "$scratch/out"
 # a machine that is busy may take many times as long, but not a millionth
 doctor 0.000001 "$scratch/faster"
-compare 3 "against a faster one" "$scratch/faster" --tolerance 10
-check "the slower row is marked" grep -q SLOWER "$scratch/out"
-compare 3 "the same, as JSON" "$scratch/faster" --json
+compare 3 "against a faster one" "$scratch/faster" --tolerance 10 --json
 check "the ratio in JSON" python3 -c '
 import json, sys
 ratio = json.load(open(sys.argv[1]))["runs"][0]["ratio"]
 assert ratio["slower"] is True and ratio["frame"] > 10 and ratio["kernel"] > 10, ratio' "$scratch/out"
-doctor 1e6 "$scratch/slower"
-compare 0 "against a slower one" "$scratch/slower"
 compare 1 "without a row in common" "$scratch/report" --size 16x16
 compare 1 "against what is no report" README.md
 compare 1 "against what is not there" "$scratch/none"

@@ -1,0 +1,129 @@
+#include "host/cli/bench_variant.h"
+
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/cli/progress.h"
+#include "host/measure/work.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { BUILD_TEST_SIDE = 64 };
+
+static bool picture_stop(void *context, const Band *band, double fraction_done)
+{
+    (void)context, (void)band, (void)fraction_done;
+    return !progress_interrupted();
+}
+
+// From a program's first command to its kernel's first run: drivers may finish the build at the first launch.
+static double build_length(const RenderReport *report)
+{
+    double seconds = report->build_seconds;
+    if (report->launches.count > 0) {
+        const LaunchTime *first = &report->launches.items[0].time;
+        seconds += first->host_seconds - (first->trusted ? first->event_seconds : 0);
+    }
+    return seconds;
+}
+
+// Renders a corner of the picture with a program of its own; *from_cache tells where that came from. False
+// where the settings do not fit.
+static bool build_try(Compute *compute, const Variant *variant, bool no_cache, double *seconds,
+                      bool *from_cache, MessageList *messages)
+{
+    RenderSettings settings = variant->settings;
+    settings.no_cache = no_cache;
+    if (settings.region_width > BUILD_TEST_SIDE) settings.region_width = BUILD_TEST_SIDE;
+    if (settings.region_height > BUILD_TEST_SIDE) settings.region_height = BUILD_TEST_SIDE;
+    Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
+    if (!renderer) return false;
+    renderer_render(renderer, 0, picture_stop, NULL);
+    *seconds = build_length(renderer_report(renderer));
+    *from_cache = renderer_report(renderer)->build_from_cache;
+    renderer_close(renderer);
+    return true;
+}
+
+static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *row, MessageList *messages)
+{
+    bool from_cache = false;
+    if (!build_try(compute, variant, true, &row->build_cold.value, &from_cache, messages)) return false;
+    // the first time may fill the cache
+    for (int attempt = 0; attempt < 2 && !from_cache; attempt++)
+        if (!build_try(compute, variant, false, &row->build_cached.value, &from_cache, messages))
+            return false;
+    if (!from_cache) row->build_cached.why_not = "there is no cache, or the driver gives no binary for it";
+    return true;
+}
+
+static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, MessageList *messages)
+{
+    RenderSettings settings = variant->settings;
+    settings.counting = true;
+    Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
+    if (!renderer) return false;
+    renderer_render(renderer, 0, picture_stop, NULL);
+    // both in the order of the RAYS_… of kernels/types.h
+    memcpy(row->rays, renderer_report(renderer)->rays, sizeof row->rays);
+    renderer_close(renderer);
+    return true;
+}
+
+void variant_open(Compute *compute, Variant *variant, BenchRow *row)
+{
+    MessageList messages = {0};
+    const RenderSettings *settings = &variant->settings;
+    row->key.lanes = settings->lanes ? settings->lanes
+                                     : device_lanes(compute->device, settings->precision == PRECISION_DOUBLE);
+    if (builds_measure(compute, variant, row, &messages) && rays_count(compute, variant, row, &messages))
+        variant->renderer = renderer_open(compute, variant->scene, settings, &messages);
+    if (variant->renderer) {
+        const RenderReport *report = renderer_report(variant->renderer);
+        row->wide = report->wide;
+        row->hierarchy = (report->features & FEATURE_BVH) != 0;
+        row->flops_per_ray = work_flops_per_ray(variant->scene);
+        size_t bytes =
+            (size_t)settings->width * settings->height * 3 * (row->wide ? sizeof(double) : sizeof(float));
+        row->picture_bytes = (double)bytes;
+        variant->pixels = memory_allocate(bytes, 1);
+    } else {
+        row->failure = memory_copy_text(messages.count > 0 ? messages.items[0].text : "unknown");
+    }
+    message_list_free(&messages);
+}
+
+typedef struct {
+    Variant *variant;
+    size_t row_bytes;
+    double end_seconds;
+} RunContext;
+
+static bool band_keep(void *context, const Band *band, double fraction_done)
+{
+    (void)fraction_done;
+    RunContext *run = context;
+    memcpy(run->variant->pixels + band->first_row * run->row_bytes, band->colors,
+           band->row_count * run->row_bytes);
+    run->end_seconds = clock_seconds();
+    return !progress_interrupted();
+}
+
+bool variant_run(Variant *variant, BenchTimes *times)
+{
+    renderer_report_restart(variant->renderer);
+    const RenderReport *report = renderer_report(variant->renderer);
+    size_t scalar = report->wide ? sizeof(double) : sizeof(float);
+    RunContext run = {variant, variant->settings.width * 3 * scalar, 0};
+    if (!renderer_render(variant->renderer, 0, band_keep, &run)) return false;
+    for (size_t i = 0; times && i < report->launches.count; i++)
+        bench_add_launch(times, &report->launches.items[i].time);
+    if (times) bench_end_run(times, run.end_seconds - report->launches.items[0].time.host_start_seconds);
+    return true;
+}
+
+void variant_close(Variant *variant)
+{
+    renderer_close(variant->renderer);
+    free(variant->pixels);
+    *variant = (Variant){0};
+}
