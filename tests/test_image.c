@@ -356,8 +356,8 @@ static void check_refused(const char *bytes, size_t length, const char *reason)
 static void test_bad_files(void **state)
 {
     (void)state;
-    CHECK_REFUSED("", "neither PNG, PPM, EXR nor NPY");
-    CHECK_REFUSED("hello", "neither PNG, PPM, EXR nor NPY");
+    CHECK_REFUSED("", "neither PNG, JPEG, PPM, EXR nor NPY");
+    CHECK_REFUSED("hello", "neither PNG, JPEG, PPM, EXR nor NPY");
     CHECK_REFUSED("P6\n1 x\n255\n", "PPM: the header is damaged");
     CHECK_REFUSED("P6\n1 1\n70000\nabc", "PPM: the maximum must be 1 to 65535, not 70000");
     CHECK_REFUSED("P6\n0 1\n255\n", "the picture is empty");

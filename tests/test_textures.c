@@ -62,7 +62,7 @@ static void picture_write(const TestPicture *picture)
     assert_true(image_writer_commit(writer, &messages));
 }
 
-// A scene that shows colors as they are, with `material` in place of MATERIAL: the picture's.
+// A scene that shows colors as they are, and one object, whose material is the picture's.
 static Scene scene_make(const char *camera, const char *object)
 {
     Text text = {0};
@@ -180,6 +180,11 @@ static void map_quad(Vector3 position, Vector3 normal, double *u, double *v)
     *v = (position.y + 2) / 4;
 }
 
+static Vector3 vector_at(const double *values, size_t pixel)
+{
+    return (Vector3){values[3 * pixel], values[3 * pixel + 1], values[3 * pixel + 2]};
+}
+
 // Each pixel against its place in the picture, where texels are larger than pixels.
 static void check_places(const char *camera, const char *object, PictureMap map, bool repeats_upward)
 {
@@ -194,8 +199,7 @@ static void check_places(const char *camera, const char *object, PictureMap map,
         size_t seen = 0;
         for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
             if (frame.object[i] == UINT32_MAX) continue;
-            const double *n = &frame.normal[3 * i], *p = &frame.position[3 * i];
-            Vector3 normal = {n[0], n[1], n[2]}, from_eye = {p[0], p[1], p[2]};
+            Vector3 normal = vector_at(frame.normal, i), from_eye = vector_at(frame.position, i);
             if (vector_dot(normal, from_eye) > -0.3 * vector_length(from_eye))
                 continue; // foreshortened texels
             double u, v;
