@@ -42,11 +42,11 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     } else {
         real c = fma(-radius, radius, vector_dot(f, f));
         real discriminant = ray->squared * half_chord_squared;
-        // Where a ray starts near the surface c cancels, and both roots with it. One that leaves outward
-        // needs none.
+        // Within a 32nd of the radius of the surface c cancels, and both roots with it: pairs instead. A ray
+        // that leaves outward needs none.
         real squared_radius = radius * radius;
         mask leaves = (b > (real)(0)) & (c > (real)(8 * UNIT_ROUNDOFF) * squared_radius);
-        mask beside = hit & !leaves & (c < (real)(0x1p-6f) * squared_radius);
+        mask beside = hit & !leaves & (fabs(c) < (real)(0x1p-4f) * squared_radius);
         if (lanes_any(beside)) {
             PairVector exact_f = pair_vector_difference(ray->origin, center);
             Pair exact_c = pair_subtract(pair_vector_dot(exact_f, exact_f), pair_product(radius, radius));
