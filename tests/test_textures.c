@@ -378,7 +378,7 @@ static void scene_faults_are_told(void **state)
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
                     "4:27: error: 'size' must be greater than 0\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: [1, 2]}\n",
-                    "4:14: error: 'image' must be the name of a file, not a list\n");
+                    "4:14: error: 'image' must be the name of a file, not a list of 2\n");
     assert_messages("s.yaml",
                     MATERIALS
                     "  a: {image: a.png}\nobjects: [{box: {min: [0, 0, 0], max: [1, 1, 1], material: a}}]\n",
