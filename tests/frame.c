@@ -16,6 +16,7 @@ RenderSettings frame_settings(uint32_t width, uint32_t height, Precision precisi
                             .region_width = width,
                             .region_height = height,
                             .sample_count = 1,
+                            .bounce_count = 5,
                             .precision = precision,
                             .shift_to_eye = true};
 }
@@ -51,12 +52,14 @@ static bool frame_take_band(void *context, const Band *band, double fraction_don
 static Frame frame_open(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs)
 {
     size_t pixels = (size_t)width * height;
-    Frame frame = {width, height, light_count, memory_allocate_zeroed(3 * pixels, sizeof(double)), 0, 0, 0, 0, 0};
+    Frame frame = {width, height, light_count, memory_allocate_zeroed(3 * pixels, sizeof(double)), 0, 0, 0,
+                   0,     0};
     if (aovs & AOV_T) frame.t = memory_allocate_zeroed(pixels, sizeof *frame.t);
     if (aovs & AOV_NORMAL) frame.normal = memory_allocate_zeroed(3 * pixels, sizeof *frame.normal);
     if (aovs & AOV_POSITION) frame.position = memory_allocate_zeroed(3 * pixels, sizeof *frame.position);
     if (aovs & AOV_OBJECT) frame.object = memory_allocate_zeroed(pixels, sizeof *frame.object);
-    if (aovs & AOV_SHADOW) frame.shadow = memory_allocate_zeroed(pixels * light_count + 1, sizeof *frame.shadow);
+    if (aovs & AOV_SHADOW)
+        frame.shadow = memory_allocate_zeroed(pixels * light_count + 1, sizeof *frame.shadow);
     return frame;
 }
 
@@ -90,8 +93,8 @@ Frame frame_cut(const Frame *frame, uint32_t x, uint32_t y, uint32_t width, uint
 {
     Frame cut = frame_open(width, height, 0, 0);
     for (uint32_t row = 0; row < height; row++)
-        memcpy(cut.colors + 3 * (size_t)row * width, frame->colors + 3 * ((size_t)(y + row) * frame->width + x),
-               3 * width * sizeof *cut.colors);
+        memcpy(cut.colors + 3 * (size_t)row * width,
+               frame->colors + 3 * ((size_t)(y + row) * frame->width + x), 3 * width * sizeof *cut.colors);
     return cut;
 }
 
@@ -106,8 +109,8 @@ Frame frame_flipped(const Frame *frame)
     return flipped;
 }
 
-static void numbers_assert_same(const Frame *frame, const double *values, const double *expected, size_t channels,
-                                const char *kind, const char *what)
+static void numbers_assert_same(const Frame *frame, const double *values, const double *expected,
+                                size_t channels, const char *kind, const char *what)
 {
     if (!values || !expected) return;
     size_t count = channels * frame->width * frame->height, differing = 0, first = 0;
@@ -118,9 +121,9 @@ static void numbers_assert_same(const Frame *frame, const double *values, const 
     }
     if (differing == 0) return;
     size_t pixel = first / channels;
-    fail_msg("%s: %s: %zu of %zu values differ, first at pixel %zu,%zu channel %zu: %.9g, expected %.9g", what, kind,
-             differing, count, pixel % frame->width, pixel / frame->width, first % channels, values[first],
-             expected[first]);
+    fail_msg("%s: %s: %zu of %zu values differ, first at pixel %zu,%zu channel %zu: %.9g, expected %.9g",
+             what, kind, differing, count, pixel % frame->width, pixel / frame->width, first % channels,
+             values[first], expected[first]);
 }
 
 static void integers_assert_same(const Frame *frame, const uint32_t *values, const uint32_t *expected,

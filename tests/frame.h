@@ -6,9 +6,9 @@
 // Rows from the top; values of float kernels are widened, which is exact.
 typedef struct {
     uint32_t width, height, light_count;
-    double *colors;                 // 3 per pixel
-    double *t, *normal, *position;  // NULL unless asked for; positions are relative to the eye
-    uint32_t *object, *shadow;      // NULL unless asked for
+    double *colors;                // 3 per pixel
+    double *t, *normal, *position; // NULL unless asked for; positions are relative to the eye
+    uint32_t *object, *shadow;     // NULL unless asked for
 } Frame;
 
 // The whole picture, one sample a pixel, as glint render takes it.
@@ -23,8 +23,8 @@ Frame frame_cut(const Frame *frame, uint32_t x, uint32_t y, uint32_t width, uint
 // Its columns, without its AOVs, from right to left.
 Frame frame_flipped(const Frame *frame);
 
-// Colors, and the AOVs that both have, equal in value (hence in their bits, but for the sign of a zero); fails the test
-// at the first pixel that differs. Frees neither.
+// Colors, and the AOVs that both have, equal in value (hence in their bits, but for the sign of a zero);
+// fails the test at the first pixel that differs. Frees neither.
 void frame_assert_same(const Frame *frame, const Frame *expected, const char *what);
 
 // So many pixels have a number that is not finite, or a negative color.

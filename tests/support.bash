@@ -44,12 +44,13 @@ is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) fa
 
 # npy_same A B WIDTH: both hold the same bytes, else says at which of their pixels (three floats each) they differ first.
 npy_same() {
-    local offset header=128 pixel
+    local header=128
     cmp -s "$1" "$2" && return
     [ "$(stat -c %s "$1")" = "$(stat -c %s "$2")" ] || { echo "$1 and $2 differ in size"; return 1; }
-    offset=$(cmp "$1" "$2" | sed -n 's/.*byte \([0-9]*\),.*/\1/p')
-    pixel=$(((offset - 1 - header) / 12))
-    echo "$(($(cmp -l "$1" "$2" | awk -v h=$header '{ print int(($1 - 1 - h) / 12) }' | uniq | wc -l))) pixels differ," \
-        "first at $((pixel % $3)),$((pixel / $3)), channel $(((offset - 1 - header) / 4 % 3))"
+    cmp -l "$1" "$2" | awk -v h=$header -v w="$3" '
+        { value = int(($1 - 1 - h) / 4); pixel = int(value / 3) }
+        NR == 1 { place = pixel % w "," int(pixel / w) ", channel " value % 3 }
+        pixel != last { count++; last = pixel }
+        END { print count " pixels differ, first at " place }'
     return 1
 }

@@ -75,6 +75,7 @@ static void test_event_times(void **state)
     } cases[] = {
         {1000, 2000, 1002000, 2e-3, 1e-9, 1e-3, true},    // within what the host saw
         {0, 0, 0, 2e-3, 1e-9, 0, false},                  // a runtime that reports zeros
+        {4, 5, 6, 2e-3, 0, 1e-9, false},                  // one that counts its events
         {1000, 0, 5000, 2e-3, 1e-9, 0, false},            // one that forgets the start
         {1000, 5000, 4000, 2e-3, 1e-9, 0, false},         // end before start
         {1000, 5000, 5000, 2e-3, 1e-9, 0, false},         // no time at all

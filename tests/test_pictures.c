@@ -1,4 +1,6 @@
-// Pictures whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard cases.
+// Pictures whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard
+// cases.
+#include "host/base/text.h"
 #include "host/render/camera_basis.h"
 #include "tests/frame.h"
 #include "tests/probe.h"
@@ -11,17 +13,10 @@
 
 #include <cmocka.h>
 
-static Scene scene_of(const char *format, ...) __attribute__((format(printf, 1, 2)));
-static Scene scene_of(const char *format, ...)
+static Scene scene_of(const char *text)
 {
-    char text[2048];
-    va_list arguments;
-    va_start(arguments, format);
-    int length = vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    assert_in_range(length, 1, sizeof text - 1);
     MessageList messages = {0};
-    Source source = {"picture.yaml", text, (size_t)length};
+    Source source = {"picture.yaml", text, strlen(text)};
     Scene scene;
     bool read = scene_read_yaml(&scene, &source, &messages);
     if (!read) message_list_print(&messages, stderr);
@@ -33,9 +28,9 @@ static Scene scene_of(const char *format, ...)
 // The case that a failing check belongs to.
 static char place[160];
 
-#define check(condition)                                                                                           \
-    do {                                                                                                           \
-        if (!(condition)) fail_msg("%s: not so: %s (line %d)", place, #condition, __LINE__);                       \
+#define check(condition)                                                                                     \
+    do {                                                                                                     \
+        if (!(condition)) fail_msg("%s: not so: %s (line %d)", place, #condition, __LINE__);                 \
     } while (0)
 
 static Frame render(const Scene *scene, uint32_t width, uint32_t height, Precision precision, unsigned aovs)
@@ -72,10 +67,11 @@ static Vector3 frame_place(const Frame *frame, const Scene *scene, size_t pixel)
 // Numbers that float holds exactly: the answer is exact at every precision.
 static void background_and_ambient_at(Precision precision)
 {
-    Scene scene = scene_of("camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 90}\n"
-                           "background: [0.125, 0.25, 2]\nambient: [0.5, 0.25, 1]\n"
-                           "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {color: [0.5, 1, 0.25], "
-                           "ambient: 0.75}}}]\n");
+    Scene scene =
+        scene_of("camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 90}\n"
+                 "background: [0.125, 0.25, 2]\nambient: [0.5, 0.25, 1]\n"
+                 "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {color: [0.5, 1, 0.25], "
+                 "ambient: 0.75}}}]\n");
     Frame frame = render(&scene, 31, 31, precision, AOV_OBJECT | AOV_T);
     size_t seen = 0;
     for (size_t i = 0; i < (size_t)31 * 31; i++) {
@@ -105,10 +101,11 @@ static void background_and_ambient(void **state)
 // A light straight above a plane, seen from above: kd C I N.L, and with ks the whole highlight in the middle.
 static void light_above_plane_at(Precision precision)
 {
-    Scene scene = scene_of("camera: {position: [0, 2, 0], look_at: [0, 0, 0], up: [0, 0, 1], fov: 90}\n"
-                           "lights: [{point: {position: [0, 4, 0], color: [1, 0.5, 0.25], intensity: 0.5}}]\n"
-                           "objects: [{plane: {point: [0, 0, 0], normal: [0, 3, 0], material: {color: [0.5, 1, 0.5], "
-                           "diffuse: [0.5, 0.25, 1]}}}]\n");
+    Scene scene =
+        scene_of("camera: {position: [0, 2, 0], look_at: [0, 0, 0], up: [0, 0, 1], fov: 90}\n"
+                 "lights: [{point: {position: [0, 4, 0], color: [1, 0.5, 0.25], intensity: 0.5}}]\n"
+                 "objects: [{plane: {point: [0, 0, 0], normal: [0, 3, 0], material: {color: [0.5, 1, 0.5], "
+                 "diffuse: [0.5, 0.25, 1]}}}]\n");
     Frame frame = render(&scene, 33, 33, precision, AOV_POSITION);
     double tolerance = precision == PRECISION_FAST ? 1e-5 : precision == PRECISION_DOUBLE ? 1e-14 : 3e-7;
     for (size_t i = 0; i < (size_t)33 * 33; i++) {
@@ -139,7 +136,8 @@ static void light_above_plane(void **state)
     at_each_precision(light_above_plane_at);
 }
 
-// R1: a sphere standing on a plane, a light above: the shadow's radius is 10 / sqrt(80), and it reaches the contact.
+// R1: a sphere standing on a plane, a light above: the shadow's radius is 10 / sqrt(80), and it reaches the
+// contact.
 static void contact_shadow_at(Precision precision)
 {
     Scene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
@@ -176,13 +174,14 @@ static void contact_shadow(void **state)
     at_each_precision(contact_shadow_at);
 }
 
-// A spot straight down on a plane from height 5: the cone of 30 degrees meets it in a circle of radius 5 tan 30, full
-// within 5 tan 20 where the penumbra is 10 degrees wide.
+// A spot straight down on a plane from height 5: the cone of 30 degrees meets it in a circle of radius 5 tan
+// 30, full within 5 tan 20 where the penumbra is 10 degrees wide.
 static void spot_cone_at(Precision precision)
 {
-    Scene scene = scene_of("camera: {position: [0.3, 6, -0.4], look_at: [0.2, 0, 0.1], up: [0, 0, 1], fov: 70}\n"
-                           "lights: [{spot: {position: [0, 5, 0], look_at: [0, 0, 0], angle: 30, penumbra: 10}}]\n"
-                           "objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}}]\n");
+    Scene scene =
+        scene_of("camera: {position: [0.3, 6, -0.4], look_at: [0.2, 0, 0.1], up: [0, 0, 1], fov: 70}\n"
+                 "lights: [{spot: {position: [0, 5, 0], look_at: [0, 0, 0], angle: 30, penumbra: 10}}]\n"
+                 "objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}}]\n");
     const double outer = 5 * tan(M_PI / 6), inner = 5 * tan(M_PI / 9);
     const double versine_outer = 1 - cos(M_PI / 6), versine_inner = 1 - cos(M_PI / 9);
     Frame soft = render(&scene, 160, 160, precision, AOV_POSITION);
@@ -238,24 +237,26 @@ static long double highlight_of(const Frame *frame, const Scene *scene, size_t p
     return s >= 1 ? 0 : expl((long double)shininess * log1pl(-s));
 }
 
-// R5: highlights of every sharpness on a sphere; never below 0 nor above ks, nor NaN. Light and eye are as far from the
-// center, so that the peak lies halfway between; the field of view narrows with the highlight.
+// R5: highlights of every sharpness on a sphere; never below 0 nor above ks, nor NaN. Light and eye are as
+// far from the center, so that the peak lies halfway between; the field of view narrows with the highlight.
 static void highlight_at(Precision precision)
 {
     static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
-    Scene scene = scene_of("camera: {position: [0.5, 0.25, 4], look_at: [0, 0, 1], fov: 32}\n"
-                           "lights: [{point: {position: [-0.25, 0.5, 4]}}]\n"
-                           "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {diffuse: 0, specular: 1}}}]\n");
-    scene.camera.look_at = vector_normalize(vector_add(scene.camera.position, scene.lights.items[0].position));
+    Scene scene = scene_of(
+        "camera: {position: [0.5, 0.25, 4], look_at: [0, 0, 1], fov: 32}\n"
+        "lights: [{point: {position: [-0.25, 0.5, 4]}}]\n"
+        "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {diffuse: 0, specular: 1}}}]\n");
+    scene.camera.look_at =
+        vector_normalize(vector_add(scene.camera.position, scene.lights.items[0].position));
     for (size_t e = 0; e < sizeof exponents / sizeof *exponents; e++) {
         snprintf(place, sizeof place, "%s, shininess %g", precision_names[precision], exponents[e]);
         scene.camera.half_tangent = fmin(0.3, 0.6 / sqrt(fmax(exponents[e], 1)));
         scene.materials.items[scene.objects.items[0].material].shininess = exponents[e];
         // `single` is held to 1e4 only: beyond, the normal's own rounding shows
-        double tolerance = precision == PRECISION_DOUBLE   ? 1e-8
-                           : precision == PRECISION_STRICT ? 1e-4
+        double tolerance = precision == PRECISION_DOUBLE                          ? 1e-8
+                           : precision == PRECISION_STRICT                        ? 1e-4
                            : precision == PRECISION_SINGLE && exponents[e] <= 1e4 ? 2e-3
-                                                                                   : 2;
+                                                                                  : 2;
         Frame frame = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
         double brightest = 0;
         for (size_t i = 0; i < (size_t)201 * 201; i++) {
@@ -279,16 +280,18 @@ static void highlight(void **state)
     at_each_precision(highlight_at);
 }
 
-// P2: a tilted plane of size S at distance O from the world's origin, under a low sun: not one pixel shadows itself.
+// P2: a tilted plane of size S at distance O from the world's origin, under a low sun: not one pixel shadows
+// itself.
 static void tilted_plane_at(Precision precision)
 {
     static const double pairs[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
     static const double elevations[] = {0.01, 1, 45};
     const Vector3 n = vector_normalize((Vector3){1, 2, 3});
     const Vector3 e = vector_normalize(vector_cross(n, (Vector3){1, 0, 0}));
-    Scene scene = scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\n"
-                           "lights: [{directional: {direction: [0, 0, 1]}}]\n"
-                           "objects: [{plane: {point: [0, 0, 0], normal: [1, 2, 3], material: {diffuse: 0.75}}}]\n");
+    Scene scene =
+        scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\n"
+                 "lights: [{directional: {direction: [0, 0, 1]}}]\n"
+                 "objects: [{plane: {point: [0, 0, 0], normal: [1, 2, 3], material: {diffuse: 0.75}}}]\n");
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
         double size = pairs[i][0], offset = pairs[i][1];
         Vector3 p = {0.3 * size + offset, -0.2 * size - 2 * offset, 0.5 * size + 0.5 * offset};
@@ -297,8 +300,8 @@ static void tilted_plane_at(Precision precision)
         scene.camera.position =
             vector_add(p, vector_add(vector_scale(n, 3 * size), vector_scale(e, 0.5 * size)));
         for (size_t k = 0; k < sizeof elevations / sizeof *elevations; k++) {
-            snprintf(place, sizeof place, "%s, S %g, O %g, sun at %g degrees", precision_names[precision], size, offset,
-                     elevations[k]);
+            snprintf(place, sizeof place, "%s, S %g, O %g, sun at %g degrees", precision_names[precision],
+                     size, offset, elevations[k]);
             double angle = elevations[k] * M_PI / 180;
             scene.lights.items[0].direction =
                 vector_add(vector_scale(n, -sin(angle)), vector_scale(e, -cos(angle)));
@@ -335,9 +338,13 @@ static void inside_at(Precision precision)
     };
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         snprintf(place, sizeof place, "%s, inside %s", precision_names[precision], shapes[i]);
-        Scene scene = scene_of("camera: {position: [0.1, 0.2, 0.3], look_at: [1, -0.4, 0.5], fov: 100}\n"
-                               "lights: [{point: {position: [-0.2, 0.1, -0.1]}}]\nobjects: [{%s}]\n",
-                               shapes[i]);
+        Text text = {0};
+        text_appendf(&text,
+                     "camera: {position: [0.1, 0.2, 0.3], look_at: [1, -0.4, 0.5], fov: 100}\n"
+                     "lights: [{point: {position: [-0.2, 0.1, -0.1]}}]\nobjects: [{%s}]\n",
+                     shapes[i]);
+        Scene scene = scene_of(text_c(&text));
+        text_free(&text);
         Frame frame = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
         for (size_t pixel = 0; pixel < (size_t)96 * 96; pixel++) {
             check(frame.object[pixel] == 0);
@@ -374,18 +381,23 @@ static void degenerate_cameras(void **state)
         const char *name;
         Vector3 look_at, up;
     } cameras[] = {
-        {"up parallel", {0, 0, 3}, {0, 0, 1}},        {"up antiparallel", {0, 0, 3}, {0, 0, -5}},
-        {"up zero", {0, 0, 3}, {0, 0, 0}},            {"up nearly parallel", {0, 0, 3}, {1e-7, 0, 1}},
-        {"straight down", {0, -1, 0}, {0, 1, 0}},     {"straight up", {0, 1, 0}, {0, 1, 0}},
-        {"tilted, up parallel", {1, 2, 3}, {1, 2, 3}}, {"huge up", {0, 0, 3}, {0, 1e300, 0}},
+        {"up parallel", {0, 0, 3}, {0, 0, 1}},
+        {"up antiparallel", {0, 0, 3}, {0, 0, -5}},
+        {"up zero", {0, 0, 3}, {0, 0, 0}},
+        {"up nearly parallel", {0, 0, 3}, {1e-7, 0, 1}},
+        {"straight down", {0, -1, 0}, {0, 1, 0}},
+        {"straight up", {0, 1, 0}, {0, 1, 0}},
+        {"tilted, up parallel", {1, 2, 3}, {1, 2, 3}},
+        {"huge up", {0, 0, 3}, {0, 1e300, 0}},
         {"tiny up", {0, 0, 3}, {0, 1e-300, 0}},
     };
     Frame unrolled = {0};
     for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
         snprintf(place, sizeof place, "%s", cameras[i].name);
-        Scene scene = scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\nambient: [1, 1, 1]\n"
-                               "objects: [{box: {min: [-4, -4, -4], max: [4, 4, 4], material: {checker: {colors: "
-                               "[[1, 1, 1], [0.5, 0, 0]], size: 1.1}}}}]\n");
+        Scene scene =
+            scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\nambient: [1, 1, 1]\n"
+                     "objects: [{box: {min: [-4, -4, -4], max: [4, 4, 4], material: {checker: {colors: "
+                     "[[1, 1, 1], [0.5, 0, 0]], size: 1.1}}}}]\n");
         scene.camera.look_at = cameras[i].look_at;
         scene.camera.up = cameras[i].up;
         check(basis_error(&scene.camera) <= 1e-6);
@@ -433,12 +445,16 @@ static void distance_from_origin_changes_nothing(void **state)
     for (size_t i = 0; i < 2; i++) {
         double far = i == 0 ? 0 : 0x1p23;
         snprintf(place, sizeof place, "moved by %g", far);
-        Scene scene = scene_of("camera: {position: [%.17g, 1.5, -4], look_at: [%.17g, 0.5, 0], fov: 45}\n"
-                               "lights: [{point: {position: [%.17g, 5, -3]}}]\n"
-                               "objects:\n  - sphere: {center: [%.17g, 0.75, 0.5], radius: 0.75}\n"
-                               "  - plane: {point: [%.17g, 0, 0], normal: [0, 1, 0], material: {checker: {colors: "
-                               "[[1, 1, 1], [0, 0, 0]], size: 0.5}}}\n",
-                               far + 0.25, far + 0.25, far + 2, far + 0.5, far);
+        Text text = {0};
+        text_appendf(&text,
+                     "camera: {position: [%.17g, 1.5, -4], look_at: [%.17g, 0.5, 0], fov: 45}\n"
+                     "lights: [{point: {position: [%.17g, 5, -3]}}]\n"
+                     "objects:\n  - sphere: {center: [%.17g, 0.75, 0.5], radius: 0.75}\n"
+                     "  - plane: {point: [%.17g, 0, 0], normal: [0, 1, 0], material: {checker: {colors: "
+                     "[[1, 1, 1], [0, 0, 0]], size: 0.5}}}\n",
+                     far + 0.25, far + 0.25, far + 2, far + 0.5, far);
+        Scene scene = scene_of(text_c(&text));
+        text_free(&text);
         frames[i] = render(&scene, 64, 48, PRECISION_SINGLE, AOV_T | AOV_SHADOW | AOV_OBJECT);
         scene_free(&scene);
     }

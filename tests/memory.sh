@@ -1,0 +1,43 @@
+#!/bin/bash
+# Memory is that of a band, not of the picture. GLINT_LONG_TESTS=1 renders the whole 32768x32768 as well (minutes).
+. "$(dirname "$0")/support.bash"
+is_sanitized && skip_all 'a sanitized program needs more memory'
+cd "$scratch" || exit 1
+cat >ball.yaml <<'E2'
+camera: {position: [0, 1, -4], look_at: [0, 0, 0], fov: 60}
+lights: [{directional: {direction: [1, -1, 2]}}]
+objects:
+  - sphere: {center: [0, 0, 0], radius: 1}
+  - plane: {point: [0, -1, 0], normal: [0, 1, 0]}
+E2
+
+# peak WIDTHxHEIGHT OPTIONS…: the largest memory of a render, in MiB, with its seconds, on standard output.
+peak() {
+    python3 - "$GLINT" render ball.yaml --quiet --size "$@" <<'E2'
+import resource, subprocess, sys, time
+start = time.monotonic()
+subprocess.run(sys.argv[1:], check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024, '%.1f' % (time.monotonic() - start))
+E2
+}
+# bounded MIB WIDTHxHEIGHT OPTIONS…
+bounded() {
+    local bound=$1 measured
+    shift
+    if ! measured=$(peak "$@" 2>err); then
+        fail "$*: $(cat err)"
+    elif [ "${measured% *}" -lt "$bound" ]; then
+        pass
+        echo "$*: ${measured% *} MiB at most, ${measured#* } s"
+    else
+        fail "$*: ${measured% *} MiB, not below $bound MiB"
+    fi
+}
+
+bounded 400 64x64 -o small.png
+# the compiler's own memory is spent: the kernel comes from the cache now
+bounded 200 8192x2048 -o wide.png
+bounded 200 256x65536 -o tall.ppm
+bounded 400 4096x2048 --samples 4 --aov t,normal -o deep.exr
+[ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 -o huge.png
+finish
