@@ -3,6 +3,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/version.h"
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -32,7 +33,7 @@ static void help(FILE *stream)
     fputs("\nglint COMMAND --help tells a command's options; glint --version the version.\n", stream);
 }
 
-int main(int argument_count, char **arguments)
+static int command_run(int argument_count, char **arguments)
 {
     if (argument_count < 2) {
         help(stderr);
@@ -49,7 +50,13 @@ int main(int argument_count, char **arguments)
     }
     const char *names[COMMAND_COUNT];
     for (size_t i = 0; i < COMMAND_COUNT; i++) {
-        if (strcmp(name, commands[i].name) == 0) return commands[i].run(argument_count - 1, arguments + 1);
+        if (strcmp(name, commands[i].name) == 0) {
+            // getopt heads its messages with the first argument
+            char full_name[32];
+            snprintf(full_name, sizeof full_name, "glint %s", name);
+            arguments[1] = full_name;
+            return commands[i].run(argument_count - 1, arguments + 1);
+        }
         names[i] = commands[i].name;
     }
     const char *near = text_nearest(name, names, COMMAND_COUNT);
@@ -57,4 +64,13 @@ int main(int argument_count, char **arguments)
     if (near) fprintf(stderr, "; did you mean %s?", near);
     fputc('\n', stderr);
     return EXIT_USER;
+}
+
+int main(int argument_count, char **arguments)
+{
+    int status = command_run(argument_count, arguments);
+    // a report that did not get out whole must not look like one that did
+    if (fflush(stdout) == 0 && !ferror(stdout)) return status;
+    fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
+    return EXIT_MACHINE;
 }

@@ -136,6 +136,8 @@ printf '0 0 -4 0 0 1\n0 0 -4 0 x 1\n' >bad-rays
 refused 1 '^bad-rays:2:10: error: expected a number' trace ball.yaml --rays bad-rays
 echo '0 0 -4 0 0 1 0' >bad-rays && refused 1 '^bad-rays:1:1: error: expected .*found 7' trace ball.yaml --rays bad-rays
 echo '0 0 -4 0 0 1 0 1 2' >bad-rays && refused 1 'found more' trace ball.yaml --rays bad-rays
+echo '0 0 -4 0 0 inf' >bad-rays && refused 1 'beyond the precision' trace ball.yaml --rays bad-rays
+echo '0 0 -4 0 0 1e-50' >bad-rays && refused 1 'direction cannot be 0 0 0' trace ball.yaml --rays bad-rays
 echo '0 0 -4 0 -0 0' >bad-rays && refused 1 'direction cannot be 0 0 0' trace ball.yaml --rays bad-rays
 echo 'camera: 5' >bad.yaml && refused 1 '^bad.yaml:1:' check bad.yaml
 echo 'bogus 1' >bad.rt && refused 1 '^Error$' check bad.rt
@@ -194,7 +196,7 @@ check 'Ctrl-C: nothing left beside it' test -z "$(find . -name '.long.png*')"
 ok 'a picture named after its scene' render ball.yaml $small
 python 'its PNG' 'head, pixels, texts, kinds = png("ball.png"); assert head == (8, 6, 8, 2), head
 assert len(pixels) == 6 * 25; assert b"sRGB" in kinds, kinds
-for key in b"Software Scene Device Driver Precision Lanes Samples Size Region Transfer Kernel".split(): assert texts[key], key
+for key in b"Software Scene Device Driver Precision Lanes Samples Bounces Size Region Transfer Kernel".split(): assert texts[key], key
 assert texts[b"Scene"] == b"ball.yaml" and texts[b"Precision"] == b"single" and texts[b"Size"] == b"8x6", texts'
 ok '16 bits' render ball.yaml $small --bits 16 --transfer none --samples 3 --region 2,1,4,3 -o deep.png
 python 'its PNG' 'head, pixels, texts, kinds = png("deep.png"); assert head == (4, 3, 16, 2), head

@@ -1,7 +1,7 @@
 // Feeds damaged scenes to one reader, in this process: fuzz_scene FORMAT RUNS SEED SCENE…
-// FORMAT: yaml, rt, cfg or nff. The same arguments give the same inputs. Build it with sanitizers; it ends with a
-// failure only where a reader crashes, leaks or hangs; it then leaves the input in
-// fuzz_scene.input (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
+// FORMAT: yaml, rt, cfg or nff. The same arguments give the same inputs. Build it with sanitizers; it ends
+// with a failure only where a reader crashes, leaks or hangs; it then leaves the input in fuzz_scene.input
+// (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/text.h"

@@ -167,8 +167,11 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_yaml),  cmocka_unit_test(test_rt),
-        cmocka_unit_test(test_cfg), cmocka_unit_test(test_nff),   cmocka_unit_test(test_every_message_has_a_scene),
+        cmocka_unit_test(test_yaml),
+        cmocka_unit_test(test_rt),
+        cmocka_unit_test(test_cfg),
+        cmocka_unit_test(test_nff),
+        cmocka_unit_test(test_every_message_has_a_scene),
         cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

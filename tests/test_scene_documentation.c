@@ -85,10 +85,8 @@ static void test_every_shape_is_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_yaml_examples),
-        cmocka_unit_test(test_rt_examples),
-        cmocka_unit_test(test_cfg_examples),
-        cmocka_unit_test(test_nff_examples),
+        cmocka_unit_test(test_yaml_examples),        cmocka_unit_test(test_rt_examples),
+        cmocka_unit_test(test_cfg_examples),         cmocka_unit_test(test_nff_examples),
         cmocka_unit_test(test_every_shape_is_named),
     };
     return cmocka_run_group_tests(tests, page_read, page_free);

@@ -130,15 +130,13 @@ static const struct {
     {FEATURE_PLANES | FEATURE_CHECKERS,
      SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0],\n"
                 "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
-    {FEATURE_SPHERES | FEATURE_IMAGES,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-                "  material: {image: scenes/images/globe.png}}}]\n"},
+    {FEATURE_SPHERES | FEATURE_IMAGES, SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
+                                                  "  material: {image: scenes/images/globe.png}}}]\n"},
     {FEATURE_PLANES | FEATURE_IMAGES,
      SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0],\n"
                 "  material: {image: scenes/images/globe.png, size: 0.7}}}]\n"},
-    {FEATURE_TRIANGLES | FEATURE_IMAGES,
-     SCENE_HEAD "objects: [{mesh: {file: tests/textures/quad.obj,\n"
-                "  material: {image: scenes/images/globe.png}}}]\n"},
+    {FEATURE_TRIANGLES | FEATURE_IMAGES, SCENE_HEAD "objects: [{mesh: {file: tests/textures/quad.obj,\n"
+                                                    "  material: {image: scenes/images/globe.png}}}]\n"},
 };
 
 static Scene scene_with_warnings(const char *text)

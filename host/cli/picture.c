@@ -92,6 +92,7 @@ static void notes_write(Notes *notes, const Picture *picture)
     NOTE("Precision", "%s", precision_names[settings->precision]);
     NOTE("Lanes", "%u", report->lanes);
     NOTE("Samples", "%u", settings->sample_count);
+    NOTE("Bounces", "%u", settings->bounce_count);
     NOTE("Size", "%ux%u", settings->width, settings->height);
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
@@ -220,10 +221,14 @@ static void picture_free(Picture *picture)
 
 bool picture_commit(Picture *picture, MessageList *messages)
 {
-    bool whole = true;
-    for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
-        if (picture->aovs[i]) whole &= image_writer_commit(picture->aovs[i], messages);
-    whole &= image_writer_commit(picture->color, messages);
+    bool whole = image_writer_commit(picture->color, messages);
+    for (size_t i = 0; i < PICTURE_AOV_COUNT; i++) {
+        if (!picture->aovs[i]) continue;
+        if (whole)
+            whole = image_writer_commit(picture->aovs[i], messages);
+        else
+            image_writer_abandon(picture->aovs[i]);
+    }
     picture_free(picture);
     return whole;
 }

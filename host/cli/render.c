@@ -170,6 +170,7 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
         .bvh = options->common.bvh,
         .bounce_count = options->bounce_count,
         .shift_to_eye = true,
+        .stop = progress_interrupted,
         .no_cache = options->common.no_cache,
     };
     return true;

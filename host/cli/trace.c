@@ -41,7 +41,7 @@ typedef struct {
     size_t count, capacity;
 } RayList;
 
-// The numbers of one line, at most eight; the count, or -1 where something is no finite number.
+// The numbers of one line, at most eight; the count, or -1 where something is no number.
 static int line_numbers(const Source *source, size_t start, size_t end, double numbers[8],
                         MessageList *messages)
 {
@@ -75,13 +75,25 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
         size_t end = newline ? (size_t)(newline - source->bytes) : source->length;
         double n[8] = {0};
         int count = line_numbers(source, start, end, n, messages);
+        double narrow[3] = {n[3], n[4], n[5]};
+        bool beyond = n[7] == -INFINITY;
+        for (int i = 0; i < 7; i++)
+            beyond |= fabs(n[i]) > farthest;
+        if (common->precision != PRECISION_DOUBLE)
+            for (int i = 0; i < 3; i++)
+                narrow[i] = (double)(float)fmax(-farthest, fmin(n[i + 3], farthest));
         if (count > 0) {
             if (count != 6 && count != 8) {
                 message_add_at(messages, MESSAGE_ERROR, source, start,
                                "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
                 count = -1;
-            } else if (n[3] == 0 && n[4] == 0 && n[5] == 0) {
-                message_add_at(messages, MESSAGE_ERROR, source, start, "a ray's direction cannot be 0 0 0");
+            } else if (beyond) {
+                message_add_at(messages, MESSAGE_ERROR, source, start,
+                               "a number is beyond the precision's range; only tmax may be infinite");
+                count = -1;
+            } else if (narrow[0] == 0 && narrow[1] == 0 && narrow[2] == 0) {
+                message_add_at(messages, MESSAGE_ERROR, source, start,
+                               "a ray's direction cannot be 0 0 0 at its precision");
                 count = -1;
             }
         }

@@ -68,7 +68,7 @@ typedef struct {
     double event_seconds;                              // end - start; 0 where the runtime reports zeros
     double host_seconds;                               // from enqueue to completion seen by the host
     double host_start_seconds;                         // clock_seconds() before the enqueue
-    bool trusted; // false: zeros, end before start, or event longer than the host saw
+    bool trusted; // false: zeros, a mere count, end before start, or event longer than the host saw
 } LaunchTime;
 
 // What an event's moments (nanoseconds of the device clock) are worth beside the host's seconds. An event may

@@ -126,10 +126,14 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
 {
     if (request->no_cache || program->from_cache) return;
     size_t size = 0;
-    cl_must(clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL));
-    if (size == 0) return;
+    // a driver that gives no binary costs the next run its build, not this one its picture
+    cl_int told = clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL);
+    if (told != CL_SUCCESS || size == 0) return;
     char *bytes = memory_allocate(size, 1);
-    cl_must(clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL));
+    if (clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL) != CL_SUCCESS) {
+        free(bytes);
+        return;
+    }
     char *text = request_text(request), *key = request_key(compute, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};
     cache_store(key, &binary);

@@ -12,7 +12,7 @@ static const size_t group_size[2] = {8, 8};
 
 enum {
     FIRST_LAUNCH_SAMPLES = 1 << 17,  // before any time is known
-    BAND_BYTES_LARGEST = 4 << 20,   // of one film
+    BAND_BYTES_LARGEST = 4 << 20,    // of one film
     SAMPLES_OF_LAUNCH_LARGEST = 1024 // per pixel
 };
 
@@ -236,7 +236,7 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
         uint32_t left = settings->region_height - rows.first_row;
         rows.row_count = pace_rows(renderer, &pace, left < film.rows ? left : film.rows);
         uint64_t pixels = film_pixels(renderer, rows.row_count);
-        for (uint32_t first = 0; first < settings->sample_count;) {
+        for (uint32_t first = 0; go_on && first < settings->sample_count;) {
             uint64_t samples = pace_samples(&pace) / pixels;
             samples = samples < 1                           ? 1
                       : samples > SAMPLES_OF_LAUNCH_LARGEST ? SAMPLES_OF_LAUNCH_LARGEST
@@ -246,7 +246,9 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
             double seconds = band_render(renderer, &film, rows, first, last);
             pace.seconds_per_sample = seconds / (double)(pixels * (last - first));
             first = last;
+            go_on = !settings->stop || !settings->stop();
         }
+        if (!go_on) break;
         if (aovs != 0) band_aovs(renderer, &film, rows);
         go_on = band_deliver(renderer, &film, aovs, rows, sink, context);
         rows.first_row += rows.row_count;

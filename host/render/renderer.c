@@ -214,7 +214,8 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
         .no_cache = renderer->settings.no_cache,
     };
     program_build(renderer->compute, &slot->request, &slot->program);
-    renderer->report.kernel_hash = slot->program.text_hash;
+    // the picture's own kernel is the one that reports name
+    if (kind != KERNEL_AOV) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
     cl_int status;
