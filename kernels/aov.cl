@@ -2,8 +2,14 @@
 #include "film.h"
 #include "phong.h"
 
+// Infinity for a miss, put together from bits: `fast` need not know infinities.
+static inline real hit_distance(const Hit *hit)
+{
+    return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
+}
+
 kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global scalar *normals,
-                global scalar *positions, global int *objects_hit, global int *shadows)
+                global scalar *positions, global int *objects_hit, global int *shadows, uint shadow_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
@@ -14,15 +20,14 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global sc
     Hit hit = closest_hit(&scene, &ray);
     Surface surface = surface_at(&scene, &ray, &hit);
     const Vector nothing = {(real)(0), (real)(0), (real)(0)};
-    film_store(ts, &tile, 1, 0, lanes_select(surface.found, hit.t, (real)(INFINITY)));
+    film_store(ts, &tile, 1, 0, hit_distance(&hit));
     film_store_color(normals, &tile, vector_select(surface.found, surface.shading_normal, nothing));
     film_store_color(positions, &tile, vector_select(surface.found, surface.position, nothing));
     film_store_integer(objects_hit, &tile, 1, 0, hit.object);
-    uint light_count = header->picture.w;
-    for (uint i = 0; i < light_count; i++) {
+    for (uint i = 0; i < shadow_count; i++) {
         mask shadowed;
         phong_light(&scene, &surface, &ray, i, &shadowed);
-        film_store_integer(shadows, &tile, light_count, i,
+        film_store_integer(shadows, &tile, shadow_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }
 }

@@ -60,12 +60,21 @@ static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3
     if (HAS_TRANSMISSION) {
         real eta = lanes_select(surface->entering, real_divide((real)(1), surface->ior), surface->ior);
         mask total = refracted_direction(direction, surface->shading_normal, eta, &passed->direction);
+        // a smooth surface's normal may send the ray back out where its geometry would not
+        Vector plain_direction;
+        mask plain_total = refracted_direction(direction, surface->normal, eta, &plain_direction);
+        mask outward = !total & (vector_dot(passed->direction, surface->normal) >= (real)(0));
+        passed->direction = vector_select(outward, plain_direction, passed->direction);
+        total = lanes_select(outward, plain_total, total);
         real transmission = lanes_select(total, (real)(0), surface->transmission);
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
         passed->origin = surface_leave(surface, true);
         passed->weight = vector_scale(weight, transmission);
     }
     mirrored->direction = reflected_direction(direction, surface->shading_normal);
+    mask sunk = vector_dot(mirrored->direction, surface->normal) <= (real)(0);
+    mirrored->direction =
+        vector_select(sunk, reflected_direction(direction, surface->normal), mirrored->direction);
     mirrored->origin = surface_leave(surface, false);
     mirrored->weight = vector_scale(weight, reflection);
     mirrored->travelled = passed->travelled = surface->travelled;

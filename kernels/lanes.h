@@ -15,6 +15,7 @@ typedef long scalar_integer;
 #define REAL_BASE      double
 #define INTEGER_BASE   long
 #define UNIT_ROUNDOFF  0x1p-53
+#define INFINITY_BITS  0x7ff0000000000000L
 #define LARGEST        DBL_MAX
 #define SMALLEST_RATIO 0x1p-1000
 #else
@@ -24,6 +25,7 @@ typedef int scalar_integer;
 #define REAL_BASE      float
 #define INTEGER_BASE   int
 #define UNIT_ROUNDOFF  0x1p-24f
+#define INFINITY_BITS  0x7f800000
 #define LARGEST        FLT_MAX
 #define SMALLEST_RATIO 0x1p-120f
 #endif

@@ -25,8 +25,8 @@ kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, gl
     Ray ray = ray_make(origin, direction, value[6].all, value[7].all, mask_all());
     Hit hit = closest_hit(&scene, &ray);
     Surface surface = surface_at(&scene, &ray, &hit);
-    const Color3 white = {(real)(1), (real)(1), (real)(1)};
-    Bounce mirrored = {origin, direction, white}, passed = mirrored;
+    const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
+    Bounce mirrored = {origin, direction, black}, passed = mirrored;
     surface_bounce(&surface, &ray, white, &mirrored, &passed);
 
     Vector n = surface.normal, p = surface.position;

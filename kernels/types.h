@@ -144,6 +144,9 @@ typedef struct {
 
 enum { OPAQUE = 0x7fffffff }; // in x: no light passes
 
+// Of a ray's two bounces one waits while the other is followed: there is room for one at each depth.
+enum { BOUNCES_LARGEST = 16 };
+
 // What a counting build counts.
 enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
 

@@ -38,7 +38,7 @@ static TileShape tile_shape(uint32_t lanes)
 // The buffers that a band is rendered into, sized for `rows`.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, ray_counts, colors, t, normal, position, object, shadow;
+    cl_mem offsets, ray_counts, colors, losses, t, normal, position, object, shadow;
 } Film;
 
 typedef struct {
@@ -66,12 +66,13 @@ static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t ro
     size_t scalar = renderer_scalar_size(renderer), pixels = film_pixels(renderer, rows);
     film->rows = rows;
     film->colors = film_buffer(renderer, pixels * 3 * scalar);
+    film->losses = film_buffer(renderer, pixels * 3 * scalar);
     if (aovs != 0) {
         film->t = film_buffer(renderer, pixels * scalar);
         film->normal = film_buffer(renderer, pixels * 3 * scalar);
         film->position = film_buffer(renderer, pixels * 3 * scalar);
         film->object = film_buffer(renderer, pixels * sizeof(uint32_t));
-        film->shadow = film_buffer(renderer, film_shadow_size(renderer, rows));
+        film->shadow = film_buffer(renderer, aovs & AOV_SHADOW ? film_shadow_size(renderer, rows) : 0);
     }
     film->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     void *offsets = sample_pattern(settings->sample_count, renderer->report.wide);
@@ -82,7 +83,7 @@ static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t ro
 
 static void film_close(Film *film)
 {
-    cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->t,
+    cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->losses, film->t,
                         film->normal,  film->position,   film->object, film->shadow};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
         if (buffers[i]) cl_must(clReleaseMemObject(buffers[i]));
@@ -135,10 +136,11 @@ static double band_render(Renderer *renderer, const Film *film, BandRows rows, u
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
     kernel_argument(kernel, FLAT_COUNT, sizeof(cl_mem), &film->offsets);
     kernel_argument(kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->colors);
-    band_set_place(renderer, kernel, FLAT_COUNT + 2, rows);
-    kernel_argument(kernel, FLAT_COUNT + 3, sizeof first, &first);
-    kernel_argument(kernel, FLAT_COUNT + 4, sizeof last, &last);
-    kernel_argument(kernel, FLAT_COUNT + 5, sizeof(cl_mem), &film->ray_counts);
+    kernel_argument(kernel, FLAT_COUNT + 2, sizeof(cl_mem), &film->losses);
+    band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
+    kernel_argument(kernel, FLAT_COUNT + 4, sizeof first, &first);
+    kernel_argument(kernel, FLAT_COUNT + 5, sizeof last, &last);
+    kernel_argument(kernel, FLAT_COUNT + 6, sizeof(cl_mem), &film->ray_counts);
     if (renderer->settings.counting) ray_counts_clear(renderer, film);
     size_t global[2];
     band_launch_size(renderer, rows, global);
@@ -147,13 +149,15 @@ static double band_render(Renderer *renderer, const Film *film, BandRows rows, u
     return time.trusted ? time.event_seconds : time.host_seconds;
 }
 
-static void band_aovs(Renderer *renderer, const Film *film, BandRows rows)
+static void band_aovs(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_AOV);
     band_set_place(renderer, kernel, FLAT_COUNT, rows);
     const cl_mem *buffers[] = {&film->t, &film->normal, &film->position, &film->object, &film->shadow};
     for (cl_uint i = 0; i < 5; i++)
         kernel_argument(kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
+    cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
+    kernel_argument(kernel, FLAT_COUNT + 6, sizeof shadow_count, &shadow_count);
     size_t global[2];
     band_launch_size(renderer, rows, global);
     renderer_launch(renderer, KERNEL_AOV, 2, global, group_size);
@@ -190,15 +194,17 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
     return go_on;
 }
 
-// How much of the picture the next launch takes, from the time that each pixel's sample took so far.
+// How much of the picture the next launch takes, from the time that each pixel's sample took so far. It grows
+// fourfold at most: behind the sky there may be glass.
 typedef struct {
     double target_seconds, seconds_per_sample; // 0: not known yet
+    double last_samples;                       // of the last launch
 } Pace;
 
 static uint64_t pace_samples(const Pace *pace)
 {
     if (pace->seconds_per_sample <= 0) return FIRST_LAUNCH_SAMPLES;
-    return (uint64_t)fmin(pace->target_seconds / pace->seconds_per_sample, 1e15);
+    return (uint64_t)fmin(pace->target_seconds / pace->seconds_per_sample, 4 * pace->last_samples);
 }
 
 static uint32_t pace_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
@@ -213,11 +219,12 @@ static uint32_t pace_rows(const Renderer *renderer, const Pace *pace, uint32_t m
     return rows < most ? (uint32_t)rows : most;
 }
 
-static uint32_t film_rows_largest(const Renderer *renderer)
+static uint32_t film_rows_largest(const Renderer *renderer, unsigned aovs)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows;
     size_t row_bytes = film_pixels(renderer, 1) * 3 * renderer_scalar_size(renderer);
+    if (aovs & AOV_SHADOW) row_bytes += film_shadow_size(renderer, 1);
     size_t rows = BAND_BYTES_LARGEST / row_bytes;
     size_t step = tile_shape(renderer->report.lanes).height * group_size[1];
     rows = rows < step ? step : rows - rows % step;
@@ -228,7 +235,7 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
 {
     const RenderSettings *settings = &renderer->settings;
     Film film = {0};
-    film_open(&film, renderer, aovs, film_rows_largest(renderer));
+    film_open(&film, renderer, aovs, film_rows_largest(renderer, aovs));
     Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
     bool go_on = true;
     BandRows rows = {0};
@@ -244,12 +251,13 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
             uint32_t last =
                 settings->sample_count - first < samples ? settings->sample_count : first + (uint32_t)samples;
             double seconds = band_render(renderer, &film, rows, first, last);
-            pace.seconds_per_sample = seconds / (double)(pixels * (last - first));
+            pace.last_samples = (double)(pixels * (last - first));
+            pace.seconds_per_sample = seconds / pace.last_samples;
             first = last;
             go_on = !settings->stop || !settings->stop();
         }
         if (!go_on) break;
-        if (aovs != 0) band_aovs(renderer, &film, rows);
+        if (aovs != 0) band_aovs(renderer, &film, aovs, rows);
         go_on = band_deliver(renderer, &film, aovs, rows, sink, context);
         rows.first_row += rows.row_count;
     }

@@ -30,6 +30,11 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
         message_add(messages, MESSAGE_ERROR, "lanes must be 1, 4, 8 or 16, not %u", lanes);
         return false;
     }
+    if (settings->bounce_count > BOUNCES_LARGEST) {
+        message_add(messages, MESSAGE_ERROR, "bounces must be at most %d, not %u", BOUNCES_LARGEST,
+                    settings->bounce_count);
+        return false;
+    }
     if (settings->precision == PRECISION_DOUBLE && !device->fp64) {
         message_add(messages, MESSAGE_ERROR,
                     "precision double: the device \"%s\" has no 64-bit floating point", device->name);

@@ -38,7 +38,7 @@ typedef struct {
     bool shift_to_eye;         // true for pictures; false for probes: rays and scene as they are
     bool no_cache;
     double band_seconds; // aim for a launch's length; 0: 0.1
-    bool (*stop)(void);        // asked between launches whether to end early; NULL: never
+    bool (*stop)(void);  // asked between launches whether to end early; NULL: never
     uint32_t band_rows;  // fixed number of rows in a band (tests); 0: by time
 } RenderSettings;
 

@@ -108,6 +108,8 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
 {
     if (image->width > SIDE_LARGEST || image->height > SIDE_LARGEST)
         return "a side of more than 65536 texels";
+    if ((size_t)image->width * image->height > TEXELS_LARGEST - list->texel_count)
+        return "too many texels in all pictures";
     Level level = level_open(image->width, image->height);
     array_push(list->levels, level);
     if (!level_fill(&level, image, image->display && !as_displayed)) return "a color is not finite";
