@@ -61,11 +61,13 @@ static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3
         real eta = lanes_select(surface->entering, real_divide((real)(1), surface->ior), surface->ior);
         mask total = refracted_direction(direction, surface->shading_normal, eta, &passed->direction);
         // a smooth surface's normal may send the ray back out where its geometry would not
-        Vector plain_direction;
-        mask plain_total = refracted_direction(direction, surface->normal, eta, &plain_direction);
         mask outward = !total & (vector_dot(passed->direction, surface->normal) >= (real)(0));
-        passed->direction = vector_select(outward, plain_direction, passed->direction);
-        total = lanes_select(outward, plain_total, total);
+        if (lanes_any(outward)) {
+            Vector plain_direction;
+            mask plain_total = refracted_direction(direction, surface->normal, eta, &plain_direction);
+            passed->direction = vector_select(outward, plain_direction, passed->direction);
+            total = lanes_select(outward, plain_total, total);
+        }
         real transmission = lanes_select(total, (real)(0), surface->transmission);
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
         passed->origin = surface_leave(surface, true);

@@ -41,10 +41,6 @@ typedef struct {
     cl_mem offsets, ray_counts, colors, losses, t, normal, position, object, shadow;
 } Film;
 
-typedef struct {
-    const void *colors, *t, *normal, *position, *object, *shadow;
-} MappedFilm;
-
 static size_t film_pixels(const Renderer *renderer, uint32_t rows)
 {
     return (size_t)renderer->settings.region_width * rows;

@@ -15,7 +15,7 @@ enum { FEATURE_LIST(FEATURE_BIT_INDEX) FEATURE_COUNT };
 enum { FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (1u << FEATURE_COUNT) - 1 };
 #undef FEATURE_BIT
 
-extern const char *const feature_names[FEATURE_COUNT]; // "spheres", …
+extern const char *const feature_names[FEATURE_COUNT]; // "SPHERES", …
 
 FeatureSet features_of(const Scene *scene);
 void features_write_prelude(Text *text, FeatureSet set); // `#define HAS_SPHERES 1` … one for each feature

@@ -44,9 +44,9 @@ typedef struct {
 
 typedef struct Renderer Renderer;
 
-// Flattens, builds and uploads. NULL with a message where the settings do not fit the device (double without
-// fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the precision. The compute outlives
-// it.
+// Flattens and uploads; kernels are built when first used. NULL with a message where the settings do not fit
+// the device (double without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the
+// precision. The compute outlives it.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
 void renderer_close(Renderer *renderer);
