@@ -8,8 +8,9 @@ static inline real hit_distance(const Hit *hit)
     return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
 }
 
-kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global scalar *normals,
-                global scalar *positions, global int *objects_hit, global int *shadows, uint shadow_count)
+kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *directions, global scalar *ts,
+                global scalar *normals, global scalar *positions, global int *objects_hit,
+                global int *shadows, uint shadow_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
@@ -20,6 +21,7 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *ts, global sc
     Hit hit = closest_hit(&scene, &ray);
     Surface surface = surface_at(&scene, &ray, &hit);
     const Vector nothing = {(real)(0), (real)(0), (real)(0)};
+    film_store_color(directions, &tile, ray.direction);
     film_store(ts, &tile, 1, 0, hit_distance(&hit));
     film_store_color(normals, &tile, vector_select(surface.found, surface.shading_normal, nothing));
     film_store_color(positions, &tile, vector_select(surface.found, surface.position, nothing));

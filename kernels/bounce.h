@@ -51,15 +51,16 @@ static inline mask refracted_direction(Vector direction, Vector normal, real eta
 }
 
 // What the surface sends on: the mirrored ray, and the one through it. Where all is reflected the mirrored
-// ray carries what would have passed.
-static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3 weight, Bounce *mirrored,
+// ray carries what would have passed; the mask returned tells where.
+static inline mask surface_bounce(const Surface *surface, const Ray *ray, Color3 weight, Bounce *mirrored,
                                   Bounce *passed)
 {
     Vector direction = ray_unit_direction(ray);
     real reflection = surface->reflection;
+    mask total = mask_none();
     if (HAS_TRANSMISSION) {
         real eta = lanes_select(surface->entering, real_divide((real)(1), surface->ior), surface->ior);
-        mask total = refracted_direction(direction, surface->shading_normal, eta, &passed->direction);
+        total = refracted_direction(direction, surface->shading_normal, eta, &passed->direction);
         // a smooth surface's normal may send the ray back out where its geometry would not
         mask outward = !total & (vector_dot(passed->direction, surface->normal) >= (real)(0));
         if (lanes_any(outward)) {
@@ -72,6 +73,7 @@ static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
         passed->origin = surface_leave(surface, true);
         passed->weight = vector_scale(weight, transmission);
+        total = total & (surface->transmission > (real)(0));
     }
     mirrored->direction = reflected_direction(direction, surface->shading_normal);
     mask sunk = vector_dot(mirrored->direction, surface->normal) <= (real)(0);
@@ -80,6 +82,7 @@ static inline void surface_bounce(const Surface *surface, const Ray *ray, Color3
     mirrored->origin = surface_leave(surface, false);
     mirrored->weight = vector_scale(weight, reflection);
     mirrored->travelled = passed->travelled = surface->travelled;
+    return total;
 }
 
 #endif

@@ -38,23 +38,27 @@ typedef int scalar_integer;
 #define JOIN(a, b)        JOIN_TOKENS(a, b)
 
 #if LANES == 1
-typedef scalar real;
-typedef scalar_integer integer;
+#define LANES_TYPE(base)    base
 #define LANES_CONVERT(base) JOIN(convert_, base)
 #define LANES_AS(base)      JOIN(as_, base)
 #else
-typedef JOIN(REAL_BASE, LANES) real;
-typedef JOIN(INTEGER_BASE, LANES) integer;
+#define LANES_TYPE(base)    JOIN(base, LANES)
 #define LANES_CONVERT(base) JOIN(JOIN(convert_, base), LANES)
 #define LANES_AS(base)      JOIN(JOIN(as_, base), LANES)
 #endif
 
+typedef LANES_TYPE(REAL_BASE) real;
+typedef LANES_TYPE(INTEGER_BASE) integer;
 typedef integer mask;
+typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) natural; // wraps around
 
 #define real_from_integer LANES_CONVERT(REAL_BASE)
 #define integer_from_real LANES_CONVERT(INTEGER_BASE)
 #define real_from_bits    LANES_AS(REAL_BASE)
 #define bits_from_real    LANES_AS(INTEGER_BASE)
+
+#define natural_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
+#define integer_from_natural LANES_AS(INTEGER_BASE)
 
 // The tile of neighboring pixels that one work-item carries, and each lane's place in it.
 #if LANES == 1

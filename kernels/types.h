@@ -147,6 +147,15 @@ enum { OPAQUE = 0x7fffffff }; // in x: no light passes
 // Of a ray's two bounces one waits while the other is followed: there is room for one at each depth.
 enum { BOUNCES_LARGEST = 16 };
 
+// The signature of a ray's way through the scene: from PATH_START on, for the ray itself and each that comes
+// of it, the mirrored one and its offspring before the one that passes, 32 bits of
+// (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is of the object met, -1 for the
+// background; events tells what was sent on there, 0 where the object was only seen.
+// (Fowler, Noll, Vo: FNV-1a, by words instead of bytes.)
+enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_EVENTS = 8 };
+#define PATH_START  0x811c9dc5u
+#define PATH_FACTOR 0x01000193u
+
 // What a counting build counts.
 enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
 

@@ -231,7 +231,7 @@ refused 1 'bogus' check complete.rt
 ok '--lenient' render complete.rt --lenient $small -o other.png && check 'its warning' grep -q 'warning.*bogus' err
 
 # What lies behind the pixels.
-ok '--aov' render ball.yaml $small --aov t,normal,position,object,shadow,color -o v.png
+ok '--aov' render ball.yaml $small --aov t,normal,position,object,shadow,ray,path,color -o v.png
 python 'AOV files' '
 import math
 def near(a, b): return abs(a - b) < 1e-4
@@ -240,6 +240,15 @@ hit, shadow, color = npy("v.object.npy"), npy("v.shadow.npy"), npy("v.color.npy"
 assert t[:2] == ((6, 8), "<f4") and normal[:2] == ((6, 8, 3), "<f4") and position[:2] == ((6, 8, 3), "<f8")
 assert hit[:2] == ((6, 8), "<u4") and shadow[:2] == ((6, 8, 2), "<u4") and color[:2] == ((6, 8, 3), "<f4"), shadow
 assert color[2] == npy("single.npy")[2]
+ray, path = npy("v.ray.npy"), npy("v.path.npy")
+assert ray[:2] == ((6, 8, 3), "<f4") and path[:2] == ((6, 8), "<u4")
+# one object, seen or not: FNV-1a of the word 8 (0 + 1), or of 0
+for i in range(48):
+    assert path[2][i] == (0x811c9dc5 ^ (8 if hit[2][i] == 0 else 0)) * 0x01000193 % 2**32
+    d = ray[2][3 * i:3 * i + 3]
+    assert near(math.hypot(*d), 1)
+    if hit[2][i] == 0:
+        assert all(near(a * t[2][i], b - c) for a, b, c in zip(d, position[2][3 * i:], (0, 0, -4)))
 assert 0 < hit[2].count(0) < 48 and hit[2].count(0) + hit[2].count(2**32 - 1) == 48
 for i in range(48):
     n, p = normal[2][3 * i:3 * i + 3], position[2][3 * i:3 * i + 3]

@@ -42,7 +42,9 @@ static bool frame_take_band(void *context, const Band *band, double fraction_don
     if (frame->t) widen(frame->t + first, band->t, count, sink->wide);
     if (frame->normal) widen(frame->normal + 3 * first, band->normal, 3 * count, sink->wide);
     if (frame->position) widen(frame->position + 3 * first, band->position, 3 * count, sink->wide);
+    if (frame->ray) widen(frame->ray + 3 * first, band->ray, 3 * count, sink->wide);
     if (frame->object) memcpy(frame->object + first, band->object, count * sizeof *frame->object);
+    if (frame->path) memcpy(frame->path + first, band->path, count * sizeof *frame->path);
     if (frame->shadow && frame->light_count > 0)
         memcpy(frame->shadow + first * frame->light_count, band->shadow,
                count * frame->light_count * sizeof *frame->shadow);
@@ -52,11 +54,13 @@ static bool frame_take_band(void *context, const Band *band, double fraction_don
 static Frame frame_open(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs)
 {
     size_t pixels = (size_t)width * height;
-    Frame frame = {width, height, light_count, memory_allocate_zeroed(3 * pixels, sizeof(double)), 0, 0, 0,
-                   0,     0};
+    Frame frame = {.width = width, .height = height, .light_count = light_count};
+    frame.colors = memory_allocate_zeroed(3 * pixels, sizeof *frame.colors);
     if (aovs & AOV_T) frame.t = memory_allocate_zeroed(pixels, sizeof *frame.t);
     if (aovs & AOV_NORMAL) frame.normal = memory_allocate_zeroed(3 * pixels, sizeof *frame.normal);
     if (aovs & AOV_POSITION) frame.position = memory_allocate_zeroed(3 * pixels, sizeof *frame.position);
+    if (aovs & AOV_RAY) frame.ray = memory_allocate_zeroed(3 * pixels, sizeof *frame.ray);
+    if (aovs & AOV_PATH) frame.path = memory_allocate_zeroed(pixels, sizeof *frame.path);
     if (aovs & AOV_OBJECT) frame.object = memory_allocate_zeroed(pixels, sizeof *frame.object);
     if (aovs & AOV_SHADOW)
         frame.shadow = memory_allocate_zeroed(pixels * light_count + 1, sizeof *frame.shadow);
@@ -84,6 +88,8 @@ void frame_free(Frame *frame)
     free(frame->t);
     free(frame->normal);
     free(frame->position);
+    free(frame->ray);
+    free(frame->path);
     free(frame->object);
     free(frame->shadow);
     *frame = (Frame){0};
@@ -142,7 +148,9 @@ void frame_assert_same(const Frame *frame, const Frame *expected, const char *wh
 {
     assert_int_equal(frame->width, expected->width);
     assert_int_equal(frame->height, expected->height);
+    numbers_assert_same(frame, frame->ray, expected->ray, 3, "ray", what);
     integers_assert_same(frame, frame->object, expected->object, 1, "object", what);
+    integers_assert_same(frame, frame->path, expected->path, 1, "path", what);
     numbers_assert_same(frame, frame->t, expected->t, 1, "t", what);
     numbers_assert_same(frame, frame->normal, expected->normal, 3, "normal", what);
     numbers_assert_same(frame, frame->position, expected->position, 3, "position", what);

@@ -6,9 +6,10 @@
 // Rows from the top; values of float kernels are widened, which is exact.
 typedef struct {
     uint32_t width, height, light_count;
-    double *colors;                // 3 per pixel
-    double *t, *normal, *position; // NULL unless asked for; positions are relative to the eye
-    uint32_t *object, *shadow;     // NULL unless asked for
+    double *colors;                   // 3 per pixel
+    double *t, *normal, *position;    // NULL unless asked for; positions are relative to the eye
+    double *ray;                      // 3 per pixel, NULL unless asked for
+    uint32_t *object, *shadow, *path; // NULL unless asked for
 } Frame;
 
 // The whole picture, one sample a pixel, as glint render takes it.

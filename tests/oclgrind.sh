@@ -32,7 +32,7 @@ printf '0 1 -9 0 0 1\n-5 1 0 1 0 0\n1 9 -2 0 -1 0\n' >"$scratch/rays"
 for lanes in 1 4; do
     clean "render at $lanes lanes" render $scene --size 16x9 --lanes $lanes --quiet -o "$scratch/a.png"
     clean "strict, samples and AOVs at $lanes lanes" render $scene --size 7x5 --samples 2 --precision strict --lanes $lanes \
-        --quiet --aov t,normal,position,object,shadow -o "$scratch/b.png"
+        --quiet --aov t,normal,position,object,shadow,ray,path -o "$scratch/b.png"
     clean "trace at $lanes lanes" trace $scene --rays "$scratch/rays" --lanes $lanes -o "$scratch/c.csv"
 done
 clean 'double' render $scene --size 7x5 --precision double --lanes 1 --quiet -o "$scratch/d.npy"

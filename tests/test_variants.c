@@ -75,15 +75,17 @@ static void lanes_agree(void **state)
 static void lanes_agree_behind_the_picture(void **state)
 {
     (void)state;
-    const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW;
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_STRICT);
-    settings.lanes = 1;
-    Frame expected = frame_render(&probe_compute, &every_shape, &settings, aovs);
-    settings.lanes = 16;
-    Frame frame = frame_render(&probe_compute, &every_shape, &settings, aovs);
-    assert_int_equal(frame_count_faulty(&expected), 0);
-    same_and_freed(&frame, &expected, "1 and 16 lanes");
-    frame_free(&expected);
+    const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
+    for (size_t p = 0; p < 2; p++) {
+        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        settings.lanes = 1;
+        Frame expected = frame_render(&probe_compute, &every_shape, &settings, aovs);
+        assert_int_equal(frame_count_faulty(&expected), 0);
+        settings.lanes = 16;
+        Frame frame = frame_render(&probe_compute, &every_shape, &settings, aovs);
+        same_and_freed(&frame, &expected, "1 and 16 lanes");
+        frame_free(&expected);
+    }
 }
 
 #define SCENE_HEAD                                                                                           \

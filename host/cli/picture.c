@@ -6,10 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const picture_aov_names[PICTURE_AOV_COUNT] = {"t",      "normal", "position",
-                                                          "object", "shadow", "color"};
+const char *const picture_aov_names[PICTURE_AOV_COUNT] = {"t",      "normal", "position", "object",
+                                                          "shadow", "ray",    "path",     "color"};
 
-enum { AOV_COLOR = 1 << 5, NOTE_COUNT_LARGEST = 16 };
+enum { AOV_COLOR = 1 << 7, NOTE_COUNT_LARGEST = 16 };
 
 struct Picture {
     const PictureOptions *options;
@@ -148,6 +148,8 @@ static bool files_open(Picture *picture, MessageList *messages)
         header_of(picture, 1, 'u', NULL),
         header_of(picture, (uint32_t)picture->scene->lights.count, 'u', NULL),
         header_of(picture, 3, real_type, NULL),
+        header_of(picture, 1, 'u', NULL),
+        header_of(picture, 3, real_type, NULL),
     };
     for (size_t i = 0; i < PICTURE_AOV_COUNT && opened; i++) {
         if (!(picture->options->aovs >> i & 1)) continue;
@@ -204,8 +206,8 @@ bool picture_write(Picture *picture, const Band *band, MessageList *messages)
         colors = narrowed(picture, colors, 3 * pixels);
     if (!image_writer_rows(picture->color, colors, band->row_count, messages)) return false;
 
-    const void *values[PICTURE_AOV_COUNT] = {band->t,      band->normal, NULL,
-                                             band->object, band->shadow, band->colors};
+    const void *values[PICTURE_AOV_COUNT] = {band->t,      band->normal, NULL,       band->object,
+                                             band->shadow, band->ray,    band->path, band->colors};
     if (band->position) values[2] = positions_in_world(picture, band, pixels);
     for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
         if (picture->aovs[i] && !image_writer_rows(picture->aovs[i], values[i], band->row_count, messages))

@@ -5,7 +5,7 @@
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
-enum { PICTURE_AOV_COUNT = 6 };
+enum { PICTURE_AOV_COUNT = 8 };
 extern const char
     *const picture_aov_names[PICTURE_AOV_COUNT]; // the first ones are the bits AOV_…, then "color"
 

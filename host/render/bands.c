@@ -38,7 +38,7 @@ static TileShape tile_shape(uint32_t lanes)
 // The buffers that a band is rendered into, sized for `rows`.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, ray_counts, colors, losses, t, normal, position, object, shadow;
+    cl_mem offsets, ray_counts, colors, losses, ray, t, normal, position, object, shadow, path;
 } Film;
 
 static size_t film_pixels(const Renderer *renderer, uint32_t rows)
@@ -63,13 +63,15 @@ static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t ro
     film->rows = rows;
     film->colors = film_buffer(renderer, pixels * 3 * scalar);
     film->losses = film_buffer(renderer, pixels * 3 * scalar);
-    if (aovs != 0) {
+    if (aovs & ~(unsigned)AOV_PATH) {
+        film->ray = film_buffer(renderer, pixels * 3 * scalar);
         film->t = film_buffer(renderer, pixels * scalar);
         film->normal = film_buffer(renderer, pixels * 3 * scalar);
         film->position = film_buffer(renderer, pixels * 3 * scalar);
         film->object = film_buffer(renderer, pixels * sizeof(uint32_t));
         film->shadow = film_buffer(renderer, aovs & AOV_SHADOW ? film_shadow_size(renderer, rows) : 0);
     }
+    if (aovs & AOV_PATH) film->path = film_buffer(renderer, pixels * sizeof(uint32_t));
     film->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     void *offsets = sample_pattern(settings->sample_count, renderer->report.wide);
     film->offsets =
@@ -79,8 +81,8 @@ static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t ro
 
 static void film_close(Film *film)
 {
-    cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->losses, film->t,
-                        film->normal,  film->position,   film->object, film->shadow};
+    cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->losses, film->ray, film->t,
+                        film->normal,  film->position,   film->object, film->shadow, film->path};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
         if (buffers[i]) cl_must(clReleaseMemObject(buffers[i]));
     *film = (Film){0};
@@ -149,14 +151,25 @@ static void band_aovs(Renderer *renderer, const Film *film, unsigned aovs, BandR
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_AOV);
     band_set_place(renderer, kernel, FLAT_COUNT, rows);
-    const cl_mem *buffers[] = {&film->t, &film->normal, &film->position, &film->object, &film->shadow};
-    for (cl_uint i = 0; i < 5; i++)
+    const cl_mem *buffers[] = {&film->ray,      &film->t,      &film->normal,
+                               &film->position, &film->object, &film->shadow};
+    for (cl_uint i = 0; i < 6; i++)
         kernel_argument(kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
     cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
-    kernel_argument(kernel, FLAT_COUNT + 6, sizeof shadow_count, &shadow_count);
+    kernel_argument(kernel, FLAT_COUNT + 7, sizeof shadow_count, &shadow_count);
     size_t global[2];
     band_launch_size(renderer, rows, global);
     renderer_launch(renderer, KERNEL_AOV, 2, global, group_size);
+}
+
+static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
+{
+    cl_kernel kernel = renderer_kernel(renderer, KERNEL_PATH);
+    band_set_place(renderer, kernel, FLAT_COUNT, rows);
+    kernel_argument(kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->path);
+    size_t global[2];
+    band_launch_size(renderer, rows, global);
+    renderer_launch(renderer, KERNEL_PATH, 2, global, group_size);
 }
 
 static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows, BandSink sink,
@@ -175,14 +188,16 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
         {AOV_POSITION, film->position, pixels * 3 * scalar},
         {AOV_OBJECT, film->object, pixels * sizeof(uint32_t)},
         {AOV_SHADOW, film->shadow, film_shadow_size(renderer, rows.row_count)},
+        {AOV_RAY, film->ray, pixels * 3 * scalar},
+        {AOV_PATH, film->path, pixels * sizeof(uint32_t)},
     };
     enum { PART_COUNT = sizeof parts / sizeof *parts };
     const void *mapped[PART_COUNT] = {NULL};
     for (size_t i = 0; i < PART_COUNT; i++)
         if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
             mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
-    Band band = {rows.first_row, rows.row_count, mapped[0], mapped[1],
-                 mapped[2],      mapped[3],      mapped[4], mapped[5]};
+    Band band = {rows.first_row, rows.row_count, mapped[0], mapped[1], mapped[2],
+                 mapped[3],      mapped[4],      mapped[5], mapped[6], mapped[7]};
     double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
     bool go_on = sink(context, &band, done);
     for (size_t i = 0; i < PART_COUNT; i++)
@@ -253,7 +268,8 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
             go_on = !settings->stop || !settings->stop();
         }
         if (!go_on) break;
-        if (aovs != 0) band_aovs(renderer, &film, aovs, rows);
+        if (aovs & ~(unsigned)AOV_PATH) band_aovs(renderer, &film, aovs, rows);
+        if (aovs & AOV_PATH) band_paths(renderer, &film, rows);
         go_on = band_deliver(renderer, &film, aovs, rows, sink, context);
         rows.first_row += rows.row_count;
     }

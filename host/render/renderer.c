@@ -20,6 +20,7 @@ static const struct {
 } kernel_sources[KERNEL_COUNT] = {
     [KERNEL_RENDER] = {"render.cl", "render"},
     [KERNEL_AOV] = {"aov.cl", "aov"},
+    [KERNEL_PATH] = {"path.cl", "path"},
     [KERNEL_TRACE] = {"trace.cl", "trace"},
 };
 
@@ -220,7 +221,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     };
     program_build(renderer->compute, &slot->request, &slot->program);
     // the picture's own kernel is the one that reports name
-    if (kind != KERNEL_AOV) renderer->report.kernel_hash = slot->program.text_hash;
+    if (kind != KERNEL_AOV && kind != KERNEL_PATH) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
     cl_int status;

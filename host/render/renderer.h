@@ -19,7 +19,15 @@ typedef enum {
 extern const char *const precision_names[PRECISION_COUNT];
 
 // What a picture can hold beside its color; a set of bits.
-enum { AOV_T = 1, AOV_NORMAL = 2, AOV_POSITION = 4, AOV_OBJECT = 8, AOV_SHADOW = 16 };
+enum {
+    AOV_T = 1,
+    AOV_NORMAL = 2,
+    AOV_POSITION = 4,
+    AOV_OBJECT = 8,
+    AOV_SHADOW = 16,
+    AOV_RAY = 32,
+    AOV_PATH = 64
+};
 
 // Whether rays go through a hierarchy. The picture is the same either way.
 typedef enum { BVH_AUTO, BVH_ON, BVH_OFF, BVH_CHOICE_COUNT } BvhChoice;
@@ -65,6 +73,8 @@ typedef struct {
 // Called for each band from the top; returns false to stop (a user's interrupt).
 typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
 
+    const void *ray;               // 3 per pixel: the direction, unit but for rounding, from the eye
+    const uint32_t *path;          // 1 per pixel: the signature of what the ray met (kernels/types.h)
 // Renders the region in bands of about band_seconds each. False if the sink stopped it.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
@@ -73,7 +83,7 @@ void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, 
 
 // A kernel's launch, or a transfer.
 typedef struct {
-    const char *name; // "render", "aov", "trace", "read-back"
+    const char *name; // "render", "aov", "path", "trace", "read-back"
     LaunchTime time;
 } NamedLaunch;
 

@@ -4,7 +4,7 @@
 #include "host/render/flatten.h"
 #include "host/render/renderer.h"
 
-typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_TRACE, KERNEL_COUNT } KernelKind;
+typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_PATH, KERNEL_TRACE, KERNEL_COUNT } KernelKind;
 
 typedef struct {
     ProgramRequest request;

@@ -31,7 +31,7 @@ _glint() {
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
     --device) words="cpu gpu" ;;
-    --aov) words="t normal position object shadow color" ;;
+    --aov) words="t normal position object shadow ray path color" ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
     --size | --samples | --region | --bounces | --seconds | --tolerance) return ;;
     esac

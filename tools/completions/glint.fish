@@ -26,7 +26,7 @@ complete -c glint -n '__fish_seen_subcommand_from render bench' -l size -x -d 'W
 complete -c glint -n '__fish_seen_subcommand_from render' -l samples -x -d 'Rays for each pixel'
 complete -c glint -n '__fish_seen_subcommand_from render' -l region -x -d 'Pixels to render, as X,Y,W,H'
 complete -c glint -n '__fish_seen_subcommand_from render' -l bounces -x -d 'Reflections and refractions at most'
-complete -c glint -n '__fish_seen_subcommand_from render' -l aov -x -a 't normal position object shadow color' -d 'Other things than the picture'
+complete -c glint -n '__fish_seen_subcommand_from render' -l aov -x -a 't normal position object shadow ray path color' -d 'Other things than the picture'
 complete -c glint -n '__fish_seen_subcommand_from render' -l timing -d 'How long each stage took'
 complete -c glint -n '__fish_seen_subcommand_from render' -l transfer -x -a 'srgb none' -d 'Curve to display values'
 complete -c glint -n '__fish_seen_subcommand_from render' -l bits -x -a '8 16' -d 'Bits a channel'

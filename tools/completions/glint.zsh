@@ -12,7 +12,7 @@ _glint_render() {
         '--lanes[pixels a work-item carries]:lanes:(1 4 8 16)' \
         '--bvh[use a hierarchy]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
-        '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow color' \
+        '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow ray path color' \
         '--timing=-[how long each stage took]::form:(json)' \
         '--transfer[curve from linear light to display values]:curve:(srgb none)' \
         '--bits[bits a channel]:bits:(8 16)' \

@@ -1,0 +1,16 @@
+// The signature of the way that the ray through each pixel's center takes.
+#define SIGNS_PATHS 1
+#include "film.h"
+#include "path.h"
+
+kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
+{
+    Scene scene = SCENE_FROM_ARGUMENTS;
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
+    Tile tile = band_tile(&band);
+    if (!lanes_any(tile.inside)) return;
+
+    natural signature;
+    ray_color(&scene, camera_ray(header, tile.pixels, 0, 0, tile.inside), &signature);
+    film_store_integer(paths, &tile, 1, 0, integer_from_natural(signature));
+}
