@@ -9,6 +9,7 @@ unset GLINT_DEVICE
 
 scratch=$(mktemp -d) || exit 1
 trap 'rm -rf "$scratch"' EXIT
+shared_cache=${XDG_CACHE_HOME:-$scratch} # of all tests of a run
 export XDG_CACHE_HOME=$scratch/cache TMPDIR=$scratch
 mkdir "$XDG_CACHE_HOME"
 
@@ -39,6 +40,22 @@ finish() {
 skip_all() {
     echo "skipped: $*"
     exit 77
+}
+# python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: python3 (or $PYTHON), else a virtual
+# environment that the tests of a run share, in which pip installs what is missing (by the module's own name where no
+# requirement is given). Skips the test where that cannot be done.
+python_with() {
+    python=${PYTHON:-python3}
+    local modules=("${@%%=*}") folder=$shared_cache/glint-tests/python log=$scratch/pip.log
+    local import="import $(IFS=,; echo "${modules[*]}")"
+    "$python" -c "$import" 2>/dev/null && return
+    command -v "$python" >/dev/null || skip_all "there is no $python"
+    {
+        [ -x "$folder/bin/pip" ] || "$python" -m venv --clear "$folder"
+        python=$folder/bin/python
+        "$python" -c "$import" 2>/dev/null || timeout 300 "$python" -m pip install -q --no-input "${@#*=}"
+    } >"$log" 2>&1 && "$python" -c "$import" 2>>"$log" ||
+        skip_all "${modules[*]}: not here, and pip cannot install them: $(tail -n 1 "$log")"
 }
 is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
 
