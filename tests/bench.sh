@@ -45,6 +45,7 @@ for run in runs:
         assert 0 < times["min"] <= times["median"] <= times["max"] and times["runs"] >= 1, run
     assert run["frame_ms"]["runs"] == run["kernel_ms"]["runs"], run
     assert run["clock"] == "event" or (run["clock"] == "host" and run["clock_doubt"]), run
+    assert len(run["kernel_hash"]) == 16 and int(run["kernel_hash"], 16) > 0, run
     assert is_figure(run["build_ms"]["cold"]) and is_figure(run["build_ms"]["cached"]), run
     rays = run["rays"]
     assert set(rays) == {"camera", "camera_hits", "reflected", "refracted", "shadow"}, run
@@ -54,6 +55,8 @@ for run in runs:
     assert is_figure(run["peak_fraction"]) and is_figure(run["bandwidth_fraction"]), run
     assert isinstance(run["peak_fraction"], dict) == run["hierarchy"], run
     assert run["launches"] and all(launch["name"] == "render" and launch["host_ms"] > 0 for launch in run["launches"])
+hashes = {(run["scene"], run["precision"]): run["kernel_hash"] for run in runs}
+assert len(set(hashes.values())) == len(hashes), "a kernel's hash tells it from others"
 for scene in scenes:
     counts = [run["rays"]["camera_hits"] for run in runs if run["scene"] == scene]
     assert max(counts) - min(counts) <= 2, (scene, counts)

@@ -1,6 +1,6 @@
 #include "host/cli/bench_report.h"
 
-#include "host/base/json.h"
+#include "host/cli/bench_json.h"
 #include "host/cli/version.h"
 #include <inttypes.h>
 #include <stdio.h>
@@ -78,7 +78,8 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     figure_print(stream, 5, 0, 1e3, row->build_cached);
     fprintf(stream, " %7.1f", bench_rays_per_second(row) / 1e6);
     figure_print(stream, 6, 1, 100, bench_peak_fraction(row, report->peak));
-    fprintf(stream, " %6.1f\n", 100 * bench_bandwidth_fraction(row, report->peak));
+    fprintf(stream, " %6.1f  %016" PRIx64 "\n", 100 * bench_bandwidth_fraction(row, report->peak),
+            row->kernel_hash);
     if (doubt) fprintf(stream, "    the host's clock is used: %s\n", doubt);
     Ratio ratio = row_ratio(report, row);
     if (ratio.found)
@@ -117,7 +118,7 @@ static void rays_print(const BenchRow *row, FILE *stream)
 static const char table_head[] =
     "                      frame ms                   kernel ms                           build ms\n"
     "                       min   median      max      min   median      max  clock runs   cold  kept"
-    " Mrays/s flops% bytes%\n";
+    " Mrays/s flops% bytes%  kernel\n";
 
 void bench_print_text(const BenchReport *report, FILE *stream)
 {
@@ -136,46 +137,11 @@ void bench_print_text(const BenchReport *report, FILE *stream)
     reasons_print(report, stream);
 }
 
-static void summary_json(Json *json, const char *key, Summary seconds)
+static void report_device_json(Json *json, const BenchReport *report)
 {
-    json_begin_object(json, key);
-    json_number(json, "min", 1e3 * seconds.min);
-    json_number(json, "median", 1e3 * seconds.median);
-    json_number(json, "max", 1e3 * seconds.max);
-    json_number(json, "quartile_range", 1e3 * seconds.quartile_range);
-    json_integer(json, "runs", (int64_t)seconds.count);
-    json_end(json);
-}
-
-static void unavailable_json(Json *json, const char *reason)
-{
-    json_text(json, "status", "unavailable");
-    json_text(json, "reason", reason);
-}
-
-static void figure_json(Json *json, const char *key, double scale, Figure figure)
-{
-    if (!figure.why_not) {
-        json_number(json, key, scale * figure.value);
-        return;
-    }
-    json_begin_object(json, key);
-    unavailable_json(json, figure.why_not);
-    json_end(json);
-}
-
-static void device_json(Json *json, const BenchReport *report)
-{
-    const Device *device = report->device;
     const Peak *peak = report->peak;
     json_begin_object(json, "device");
-    json_text(json, "name", device->name);
-    json_text(json, "platform", device->platform_name);
-    json_text(json, "platform_version", device->platform_version);
-    json_text(json, "driver", device->driver);
-    json_text(json, "type", device_type_name(device->type));
-    json_integer(json, "units", device->compute_units);
-    json_integer(json, "clock_mhz", device->clock_mhz);
+    device_json(json, report->device);
     json_begin_object(json, "peak");
     json_number(json, "gflops_float", peak->flops_per_second[0] / 1e9);
     figure_json(json, "gflops_double", 1e-9,
@@ -216,21 +182,14 @@ static void ratio_json(Json *json, Ratio ratio, double tolerance)
 
 static void results_json(Json *json, const BenchReport *report, const BenchRow *row)
 {
-    const char *doubt = bench_doubt(&row->times);
-    summary_json(json, "frame_ms", series_summarize(&row->times.frame));
-    summary_json(json, "kernel_ms", bench_kernel(&row->times));
-    json_text(json, "clock", doubt ? "host" : "event");
-    if (doubt) json_text(json, "clock_doubt", doubt);
+    kernel_hash_json(json, row->kernel_hash);
+    times_json(json, row);
     json_begin_object(json, "build_ms");
     figure_json(json, "cold", 1e3, row->build_cold);
     figure_json(json, "cached", 1e3, row->build_cached);
     json_end(json);
-    json_begin_object(json, "rays");
-    for (int kind = 0; kind < BENCH_RAY_KINDS; kind++)
-        json_integer(json, bench_ray_names[kind], (int64_t)row->rays[kind]);
-    json_end(json);
+    rays_json(json, row);
     json_boolean(json, "hierarchy", row->hierarchy);
-    json_number(json, "mrays_per_s", bench_rays_per_second(row) / 1e6);
     figure_json(json, "peak_fraction", 1, bench_peak_fraction(row, report->peak));
     json_number(json, "bandwidth_fraction", bench_bandwidth_fraction(row, report->peak));
     if (report->baseline) ratio_json(json, row_ratio(report, row), report->tolerance);
@@ -241,7 +200,7 @@ void bench_print_json(const BenchReport *report)
     Json *json = json_open();
     json_integer(json, "schema", 1);
     json_text(json, "glint", glint_version());
-    device_json(json, report);
+    report_device_json(json, report);
     json_begin_array(json, "runs");
     for (size_t i = 0; i < report->count; i++) {
         const BenchRow *row = &report->rows[i];
@@ -250,10 +209,7 @@ void bench_print_json(const BenchReport *report)
         json_text(json, "precision", row->key.precision);
         json_integer(json, "lanes", row->key.lanes);
         json_text(json, "bvh", row->key.bvh);
-        json_begin_array(json, "size");
-        json_integer(json, NULL, row->key.width);
-        json_integer(json, NULL, row->key.height);
-        json_end(json);
+        size_json(json, row->key.width, row->key.height);
         if (row->failure)
             unavailable_json(json, row->failure);
         else

@@ -69,13 +69,14 @@ static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, 
     return true;
 }
 
-void variant_open(Compute *compute, Variant *variant, BenchRow *row)
+void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing_builds)
 {
     MessageList messages = {0};
     const RenderSettings *settings = &variant->settings;
     row->key.lanes = settings->lanes ? settings->lanes
                                      : device_lanes(compute->device, settings->precision == PRECISION_DOUBLE);
-    if (builds_measure(compute, variant, row, &messages) && rays_count(compute, variant, row, &messages))
+    if ((!timing_builds || builds_measure(compute, variant, row, &messages)) &&
+        rays_count(compute, variant, row, &messages))
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);
     if (variant->renderer) {
         const RenderReport *report = renderer_report(variant->renderer);

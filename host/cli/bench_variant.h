@@ -11,9 +11,9 @@ typedef struct {
     char *pixels;       // where a run's picture ends up
 } Variant;
 
-// All that comes before the runs: measures the builds and counts the rays. What does not fit the device
-// becomes the row's failure.
-void variant_open(Compute *compute, Variant *variant, BenchRow *row);
+// All that comes before the runs: counts the rays and, where asked for, measures the builds. What does not
+// fit the device becomes the row's failure.
+void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing_builds);
 // One run; `times` NULL: to warm up. False if the user stopped it.
 bool variant_run(Variant *variant, BenchTimes *times);
 void variant_close(Variant *variant); // and zeroes; accepts a zeroed one

@@ -48,6 +48,7 @@ typedef struct {
     BenchKey key;
     char *failure; // why there is nothing but the key; NULL: there is
     BenchTimes times;
+    uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
     uint64_t rays[BENCH_RAY_KINDS];
     bool wide, hierarchy; // computes in double; rays went through a hierarchy

@@ -1,0 +1,76 @@
+#include "host/cli/bench_json.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+void summary_json(Json *json, const char *key, Summary seconds)
+{
+    json_begin_object(json, key);
+    json_number(json, "min", 1e3 * seconds.min);
+    json_number(json, "median", 1e3 * seconds.median);
+    json_number(json, "max", 1e3 * seconds.max);
+    json_number(json, "quartile_range", 1e3 * seconds.quartile_range);
+    json_integer(json, "runs", (int64_t)seconds.count);
+    json_end(json);
+}
+
+void unavailable_json(Json *json, const char *reason)
+{
+    json_text(json, "status", "unavailable");
+    json_text(json, "reason", reason);
+}
+
+void figure_json(Json *json, const char *key, double scale, Figure figure)
+{
+    if (!figure.why_not) {
+        json_number(json, key, scale * figure.value);
+        return;
+    }
+    json_begin_object(json, key);
+    unavailable_json(json, figure.why_not);
+    json_end(json);
+}
+
+void device_json(Json *json, const Device *device)
+{
+    json_text(json, "name", device->name);
+    json_text(json, "platform", device->platform_name);
+    json_text(json, "platform_version", device->platform_version);
+    json_text(json, "driver", device->driver);
+    json_text(json, "type", device_type_name(device->type));
+    json_integer(json, "units", device->compute_units);
+    json_integer(json, "clock_mhz", device->clock_mhz);
+}
+
+void size_json(Json *json, uint32_t width, uint32_t height)
+{
+    json_begin_array(json, "size");
+    json_integer(json, NULL, width);
+    json_integer(json, NULL, height);
+    json_end(json);
+}
+
+void kernel_hash_json(Json *json, uint64_t hash)
+{
+    char digits[17];
+    snprintf(digits, sizeof digits, "%016" PRIx64, hash);
+    json_text(json, "kernel_hash", digits);
+}
+
+void times_json(Json *json, const BenchRow *row)
+{
+    const char *doubt = bench_doubt(&row->times);
+    summary_json(json, "frame_ms", series_summarize(&row->times.frame));
+    summary_json(json, "kernel_ms", bench_kernel(&row->times));
+    json_text(json, "clock", doubt ? "host" : "event");
+    if (doubt) json_text(json, "clock_doubt", doubt);
+}
+
+void rays_json(Json *json, const BenchRow *row)
+{
+    json_begin_object(json, "rays");
+    for (int kind = 0; kind < BENCH_RAY_KINDS; kind++)
+        json_integer(json, bench_ray_names[kind], (int64_t)row->rays[kind]);
+    json_end(json);
+    json_number(json, "mrays_per_s", bench_rays_per_second(row) / 1e6);
+}

@@ -1,0 +1,16 @@
+// Parts of the JSON that the reports of times share.
+#pragma once
+
+#include "host/base/json.h"
+#include "host/measure/bench.h"
+#include "host/opencl/device.h"
+
+void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
+// In place of what cannot be had, in the object that is open.
+void unavailable_json(Json *json, const char *reason);
+void figure_json(Json *json, const char *key, double scale, Figure figure);
+void device_json(Json *json, const Device *device); // what it is, into the object that is open
+void size_json(Json *json, uint32_t width, uint32_t height);
+void kernel_hash_json(Json *json, uint64_t hash);
+void times_json(Json *json, const BenchRow *row); // frame_ms, kernel_ms and the clock of the latter
+void rays_json(Json *json, const BenchRow *row);  // rays, mrays_per_s

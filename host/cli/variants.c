@@ -1,0 +1,208 @@
+#include "host/cli/variants.h"
+
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const VariantOptions variant_options_default = {
+    .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO, .bounce_count = 5};
+
+const char variant_options_help[] =
+    "      --lanes LIST      of 1, 4, 8, 16 (default: the device's own)\n"
+    "      --bvh LIST        of auto, on, off (default: auto)\n"
+    "      --size WxH        of the pictures (default: as glint render has it)\n"
+    "      --seconds MAX     stop measuring after so long, settled or not (default: 5 for each row)\n"
+    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
+    "else a CPU)\n"
+    "      --lenient         skip what .rt files hold beyond the format, with a warning\n"
+    "  -h, --help            this text\n";
+
+// The lanes that are asked for: a bit for each of these.
+static const char *const lanes_names[] = {"1", "4", "8", "16"};
+static const uint32_t lanes_values[] = {1, 4, 8, 16};
+enum { LANES_CHOICE_COUNT = 4, WARM_UP_RUNS = 3, ENOUGH_RUNS = 20, SAMPLES_LARGEST = 1 << 20 };
+
+bool option_positive(const char *option, const char *value, double *result)
+{
+    char *end;
+    double number = strtod(value, &end);
+    if (end == value || *end != '\0' || !(number > 0 && number < 1e9)) {
+        fprintf(stderr, "glint: --%s: expected a number above 0, not \"%s\"\n", option, value);
+        return false;
+    }
+    *result = number;
+    return true;
+}
+
+// Numbers separated by commas.
+static bool option_samples(VariantOptions *options, const char *value)
+{
+    options->sample_choices = 0;
+    for (const char *at = value;; at++) {
+        size_t length = strcspn(at, ",");
+        char *word = memory_copy_text(at);
+        word[length] = '\0';
+        uint32_t samples = 0;
+        bool valid = option_count("samples", word, 1, SAMPLES_LARGEST, &samples);
+        free(word);
+        if (!valid) return false;
+        if (options->sample_choices == SAMPLE_CHOICES_LARGEST) {
+            fprintf(stderr, "glint: --samples: at most %d numbers\n", SAMPLE_CHOICES_LARGEST);
+            return false;
+        }
+        options->samples[options->sample_choices++] = samples;
+        at += length;
+        if (*at == '\0') return true;
+    }
+}
+
+bool variant_option(VariantOptions *options, int option, const char *value, bool *valid)
+{
+    switch (option) {
+    case OPTION_PRECISION:
+        *valid = option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
+        return true;
+    case OPTION_LANES:
+        *valid = option_set("lanes", value, lanes_names, LANES_CHOICE_COUNT, &options->lanes);
+        return true;
+    case OPTION_BVH:
+        *valid = option_set("bvh", value, bvh_choice_names, BVH_CHOICE_COUNT, &options->bvhs);
+        return true;
+    case OPTION_SIZE:
+        *valid = option_size("size", value, &options->width, &options->height);
+        return true;
+    case OPTION_SECONDS:
+        *valid = option_positive("seconds", value, &options->seconds);
+        return true;
+    case OPTION_SAMPLES:
+        *valid = option_samples(options, value);
+        return true;
+    case OPTION_BOUNCES:
+        *valid = option_count("bounces", value, 0, 16, &options->bounce_count);
+        return true;
+    default:
+        return option_common(&options->common, option, value, valid);
+    }
+}
+
+static void variant_add(VariantSet *set, const char *path, size_t scene_index, const RenderSettings *settings)
+{
+    set->variants[set->count] = (Variant){.scene = &set->scenes[scene_index], .settings = *settings};
+    set->scene_indices[set->count] = scene_index;
+    set->rows[set->count++] =
+        (BenchRow){.key = {path, precision_names[settings->precision], bvh_choice_names[settings->bvh],
+                           settings->lanes, settings->width, settings->height}};
+}
+
+static void scene_add_variants(VariantSet *set, const VariantOptions *options, const char *path,
+                               size_t scene_index)
+{
+    uint32_t width = options->width, height = options->height;
+    picture_size_choose(&set->scenes[scene_index], &width, &height);
+    RenderSettings settings = {
+        .width = width,
+        .height = height,
+        .region_width = width,
+        .region_height = height,
+        .bounce_count = options->bounce_count,
+        .shift_to_eye = true,
+    };
+    const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
+    for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
+        for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
+            for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
+                for (size_t i = 0; i < sample_choices; i++) {
+                    if (!(options->precisions >> precision & 1) || !(options->bvhs >> bvh & 1)) continue;
+                    // where no lanes are asked for, once with the device's own
+                    if (options->lanes ? !(options->lanes >> lanes & 1) : lanes > 0) continue;
+                    settings.precision = (Precision)precision;
+                    settings.lanes = options->lanes ? lanes_values[lanes] : 0;
+                    settings.bvh = (BvhChoice)bvh;
+                    settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
+                    variant_add(set, path, scene_index, &settings);
+                }
+}
+
+bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count)
+{
+    const size_t largest = count * PRECISION_COUNT * LANES_CHOICE_COUNT * BVH_CHOICE_COUNT *
+                           (options->sample_choices > 0 ? options->sample_choices : 1);
+    *set = (VariantSet){
+        .scenes = memory_allocate_zeroed(count, sizeof *set->scenes),
+        .scene_count = count,
+        .variants = memory_allocate_zeroed(largest, sizeof *set->variants),
+        .rows = memory_allocate_zeroed(largest, sizeof *set->rows),
+        .scene_indices = memory_allocate_zeroed(largest, sizeof *set->scene_indices),
+    };
+    for (size_t i = 0; i < count; i++) {
+        if (!scene_open(&set->scenes[i], paths[i], &options->common)) return false;
+        scene_add_variants(set, options, paths[i], i);
+    }
+    return true;
+}
+
+static bool all_settled(const VariantSet *set)
+{
+    for (size_t i = 0; i < set->count; i++)
+        if (set->variants[i].renderer && !bench_settled(&set->rows[i].times, ENOUGH_RUNS)) return false;
+    return true;
+}
+
+// Every variant once. False if the user stopped it.
+static bool round_run(VariantSet *set, bool warm_up)
+{
+    for (size_t i = 0; i < set->count; i++)
+        if (set->variants[i].renderer &&
+            !variant_run(&set->variants[i], warm_up ? NULL : &set->rows[i].times))
+            return false;
+    return true;
+}
+
+bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool timing_builds,
+                         Progress *progress)
+{
+    for (size_t i = 0; i < set->count; i++) {
+        if (progress_interrupted()) return false;
+        variant_open(compute, &set->variants[i], &set->rows[i], timing_builds);
+    }
+    double bound = options->seconds > 0 ? options->seconds : 5 * (double)set->count;
+    double start = clock_seconds();
+    for (int i = 0; i < WARM_UP_RUNS && (i == 0 || clock_seconds() - start < bound / 4); i++)
+        if (!round_run(set, true)) return false;
+    start = clock_seconds();
+    double spent = 0;
+    while (spent < bound && !all_settled(set)) {
+        if (!round_run(set, false)) return false;
+        spent = clock_seconds() - start;
+        progress_show(progress, spent / bound);
+    }
+    for (size_t i = 0; i < set->count; i++)
+        if (set->variants[i].renderer)
+            set->rows[i].kernel_hash = renderer_report(set->variants[i].renderer)->kernel_hash;
+    return true;
+}
+
+bool variant_set_any_measured(const VariantSet *set)
+{
+    for (size_t i = 0; i < set->count; i++)
+        if (set->variants[i].renderer) return true;
+    return false;
+}
+
+void variant_set_close(VariantSet *set)
+{
+    for (size_t i = 0; i < set->count; i++) {
+        variant_close(&set->variants[i]);
+        bench_row_free(&set->rows[i]);
+    }
+    for (size_t i = 0; i < set->scene_count; i++)
+        scene_free(&set->scenes[i]);
+    free(set->scenes);
+    free(set->variants);
+    free(set->rows);
+    free(set->scene_indices);
+    *set = (VariantSet){0};
+}

@@ -1,0 +1,67 @@
+// The ways of rendering that a command line asks for, each for every scene, run in turn and timed: what
+// glint bench and glint accuracy share.
+#pragma once
+
+#include "host/cli/bench_variant.h"
+#include "host/cli/options.h"
+#include "host/cli/progress.h"
+
+enum { SAMPLE_CHOICES_LARGEST = 16 };
+
+typedef struct {
+    CommonOptions common;
+    unsigned precisions, lanes, bvhs; // sets; no lanes: the device's own
+    uint32_t width, height;           // 0: not given
+    uint32_t samples[SAMPLE_CHOICES_LARGEST];
+    size_t sample_choices; // 0: one sample
+    uint32_t bounce_count;
+    double seconds; // 0: not given
+} VariantOptions;
+
+extern const VariantOptions
+    variant_options_default; // single, of everything else the device's or program's own
+
+enum {
+    OPTION_SIZE = OPTION_OWN,
+    OPTION_SECONDS,
+    OPTION_SAMPLES,
+    OPTION_BOUNCES,
+    OPTION_BEYOND_VARIANTS // each subcommand's own start here
+};
+
+#define VARIANT_LONG_OPTIONS                                                                                 \
+    {"precision", required_argument, NULL, OPTION_PRECISION},                                                \
+        {"lanes", required_argument, NULL, OPTION_LANES}, {"bvh", required_argument, NULL, OPTION_BVH},      \
+        {"size", required_argument, NULL, OPTION_SIZE},                                                      \
+        {"seconds", required_argument, NULL, OPTION_SECONDS},                                                \
+        {"device", required_argument, NULL, OPTION_DEVICE},                                                  \
+    {                                                                                                        \
+        "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
+    }
+
+extern const char variant_options_help[]; // of those, but for --precision, whose default differs
+
+// Takes one of them; *valid tells whether its value was one, else the user is told. False if `option` is
+// none.
+bool variant_option(VariantOptions *options, int option, const char *value, bool *valid);
+bool option_positive(const char *option, const char *value, double *result); // false: told what is wrong
+
+typedef struct {
+    Scene *scenes;
+    size_t scene_count;
+    // side by side, those of a scene together
+    Variant *variants;
+    BenchRow *rows;
+    size_t *scene_indices;
+    size_t count;
+} VariantSet;
+
+// Reads the scenes. False: told why; the set still wants closing.
+bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
+// Readies each variant for its runs, then measures: in turn (A B C A B C …), so that a machine that slows
+// down does so for all; until times settle, or after options->seconds. `timing_builds`: rows get times of
+// builds. False if the user stopped it.
+bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool timing_builds,
+                         Progress *progress);
+bool variant_set_any_measured(const VariantSet *set);
+void variant_set_close(VariantSet *set);
