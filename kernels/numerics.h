@@ -5,7 +5,7 @@
 #ifndef NUMERICS_H
 #define NUMERICS_H
 
-#include "lanes.h"
+#include "perturb.h"
 
 // Whether intersections use the compensated forms.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
@@ -16,9 +16,9 @@
 // 0 or beyond the range is left as the device gives it.
 static inline real real_divide(real a, real b)
 {
-    real quotient = a / b;
+    real quotient = device_divide(a, b);
     if (REPAIRS_DIVIDE) {
-        real reciprocal = (real)(1) / b;
+        real reciprocal = device_divide((real)(1), b);
         reciprocal = fma(fma(-b, reciprocal, (real)(1)), reciprocal, reciprocal);
         real better = fma(fma(-quotient, b, a), reciprocal, quotient);
         better = fma(fma(-better, b, a), reciprocal, better);
@@ -32,9 +32,9 @@ static inline real real_divide(real a, real b)
 // Correctly rounded at `strict`, likewise; 0 for 0. The argument is never negative.
 static inline real real_sqrt(real a)
 {
-    real root = sqrt(a);
+    real root = device_sqrt(a);
     if (REPAIRS_DIVIDE) {
-        real half_reciprocal = (real)(0.5f) / root;
+        real half_reciprocal = device_divide((real)(0.5f), root);
         real better = fma(fma(-root, root, a), half_reciprocal, root);
         better = fma(fma(-better, better, a), half_reciprocal, better);
         mask ordinary = (a > (real)(0x1p-100f)) & (a < (real)(0x1p120f));
@@ -200,14 +200,16 @@ static inline real real_exp_negative(real x)
     return lanes_select(x < lowest, (real)(0), series * power);
 }
 
-// (1 - s)^n for 0 <= s < 1, n >= 0. `fast` takes the device's own functions, as inaccurate as it likes.
+// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1. `fast` takes the device's own functions, as inaccurate as it
+// likes.
 static inline real real_complement_power(real s, real n)
 {
 #if IS_FAST
-    return native_exp2(n * native_log2((real)(1) - s));
+    real power = device_exp2(n * device_log2((real)(1) - s));
 #else
-    return real_exp_negative(n * real_log_complement(s));
+    real power = device_power(real_exp_negative(n * real_log_complement(s)), s, n);
 #endif
+    return real_min(power, (real)(1));
 }
 
 #endif

@@ -18,6 +18,11 @@ const char common_options_help[] =
     "      --no-cache        build the kernels anew and keep nothing\n"
     "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
 
+const char perturb_option_help[] =
+    "      --perturb SEED[:SCALE]\n"
+    "                        err in divisions, roots and powers as other devices may, SCALE times as much "
+    "(default: 1)\n";
+
 // Decimal digits only; *end is left behind them.
 static bool digits_read(const char *value, const char **end, uint64_t *result)
 {
@@ -57,6 +62,25 @@ bool option_size(const char *option, const char *value, uint32_t *width, uint32_
     }
     *width = (uint32_t)w;
     *height = (uint32_t)h;
+    return true;
+}
+
+static bool perturb_read(const char *value, CommonOptions *common)
+{
+    const char *at;
+    uint64_t seed, scale = 1;
+    bool valid = digits_read(value, &at, &seed) && seed >= 1 && seed <= UINT32_MAX;
+    if (valid && *at == ':')
+        valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_LARGEST;
+    if (!valid || *at != '\0') {
+        fprintf(stderr,
+                "glint: --perturb: expected a seed from 1 to %u, or SEED:SCALE with a scale from 1 to %d, "
+                "not \"%s\"\n",
+                UINT32_MAX, PERTURB_SCALE_LARGEST, value);
+        return false;
+    }
+    common->perturb_seed = (uint32_t)seed;
+    common->perturb_scale = (uint32_t)scale;
     return true;
 }
 
@@ -133,6 +157,9 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
         return true;
     case OPTION_LENIENT:
         common->lenient = true;
+        return true;
+    case OPTION_PERTURB:
+        *valid = perturb_read(value, common);
         return true;
     default:
         return false;

@@ -15,6 +15,7 @@ typedef struct {
     uint32_t lanes; // 0: the device's own
     BvhChoice bvh;
     bool no_cache, lenient;
+    uint32_t perturb_seed, perturb_scale; // 0: not given
 } CommonOptions;
 
 // Values of getopt_long beyond the letters; each subcommand's own start at OPTION_OWN.
@@ -25,6 +26,7 @@ enum {
     OPTION_BVH,
     OPTION_NO_CACHE,
     OPTION_LENIENT,
+    OPTION_PERTURB,
     OPTION_OWN
 };
 
@@ -37,7 +39,14 @@ enum {
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
 
+// Of the subcommands that draw or trace.
+#define PERTURB_LONG_OPTION                                                                                  \
+    {                                                                                                        \
+        "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
+    }
+
 extern const char common_options_help[];
+extern const char perturb_option_help[];
 
 enum { PICTURE_SIDE_LARGEST = 1 << 20 }; // pixels
 

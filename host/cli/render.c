@@ -36,6 +36,7 @@ static const struct option long_options[] = {
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
+    PERTURB_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -133,7 +134,7 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
     int option;
     while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
         if (option == 'h') {
-            printf("%s%s", help_text, common_options_help);
+            printf("%s%s%s", help_text, common_options_help, perturb_option_help);
             *helped = true;
             return EXIT_DONE;
         }
@@ -174,6 +175,8 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
         .shift_to_eye = true,
         .stop = progress_interrupted,
         .no_cache = options->common.no_cache,
+        .perturb_seed = options->common.perturb_seed,
+        .perturb_scale = options->common.perturb_scale,
     };
     return true;
 }

@@ -18,6 +18,7 @@ static const struct option long_options[] = {
     {"rays", required_argument, NULL, OPTION_RAYS},
     {"output", required_argument, NULL, 'o'},
     COMMON_LONG_OPTIONS,
+    PERTURB_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -155,6 +156,8 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
         .lanes = options->common.lanes,
         .bvh = options->common.bvh,
         .no_cache = options->common.no_cache,
+        .perturb_seed = options->common.perturb_seed,
+        .perturb_scale = options->common.perturb_scale,
     };
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
@@ -175,7 +178,7 @@ static int options_read(TraceOptions *options, int argument_count, char **argume
     bool valid;
     while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
         if (option == 'h') {
-            printf("%s%s", help_text, common_options_help);
+            printf("%s%s%s", help_text, common_options_help, perturb_option_help);
             *helped = true;
             return EXIT_DONE;
         }

@@ -36,6 +36,11 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
                     settings->bounce_count);
         return false;
     }
+    if (settings->perturb_scale > PERTURB_SCALE_LARGEST) {
+        message_add(messages, MESSAGE_ERROR, "errors can be at most %d times as large, not %u",
+                    PERTURB_SCALE_LARGEST, settings->perturb_scale);
+        return false;
+    }
     if (settings->precision == PRECISION_DOUBLE && !device->fp64) {
         message_add(messages, MESSAGE_ERROR,
                     "precision double: the device \"%s\" has no 64-bit floating point", device->name);
@@ -120,7 +125,9 @@ static void upload(Renderer *renderer, FlatScene *flat)
 static void prelude_write(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
-    bool correct = renderer->compute->device->correctly_rounded;
+    uint32_t seed = renderer->settings.perturb_seed, scale = renderer->settings.perturb_scale;
+    // errors are repaired, as on a device that makes them
+    bool correct = renderer->compute->device->correctly_rounded && seed == 0;
     Text *text = &renderer->prelude;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
@@ -128,6 +135,9 @@ static void prelude_write(Renderer *renderer)
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
     text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
+    text_appendf(text, "#define PERTURB %d\n", seed != 0);
+    text_appendf(text, "#define PERTURB_SEED %uu\n", seed);
+    text_appendf(text, "#define PERTURB_SCALE %u\n", scale > 0 ? scale : 1);
     features_write_prelude(text, renderer->report.features);
 
     renderer->options = "-cl-std=CL1.2";

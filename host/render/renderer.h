@@ -42,6 +42,8 @@ typedef struct {
     uint32_t lanes; // 1, 4, 8, 16; 0: the device's own choice
     BvhChoice bvh;
     bool counting;             // count rays by kind, with a build of its own: never time such a run
+    uint32_t perturb_seed;     // not 0: a build that errs as devices may (kernels/perturb.h)
+    uint32_t perturb_scale;    // times as much, at most PERTURB_SCALE_LARGEST; 0: once
     FeatureSet extra_features; // built in though the scene does not need them, for tests
     bool shift_to_eye;         // true for pictures; false for probes: rays and scene as they are
     bool no_cache;
@@ -49,6 +51,9 @@ typedef struct {
     bool (*stop)(void);  // asked between launches whether to end early; NULL: never
     uint32_t band_rows;  // fixed number of rows in a band (tests); 0: by time
 } RenderSettings;
+
+// Beyond this an error could reach the next power of two but one.
+enum { PERTURB_SCALE_LARGEST = 1000 };
 
 typedef struct Renderer Renderer;
 
@@ -68,13 +73,13 @@ typedef struct {
     const void *normal, *position; // 3 per pixel, 0 where nothing was hit; relative to the eye
     const uint32_t *object;        // 1 per pixel; UINT32_MAX where nothing was hit
     const uint32_t *shadow;        // 1 per light and pixel: 1 where the light does not reach what was hit
+    const void *ray;               // 3 per pixel: the direction, unit but for rounding, from the eye
+    const uint32_t *path;          // 1 per pixel: the signature of what the ray met (kernels/types.h)
 } Band;
 
 // Called for each band from the top; returns false to stop (a user's interrupt).
 typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
 
-    const void *ray;               // 3 per pixel: the direction, unit but for rounding, from the eye
-    const uint32_t *path;          // 1 per pixel: the signature of what the ray met (kernels/types.h)
 // Renders the region in bands of about band_seconds each. False if the sink stopped it.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 

@@ -3,14 +3,14 @@
 _glint_options() {
     case ${1-} in
     render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
-        "--timing --transfer --bits --no-cache --lenient --quiet -h --help" ;;
-    trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient -h --help" ;;
+        "--timing --transfer --bits --no-cache --lenient --perturb --quiet -h --help" ;;
+    trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --perturb -h --help" ;;
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
     diff) echo "--heatmap --json -h --help" ;;
     bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --tolerance --device" \
         "--lenient -h --help" ;;
-    verify) echo "--device --precision --lanes --no-cache --json -h --help" ;;
+    verify) echo "--device --precision --lanes --no-cache --perturb --json -h --help" ;;
     *) echo "--version --help" ;;
     esac
 }
@@ -33,7 +33,7 @@ _glint() {
     --device) words="cpu gpu" ;;
     --aov) words="t normal position object shadow ray path color" ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
-    --size | --samples | --region | --bounces | --seconds | --tolerance) return ;;
+    --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance) return ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

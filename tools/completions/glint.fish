@@ -19,6 +19,7 @@ complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l precis
 complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l lanes -x -a '1 4 8 16' -d 'Pixels or rays a work-item carries'
 complete -c glint -n '__fish_seen_subcommand_from render trace' -l bvh -x -a 'auto on off' -d 'Use a hierarchy'
 complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l no-cache -d 'Build the kernel anew'
+complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l perturb -x -d 'Err as other devices may, SEED[:SCALE]'
 complete -c glint -n '__fish_seen_subcommand_from render trace check bench' -l lenient -d 'Skip unknown elements of a .rt scene'
 complete -c glint -n '__fish_seen_subcommand_from check devices diff bench verify' -l json -d 'For programs'
 complete -c glint -n '__fish_seen_subcommand_from trace' -l rays -r -F -d 'File of rays'

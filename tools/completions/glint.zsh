@@ -17,6 +17,7 @@ _glint_render() {
         '--transfer[curve from linear light to display values]:curve:(srgb none)' \
         '--bits[bits a channel]:bits:(8 16)' \
         '--no-cache[build the kernel anew]' \
+        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '--quiet[no progress]' \
         '(- *)'{-h,--help}'[list the options]' \
@@ -32,6 +33,7 @@ _glint_trace() {
         '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
         '--bvh[use a hierarchy]:choice:(auto on off)' \
         '--no-cache[build the kernel anew]' \
+        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
@@ -57,6 +59,7 @@ _glint_verify() {
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
         '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
         '--no-cache[build the kernels anew]' \
+        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--json[for programs]' \
         '(- *)'{-h,--help}'[list the options]'
 }
