@@ -182,6 +182,32 @@ static void test_npy_types(void **state)
     image_free(&image);
 }
 
+static void test_doubles_keep_their_bits(void **state)
+{
+    (void)state;
+    const double doubles[] = {1.0 / 3, 1 + 1e-15, 5e-324};
+    const float floats[] = {1.0F / 3, 1, 0.5F};
+    ImageHeader header = {IMAGE_NPY, 3, 1, 1, TRANSFER_NONE, 8, 'd', notes};
+    picture_write("d.npy", &header, doubles, sizeof *doubles);
+    header.npy_type = 'f';
+    picture_write("f.npy", &header, floats, sizeof *floats);
+    for (int i = 0; i < 2; i++) {
+        MessageList messages = {0};
+        Image image;
+        double *values = image_read_doubles(&image, i ? "f.npy" : "d.npy", &messages);
+        assert_non_null(values);
+        for (int k = 0; k < 3; k++)
+            assert_true(values[k] == (i ? (double)floats[k] : doubles[k]));
+        free(values);
+        image_free(&image);
+    }
+    MessageList messages = {0};
+    Image image;
+    assert_null(image_read_doubles(&image, "none.npy", &messages));
+    assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
+    message_list_free(&messages);
+}
+
 static void test_npy_bytes(void **state)
 {
     (void)state;
@@ -419,6 +445,7 @@ int main(void)
         cmocka_unit_test(test_float_formats),
         cmocka_unit_test(test_small_exr),
         cmocka_unit_test(test_npy_types),
+        cmocka_unit_test(test_doubles_keep_their_bits),
         cmocka_unit_test(test_npy_bytes),
         cmocka_unit_test(test_png_notes),
         cmocka_unit_test(test_exr_notes),

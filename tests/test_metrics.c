@@ -125,7 +125,7 @@ static void test_zeros_of_two_signs_differ(void **state)
 static void test_summary_by_hand(void **state)
 {
     (void)state;
-    const float expected[] = {0, 1, NAN, 2, 4, 3}, found[] = {1, 1, 5, 2, 2, -INFINITY};
+    const double expected[] = {0, 1, (double)NAN, 2, 4, 3}, found[] = {1, 1, 5, 2, 2, -(double)INFINITY};
     ErrorSummary summary = error_summarize(expected, found, 6);
     assert_int_equal(summary.count, 4);
     assert_near(summary.largest, 2, 0);
@@ -141,9 +141,9 @@ static void test_percentile(void **state)
 {
     (void)state;
     enum { COUNT = 5000 };
-    float expected[COUNT] = {0}, found[COUNT];
+    double expected[COUNT] = {0}, found[COUNT];
     for (int i = 0; i < COUNT; i++) // every number 1e-6 .. 5000e-6 once, in a jumble, of both signs
-        found[i] = (float)((i * 1237 % COUNT + 1) * (i % 2 ? 1e-6 : -1e-6));
+        found[i] = (i * 1237 % COUNT + 1) * (i % 2 ? 1e-6 : -1e-6);
     assert_near(error_summarize(expected, found, COUNT).percentile_999, 4995e-6, 1e-9);
     assert_near(error_summarize(expected, found, COUNT).largest, 5000e-6, 1e-9);
 }

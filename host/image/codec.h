@@ -30,6 +30,8 @@ typedef struct {
     const uint8_t *bytes;
     size_t length;
     MessageList *messages;
+    double *
+        *doubles; // NULL, or where the values of a file that holds doubles go as they are; the reader frees
 } ImageFile;
 
 // A decoder that fails says why with image_refuse; image.c frees what the image holds then.

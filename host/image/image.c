@@ -133,7 +133,7 @@ static bool image_decode(Image *image, const ImageFile *file)
     return image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
 }
 
-bool image_read(Image *image, const char *path, MessageList *messages)
+static bool file_read(Image *image, double **doubles, const char *path, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
     Text text = {0};
@@ -141,11 +141,27 @@ bool image_read(Image *image, const char *path, MessageList *messages)
         text_free(&text);
         return false;
     }
-    ImageFile file = {path, (const uint8_t *)text_c(&text), text.count, messages};
+    ImageFile file = {path, (const uint8_t *)text_c(&text), text.count, messages, doubles};
     bool done = image_decode(image, &file);
     text_free(&text);
     if (!done) image_free(image);
     return done;
+}
+
+bool image_read(Image *image, const char *path, MessageList *messages)
+{
+    return file_read(image, NULL, path, messages);
+}
+
+double *image_read_doubles(Image *image, const char *path, MessageList *messages)
+{
+    double *values = NULL;
+    if (!file_read(image, &values, path, messages) || values) return values;
+    size_t count = (size_t)image->width * image->height * image->channels;
+    values = memory_allocate(count, sizeof *values);
+    for (size_t i = 0; i < count; i++)
+        values[i] = (double)image->values[i];
+    return values;
 }
 
 void image_free(Image *image)

@@ -47,4 +47,6 @@ typedef struct {
     bool display; // 8 or 16 bit display values, scaled to 0..1, curve not undone
 } Image;
 bool image_read(Image *image, const char *path, MessageList *messages); // PNG, JPEG, PPM, EXR, NPY
+// The same, and returns its values as the file has them, where it holds doubles. Caller frees. NULL: failed.
+double *image_read_doubles(Image *image, const char *path, MessageList *messages);
 void image_free(Image *image);

@@ -128,6 +128,10 @@ static bool npy_dictionary_decode(Image *image, const ImageFile *file, const cha
     if (count > (file->length - data) / size) return image_refuse(file, "NPY: the file ends too early");
     for (size_t i = 0; i < count; i++)
         image->values[i] = npy_value(file->bytes + data + i * size, type);
+    if (file->doubles && type == NPY_DOUBLE) {
+        *file->doubles = memory_allocate(count, sizeof **file->doubles);
+        memcpy(*file->doubles, file->bytes + data, count * sizeof **file->doubles);
+    }
     return true;
 }
 

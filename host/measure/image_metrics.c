@@ -2,6 +2,7 @@
 
 #include "host/base/fault.h"
 #include "host/measure/flip.h"
+#include "host/measure/percentile.h"
 #include "host/measure/srgb.h"
 #include <math.h>
 #include <stdlib.h>
@@ -17,39 +18,14 @@ static size_t value_count(const Image *image)
     return pixel_count(image) * image->channels;
 }
 
-// The value at `rank` (from 0) of the sorted magnitudes. The bits of floats that are not negative order them:
-// first the upper half of the bits is found by counting, then the lower among those that share it.
-static float rank_select(const float *magnitudes, size_t count, size_t rank)
-{
-    size_t *counts = memory_allocate(1u << 16, sizeof *counts);
-    uint32_t found = 0;
-    for (unsigned shift = 16;; shift = 0) {
-        memset(counts, 0, (1u << 16) * sizeof *counts);
-        for (size_t i = 0; i < count; i++) {
-            uint32_t bits;
-            memcpy(&bits, &magnitudes[i], sizeof bits);
-            if (shift == 16 || bits >> 16 == found >> 16) counts[bits >> shift & 0xffff]++;
-        }
-        uint32_t half = 0;
-        for (; rank >= counts[half]; half++)
-            rank -= counts[half];
-        found |= half << shift;
-        if (shift == 0) break;
-    }
-    free(counts);
-    float value;
-    memcpy(&value, &found, sizeof value);
-    return value;
-}
-
-ErrorSummary error_summarize(const float *reference, const float *test, size_t count)
+ErrorSummary error_summarize(const double *reference, const double *test, size_t count)
 {
     ErrorSummary summary = {.psnr = INFINITY};
     float *magnitudes = memory_allocate(count + 1, sizeof *magnitudes);
     double sum = 0, square_sum = 0, relative_sum = 0;
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(reference[i]) || !isfinite(test[i])) continue;
-        double expected = (double)reference[i], difference = (double)test[i] - expected;
+        double expected = reference[i], difference = test[i] - expected;
         double square = difference * difference;
         sum += difference;
         square_sum += square;
@@ -63,8 +39,7 @@ ErrorSummary error_summarize(const float *reference, const float *test, size_t c
         summary.rmse = sqrt(square_sum / compared);
         summary.rel_mse = relative_sum / compared;
         summary.psnr = -20 * log10(summary.rmse);
-        size_t rank = (size_t)ceil(0.999 * compared) - 1;
-        summary.percentile_999 = (double)rank_select(magnitudes, summary.count, rank);
+        summary.percentile_999 = percentile_999(magnitudes, summary.count);
     }
     free(magnitudes);
     return summary;
@@ -90,23 +65,23 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
 }
 
 // What the screen or the file says is there as light. Caller frees.
-static float *linear_values(const Image *image)
+static double *linear_values(const Image *image)
 {
     size_t count = value_count(image);
-    float *values = memory_allocate(count, sizeof *values);
+    double *values = memory_allocate(count, sizeof *values);
     for (size_t i = 0; i < count; i++)
-        values[i] = image->display ? (float)srgb_decode((double)image->values[i]) : image->values[i];
+        values[i] = image->display ? srgb_decode((double)image->values[i]) : (double)image->values[i];
     return values;
 }
 
 void image_errors(const Image *reference, const Image *test, float *errors)
 {
-    float *expected = linear_values(reference), *found = linear_values(test);
+    double *expected = linear_values(reference), *found = linear_values(test);
     for (size_t i = 0; i < pixel_count(reference); i++) {
         errors[i] = 0;
         for (size_t k = i * reference->channels; k < (i + 1) * reference->channels; k++) {
             if (isfinite(expected[k]) && isfinite(found[k]))
-                errors[i] = fmaxf(errors[i], fabsf(found[k] - expected[k]));
+                errors[i] = fmaxf(errors[i], (float)fabs(found[k] - expected[k]));
             else if (isfinite(expected[k]) || isfinite(found[k]))
                 errors[i] = INFINITY;
         }
@@ -194,7 +169,7 @@ ImageMetrics image_metrics(const Image *reference, const Image *test)
     };
     for (size_t i = 0; i < value_count(reference); i++)
         metrics.differing_count += memcmp(&reference->values[i], &test->values[i], sizeof(float)) != 0;
-    float *expected = linear_values(reference), *found = linear_values(test);
+    double *expected = linear_values(reference), *found = linear_values(test);
     metrics.linear = error_summarize(expected, found, value_count(reference));
     free(expected);
     free(found);

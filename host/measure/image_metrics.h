@@ -15,7 +15,7 @@ typedef struct {
     double rel_mse;
 } ErrorSummary;
 
-ErrorSummary error_summarize(const float *reference, const float *test, size_t count);
+ErrorSummary error_summarize(const double *reference, const double *test, size_t count);
 
 typedef struct {
     size_t differing_count;                     // values whose bits differ
