@@ -205,6 +205,9 @@ class Revolution(Shape):
         self.radius = float(max(map(fraction, self.radii)))
         self.size = self.radius if endless else sqrt(self.radius**2 + self.axis_length**2 / 4)
         self.reach = 4 * self.size
+        self.unit_axis = [x / self.axis_length for x in floats(self.axis)]
+        self.from_base = floats(subtract(self.center, self.base))
+        self.end_radii = floats(self.radii)
 
     def places(self, ray):
         # (|p|^2 - h^2 / |w|^2) = (r + (R - r) h / |w|^2)^2 with h = p . w, times |w|^4
@@ -238,13 +241,12 @@ class Revolution(Shape):
         return normal if any(normal) else self.axis
 
     def depth(self, p):
-        w = [x / self.axis_length for x in floats(self.axis)]
-        q = [x + y for x, y in zip(p, floats(subtract(self.center, self.base)))]
-        height = sum(x * y for x, y in zip(q, w))
-        across = sum((x - height * y) ** 2 for x, y in zip(q, w))
+        q = [x + y for x, y in zip(p, self.from_base)]
+        height = sum(x * y for x, y in zip(q, self.unit_axis))
+        across = sum((x - height * y) ** 2 for x, y in zip(q, self.unit_axis))
         if self.endless:
             return 1 - across / self.radius**2
-        start, end = floats(self.radii)
+        start, end = self.end_radii
         radius = start + (end - start) * height / self.axis_length
         ends = min(height, self.axis_length - height) / self.radius
         if ends < 0:
@@ -258,6 +260,7 @@ class Torus(Shape):
     def __init__(self, center, major, minor):
         self.center, self.major, self.minor = vector(center), rational(major), rational(minor)
         self.radius, self.size = float(minor), float(major) + float(minor)
+        self.major_radius = float(major)
         self.reach = 1.5 * self.size
 
     def places(self, ray):
@@ -279,7 +282,7 @@ class Torus(Shape):
         return [p[0] * (1 - self.major / flat), p[1] * (1 - self.major / flat), p[2]]
 
     def depth(self, p):
-        off = sqrt(p[0] ** 2 + p[1] ** 2) - float(fraction(self.major))
+        off = sqrt(p[0] ** 2 + p[1] ** 2) - self.major_radius
         return 1 - (off * off + p[2] * p[2]) / self.radius**2
 
 
