@@ -71,14 +71,24 @@ tests: $(tests)
 test:
 	+@tools/run_tests $(BUILD)
 
+# For the comparison with other programs alone; needs libembree-dev.
+embree_sources := $(wildcard tools/peers/embree/*.c)
+embree_headers := $(wildcard tools/peers/embree/*.h)
+
+$(BUILD)/peers/embree: $(embree_sources) $(embree_headers) Makefile
+	@mkdir -p $(@D)
+	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp-simd $(embree_sources) \
+	    -lembree3 -lm -lpthread -o $@
+
 # Pinned to one release of clang's tools: what they ask for changes with each.
 CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers)
+linted := $(sources) $(test_programs) $(test_helpers) \
+          $(if $(wildcard /usr/include/embree3/rtcore.h),$(embree_sources))
 
-formatted := $(linted) $(kernels) $(wildcard host/*/*.h tests/*.h tests/oracle/*.h)
+formatted := $(linted) $(kernels) $(wildcard host/*/*.h tests/*.h tests/oracle/*.h) $(embree_sources) $(embree_headers)
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)

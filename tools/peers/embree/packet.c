@@ -1,0 +1,375 @@
+#include "packet.h"
+
+#include <math.h>
+#include <stdalign.h>
+#include <string.h>
+
+static const int valid_lane = -1; // as Embree has it
+
+// A plane is not put to Embree: 16 rays against one are few instructions, and leave it shorter rays. This is
+// faster than two large triangles in its hierarchy.
+enum { NO_PLANE = -1 };
+
+typedef struct {
+    alignas(64) float x[LANES];
+    float y[LANES], z[LANES];
+} Vectors;
+
+typedef struct {
+    alignas(64) int found[LANES]; // valid_lane or 0
+    int plane[LANES];
+    Vectors position, start; // start: a little off the surface, for shadow rays
+    Vectors normal;          // to shade with, unit, towards the eye
+    Vectors to_eye;          // unit
+    Vectors diffuse, color;
+    float specular[LANES], shininess[LANES];
+} Surfaces;
+
+static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, struct RTCRayHit16 *rays,
+                        int *valid)
+{
+    const Camera *camera = &renderer->description->camera;
+    const int width = (int)renderer->width, height = (int)renderer->height;
+    const float scale = camera->half_tangent / (float)height;
+    FOR_LANES
+    {
+        int column = (int)left + i % PACKET_SIDE, row = (int)top + i / PACKET_SIDE;
+        float x = scale * (float)(2 * column + 1 - width), y = scale * (float)(height - 1 - 2 * row);
+        float direction_x = camera->forward.x + x * camera->right.x + y * camera->up.x;
+        float direction_y = camera->forward.y + x * camera->right.y + y * camera->up.y;
+        float direction_z = camera->forward.z + x * camera->right.z + y * camera->up.z;
+        float shorten =
+            1 / sqrtf(direction_x * direction_x + direction_y * direction_y + direction_z * direction_z);
+        rays->ray.org_x[i] = camera->eye.x;
+        rays->ray.org_y[i] = camera->eye.y;
+        rays->ray.org_z[i] = camera->eye.z;
+        rays->ray.dir_x[i] = shorten * direction_x;
+        rays->ray.dir_y[i] = shorten * direction_y;
+        rays->ray.dir_z[i] = shorten * direction_z;
+        rays->ray.tnear[i] = 0;
+        rays->ray.tfar[i] = far_away;
+        rays->ray.time[i] = 0;
+        rays->ray.mask[i] = ~0U;
+        rays->ray.flags[i] = 0;
+        rays->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        rays->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        valid[i] = column < width && row < height ? valid_lane : 0;
+    }
+}
+
+// Ends the rays where they meet a plane.
+static void planes_meet(const Description *scene, struct RTCRay16 *ray, int *plane_met)
+{
+    FOR_LANES plane_met[i] = NO_PLANE;
+    for (size_t k = 0; k < scene->plane_count; k++) {
+        Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
+        FOR_LANES
+        {
+            float height = normal.x * (point.x - ray->org_x[i]) + normal.y * (point.y - ray->org_y[i]) +
+                           normal.z * (point.z - ray->org_z[i]);
+            float along = normal.x * ray->dir_x[i] + normal.y * ray->dir_y[i] + normal.z * ray->dir_z[i];
+            float t = height / along;
+            bool nearer = t > 0 && t < ray->tfar[i];
+            ray->tfar[i] = nearer ? t : ray->tfar[i];
+            plane_met[i] = nearer ? (int)k : plane_met[i];
+        }
+    }
+}
+
+static void rays_intersect(const Renderer *renderer, const int *valid, struct RTCRayHit16 *rays)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = renderer->coherence;
+    if (!renderer->single) {
+        rtcIntersect16(valid, renderer->scene, &context, rays);
+        return;
+    }
+    for (int i = 0; i < LANES; i++) {
+        if (!valid[i]) continue;
+        struct RTCRayHit one = {
+            .ray = {.org_x = rays->ray.org_x[i],
+                    .org_y = rays->ray.org_y[i],
+                    .org_z = rays->ray.org_z[i],
+                    .dir_x = rays->ray.dir_x[i],
+                    .dir_y = rays->ray.dir_y[i],
+                    .dir_z = rays->ray.dir_z[i],
+                    .tfar = rays->ray.tfar[i],
+                    .mask = ~0U},
+            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .instID = {RTC_INVALID_GEOMETRY_ID}}};
+        rtcIntersect1(renderer->scene, &context, &one);
+        rays->ray.tfar[i] = one.ray.tfar;
+        rays->hit.geomID[i] = one.hit.geomID;
+        rays->hit.primID[i] = one.hit.primID;
+        rays->hit.u[i] = one.hit.u;
+        rays->hit.v[i] = one.hit.v;
+        rays->hit.Ng_x[i] = one.hit.Ng_x;
+        rays->hit.Ng_y[i] = one.hit.Ng_y;
+        rays->hit.Ng_z[i] = one.hit.Ng_z;
+    }
+}
+
+// Leaves the ends of those rays that meet something below 0.
+static void rays_occlude(const Renderer *renderer, const int *valid, struct RTCRay16 *rays)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = renderer->coherence;
+    if (!renderer->single) {
+        rtcOccluded16(valid, renderer->scene, &context, rays);
+        return;
+    }
+    for (int i = 0; i < LANES; i++) {
+        if (!valid[i]) continue;
+        struct RTCRay one = {.org_x = rays->org_x[i],
+                             .org_y = rays->org_y[i],
+                             .org_z = rays->org_z[i],
+                             .dir_x = rays->dir_x[i],
+                             .dir_y = rays->dir_y[i],
+                             .dir_z = rays->dir_z[i],
+                             .tfar = rays->tfar[i],
+                             .mask = ~0U};
+        rtcOccluded1(renderer->scene, &context, &one);
+        rays->tfar[i] = one.tfar;
+    }
+}
+
+// Normals of a mesh's vertices, blended where the rays meet it, in place of the triangles' own.
+static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit16 *hit, Vectors *normal)
+{
+    const float *normals = &mesh->normals[0].x;
+    const int *faces = mesh->faces[0];
+    FOR_LANES
+    {
+        if (hit->geomID[i] != geometry) continue;
+        int face = 3 * (int)hit->primID[i];
+        int a = 3 * faces[face], b = 3 * faces[face + 1], c = 3 * faces[face + 2];
+        float u = hit->u[i], v = hit->v[i], w = 1 - u - v;
+        normal->x[i] = w * normals[a] + u * normals[b] + v * normals[c];
+        normal->y[i] = w * normals[a + 1] + u * normals[b + 1] + v * normals[c + 1];
+        normal->z[i] = w * normals[a + 2] + u * normals[b + 2] + v * normals[c + 2];
+    }
+}
+
+static void normals_face(Vectors *normal, const int *flip)
+{
+    FOR_LANES
+    {
+        float x = normal->x[i], y = normal->y[i], z = normal->z[i];
+        float shorten = 1 / sqrtf(x * x + y * y + z * z);
+        shorten = flip[i] ? -shorten : shorten;
+        normal->x[i] = shorten * x;
+        normal->y[i] = shorten * y;
+        normal->z[i] = shorten * z;
+    }
+}
+
+// Sets materials to what the rays meet, geometric normals in `outward` to the planes', and tells which rays
+// meet something.
+static bool surfaces_find(const Renderer *renderer, const int *valid, const struct RTCRayHit16 *rays,
+                          Surfaces *surfaces, int *material, Vectors *outward)
+{
+    const Description *scene = renderer->description;
+    const struct RTCHit16 *hit = &rays->hit;
+    const int *sphere_materials = scene->sphere_materials;
+    const unsigned spheres = scene->sphere_count > 0 ? 0 : RTC_INVALID_GEOMETRY_ID - 1;
+    FOR_LANES
+    {
+        bool embree = hit->geomID[i] != RTC_INVALID_GEOMETRY_ID;
+        surfaces->plane[i] = embree ? NO_PLANE : surfaces->plane[i];
+        surfaces->found[i] = embree || surfaces->plane[i] != NO_PLANE ? valid[i] : 0;
+        outward->x[i] = hit->Ng_x[i];
+        outward->y[i] = hit->Ng_y[i];
+        outward->z[i] = hit->Ng_z[i];
+        material[i] = 0;
+        if (hit->geomID[i] == spheres) material[i] = sphere_materials[hit->primID[i]];
+    }
+    for (size_t k = 0; k < scene->mesh_count; k++) {
+        unsigned geometry = (unsigned)k + (scene->sphere_count > 0);
+        FOR_LANES material[i] = hit->geomID[i] == geometry ? scene->meshes[k].material : material[i];
+    }
+    for (size_t k = 0; k < scene->plane_count; k++) {
+        const Plane *plane = &scene->planes[k];
+        FOR_LANES
+        {
+            bool met = surfaces->plane[i] == (int)k;
+            material[i] = met ? plane->material : material[i];
+            outward->x[i] = met ? plane->normal.x : outward->x[i];
+            outward->y[i] = met ? plane->normal.y : outward->y[i];
+            outward->z[i] = met ? plane->normal.z : outward->z[i];
+        }
+    }
+    return lanes_any(surfaces->found);
+}
+
+static void surfaces_place(const Renderer *renderer, const struct RTCRayHit16 *rays, Surfaces *surfaces,
+                           Vectors *outward)
+{
+    const Description *scene = renderer->description;
+    const struct RTCRay16 *ray = &rays->ray;
+    alignas(64) int flip[LANES];
+    FOR_LANES flip[i] =
+        outward->x[i] * ray->dir_x[i] + outward->y[i] * ray->dir_y[i] + outward->z[i] * ray->dir_z[i] > 0;
+    surfaces->normal = *outward;
+    for (size_t k = 0; k < scene->mesh_count; k++)
+        mesh_smooth(&scene->meshes[k], (unsigned)k + (scene->sphere_count > 0), &rays->hit,
+                    &surfaces->normal);
+    normals_face(&surfaces->normal, flip);
+    normals_face(outward, flip);
+    const Vector eye = scene->camera.eye;
+    FOR_LANES
+    {
+        // Some roundings of a coordinate off the surface, so that it does not shade itself.
+        const float roundings = 0x1p-18F;
+        float t = ray->tfar[i];
+        float x = ray->org_x[i] + t * ray->dir_x[i], y = ray->org_y[i] + t * ray->dir_y[i],
+              z = ray->org_z[i] + t * ray->dir_z[i];
+        float off = roundings * fmaxf(t, fmaxf(fabsf(eye.x), fmaxf(fabsf(eye.y), fabsf(eye.z))));
+        surfaces->position.x[i] = x;
+        surfaces->position.y[i] = y;
+        surfaces->position.z[i] = z;
+        surfaces->start.x[i] = x + off * outward->x[i];
+        surfaces->start.y[i] = y + off * outward->y[i];
+        surfaces->start.z[i] = z + off * outward->z[i];
+        surfaces->to_eye.x[i] = -ray->dir_x[i];
+        surfaces->to_eye.y[i] = -ray->dir_y[i];
+        surfaces->to_eye.z[i] = -ray->dir_z[i];
+    }
+}
+
+static void surfaces_color(const Description *scene, const int *material, Surfaces *surfaces)
+{
+    const float *table = &scene->materials[0].ambient.x;
+    const int stride = sizeof(Material) / sizeof(float);
+    FOR_LANES
+    {
+        int entry = stride * material[i];
+        surfaces->color.x[i] = surfaces->found[i] ? table[entry + 0] : scene->background.x;
+        surfaces->color.y[i] = surfaces->found[i] ? table[entry + 1] : scene->background.y;
+        surfaces->color.z[i] = surfaces->found[i] ? table[entry + 2] : scene->background.z;
+        surfaces->diffuse.x[i] = table[entry + 3];
+        surfaces->diffuse.y[i] = table[entry + 4];
+        surfaces->diffuse.z[i] = table[entry + 5];
+        surfaces->specular[i] = table[entry + 6];
+        surfaces->shininess[i] = table[entry + 7];
+    }
+}
+
+// Takes the lanes out of `lit` between whose surface and the light a plane stands.
+static void planes_occlude(const Description *scene, const Surfaces *surfaces, Vector light, int *lit)
+{
+    for (size_t k = 0; k < scene->plane_count; k++) {
+        Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
+        float light_height =
+            normal.x * (light.x - point.x) + normal.y * (light.y - point.y) + normal.z * (light.z - point.z);
+        FOR_LANES
+        {
+            float height = normal.x * (surfaces->start.x[i] - point.x) +
+                           normal.y * (surfaces->start.y[i] - point.y) +
+                           normal.z * (surfaces->start.z[i] - point.z);
+            bool between = surfaces->plane[i] != (int)k && height * light_height < 0;
+            lit[i] = between ? 0 : lit[i];
+        }
+    }
+}
+
+static void light_add(const Renderer *renderer, const Light *light, Surfaces *surfaces)
+{
+    const Vector place = light->position;
+    const Vectors *normal = &surfaces->normal, *to_eye = &surfaces->to_eye;
+    alignas(64) int lit[LANES];
+    alignas(64) float facing[LANES];
+    Vectors to_light;
+    FOR_LANES
+    {
+        float x = place.x - surfaces->position.x[i], y = place.y - surfaces->position.y[i],
+              z = place.z - surfaces->position.z[i];
+        float shorten = 1 / sqrtf(x * x + y * y + z * z);
+        to_light.x[i] = shorten * x;
+        to_light.y[i] = shorten * y;
+        to_light.z[i] = shorten * z;
+        facing[i] =
+            normal->x[i] * to_light.x[i] + normal->y[i] * to_light.y[i] + normal->z[i] * to_light.z[i];
+        lit[i] = facing[i] > 0 ? surfaces->found[i] : 0;
+    }
+    planes_occlude(renderer->description, surfaces, place, lit);
+    if (!lanes_any(lit)) return;
+
+    struct RTCRay16 shadow;
+    FOR_LANES
+    {
+        shadow.org_x[i] = surfaces->start.x[i];
+        shadow.org_y[i] = surfaces->start.y[i];
+        shadow.org_z[i] = surfaces->start.z[i];
+        shadow.dir_x[i] = place.x - surfaces->start.x[i];
+        shadow.dir_y[i] = place.y - surfaces->start.y[i];
+        shadow.dir_z[i] = place.z - surfaces->start.z[i];
+        shadow.tnear[i] = 0;
+        shadow.tfar[i] = 1;
+        shadow.time[i] = 0;
+        shadow.mask[i] = ~0U;
+        shadow.flags[i] = 0;
+    }
+    rays_occlude(renderer, lit, &shadow);
+
+    FOR_LANES lit[i] = shadow.tfar[i] < 0 ? 0 : lit[i];
+    alignas(64) int shiny[LANES];
+    alignas(64) float highlight[LANES];
+    FOR_LANES
+    {
+        highlight[i] = 0;
+        shiny[i] = surfaces->specular[i] > 0 ? lit[i] : 0;
+    }
+    if (lanes_any(shiny)) {
+        FOR_LANES
+        {
+            float twice = 2 * facing[i];
+            float cosine = (twice * normal->x[i] - to_light.x[i]) * to_eye->x[i] +
+                           (twice * normal->y[i] - to_light.y[i]) * to_eye->y[i] +
+                           (twice * normal->z[i] - to_light.z[i]) * to_eye->z[i];
+            highlight[i] = surfaces->specular[i] * powf(fmaxf(cosine, 1e-20F), surfaces->shininess[i]);
+        }
+    }
+    const Vector color = light->color;
+    FOR_LANES
+    {
+        float diffuse = lit[i] ? facing[i] : 0, specular = lit[i] ? highlight[i] : 0;
+        surfaces->color.x[i] += color.x * (diffuse * surfaces->diffuse.x[i] + specular);
+        surfaces->color.y[i] += color.y * (diffuse * surfaces->diffuse.y[i] + specular);
+        surfaces->color.z[i] += color.z * (diffuse * surfaces->diffuse.z[i] + specular);
+    }
+}
+
+static void film_store(const Renderer *renderer, unsigned left, unsigned top, const Vectors *color)
+{
+    for (unsigned i = 0; i < LANES; i++) {
+        unsigned x = left + i % PACKET_SIDE, y = top + i / PACKET_SIDE;
+        if (x >= renderer->width || y >= renderer->height) continue;
+        float *pixel = renderer->film + 3 * ((size_t)y * renderer->width + x);
+        pixel[0] = color->x[i];
+        pixel[1] = color->y[i];
+        pixel[2] = color->z[i];
+    }
+}
+
+void packet_render(const Renderer *renderer, unsigned x, unsigned y)
+{
+    const Description *scene = renderer->description;
+    struct RTCRayHit16 rays;
+    alignas(64) int valid[LANES];
+    camera_rays(renderer, x, y, &rays, valid);
+    Surfaces surfaces;
+    planes_meet(scene, &rays.ray, surfaces.plane);
+    rays_intersect(renderer, valid, &rays);
+
+    alignas(64) int material[LANES];
+    Vectors outward;
+    bool any = surfaces_find(renderer, valid, &rays, &surfaces, material, &outward);
+    surfaces_color(scene, material, &surfaces);
+    if (any) {
+        surfaces_place(renderer, &rays, &surfaces, &outward);
+        for (size_t i = 0; i < scene->light_count; i++)
+            light_add(renderer, &scene->lights[i], &surfaces);
+    }
+    film_store(renderer, x, y, &surfaces.color);
+}

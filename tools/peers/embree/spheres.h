@@ -1,0 +1,11 @@
+// Spheres in Embree, in one of two ways: its own geometry for them, which tests several spheres against one
+// ray, or a user geometry whose callbacks test one sphere against the 16 rays of a packet.
+#pragma once
+
+#include "description.h"
+#include <embree3/rtcore.h>
+
+RTCGeometry spheres_embree(RTCDevice device, Sphere *spheres, size_t count);
+
+// For packets of 16 alone. `spheres` must outlive the geometry.
+RTCGeometry spheres_user(RTCDevice device, Sphere *spheres, size_t count);
