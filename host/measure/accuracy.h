@@ -9,20 +9,32 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// What was rendered: a value, or 3 or light_count of them, for each pixel, rows from the top. Whatever
-// precision it was computed in, numbers are kept as doubles, which change none. All but the colors may be
-// NULL: not to be had.
+// What was rendered: a value, or 3 or light_count of them, for each pixel, rows from the top. Numbers are
+// doubles whatever precision they were computed in, which changes none of them.
 typedef struct {
     uint32_t width, height, light_count;
     bool wide; // computed in double; else its t is counted in ulps of float
     double *colors;
-    double *t, *normal;               // at the pixel's center; infinity and 0 where nothing was hit
-    uint32_t *object, *shadow, *path; // UINT32_MAX where nothing was hit; a bit for each light; a hash
+    // of the ray through the pixel's center; NULL: not to be had
+    double *t, *normal; // infinity and 0 where nothing was hit
+    uint32_t *object;   // UINT32_MAX where nothing was hit
+    uint32_t *shadow;   // for each light, 1 where it does not reach what was hit
+    uint32_t *path;     // the signature of what the ray met
 } AccuracyLayers;
 
 void accuracy_layers_free(AccuracyLayers *layers); // and zeroes
 
-// The plotted figures, one of each kind of error.
+// Where a rounding decides what a pixel shows: the pixels whose value differs from one of their 4 neighbors',
+// and those around them. NULL where the layers lack the values.
+typedef struct {
+    bool *silhouette, *shadow, *path;                           // shadow: for each light, as in the layers
+    size_t silhouette_pixels, *shadow_edge_pixels, path_pixels; // shadow: for each light
+} AccuracyEdges;
+
+void accuracy_edges_find(AccuracyEdges *edges, const AccuracyLayers *reference);
+void accuracy_edges_free(AccuracyEdges *edges); // and zeroes
+
+// The kinds of error, each with one figure that is plotted.
 typedef enum {
     ACCURACY_OBJECT,  // pixels that show another object
     ACCURACY_SHADOW,  // shadow bits that differ, of all lights
@@ -36,84 +48,104 @@ typedef enum {
 } AccuracyKind;
 extern const char *const accuracy_kind_names[ACCURACY_KIND_COUNT]; // "object", …, as in the JSON
 
-// Counts of what differs within the reference's edges, and away from them; `why_not`: there are none.
+// What differs at the reference's edges, and away from them.
 typedef struct {
     size_t edge, away;
-    const char *why_not; // NULL: counted
 } EdgeCount;
 
 typedef struct {
-    size_t count; // compared
     double largest, percentile_999;
-    const char *why_not;
 } Extent;
 
-// Where an error of a kind is largest. Of counted kinds: of the wrong ones away from edges, or else at them,
-// the one with the largest difference of color.
+// Where an error of a kind is largest. Of the kinds that are counted: among the wrong ones away from edges,
+// or else those at edges, the one with the largest difference of color.
 typedef struct {
-    bool found; // false: no error of the kind, or not to be had
-    bool away;  // counted kinds: away from the reference's edges
+    bool found; // false: there is no error of the kind, or it cannot be had
+    bool away;  // of counted kinds: away from the reference's edges
     uint32_t x, y;
     uint32_t light; // shadow: the first that is wrong there
-    double error;   // shading, image: of a channel; t: relative; normal: radians; else of the color
-    double reference, variant; // object: ids, shadow: bits, path: hashes, t; shading, image: that channel
+    // shading, image: of a channel; t: relative; normal: radians; counted kinds: of the color
+    double error;
+    // object: ids, shadow: bits, path: signatures, t: distances, shading, image: that channel; normal: none
+    double reference, variant;
     double reference_color[3], variant_color[3];
 } AccuracyWorst;
 
 typedef struct {
-    size_t nonfinite, negative; // pixels of the variant
-    EdgeCount object, shadow, path;
-    ErrorSummary shading; // where object, shadows and path are the reference's, and a surface was hit
+    const char
+        *why_colors_only; // why there is nothing but nonfinite, negative, image and display; NULL: there is
+    size_t nonfinite, negative;     // pixels
+    EdgeCount object, shadow, path; // shadow, path: where the object is the reference's
+    // where object, shadows and path are the reference's, and a surface was hit
     size_t shading_pixels;
-    const char *shading_why_not;
-    Extent t_relative, t_ulps, normal;  // where the object is the reference's
-    ErrorSummary image;                 // of every pixel
-    ImageMetrics display;               // as shown, with 8 bits: srgb_psnr, off_by_…, flip_…
-    AccuracyWorst worst[ACCURACY_FLIP]; // of each kind but FLIP
+    ErrorSummary shading;
+    // where the object is the reference's, and is one
+    size_t surface_pixels;
+    Extent t_relative, t_ulps, normal;
+    ErrorSummary image;                       // of every pixel
+    ImageMetrics display;                     // as 8 bits and eyes see it: srgb_psnr, off_by_…, flip_…
+    AccuracyWorst worst[ACCURACY_KIND_COUNT]; // none of FLIP
 } AccuracyErrors;
+
+// `variant` and `reference` are of one size, and of one number of lights. `display_values`: colors are for a
+// screen as they are, without the sRGB curve.
+void accuracy_compare(AccuracyErrors *errors, const AccuracyLayers *reference, const AccuracyEdges *edges,
+                      const AccuracyLayers *variant, bool display_values);
+// Pixels with a channel that is not finite, and with one below 0.
+void accuracy_count_unsound(const AccuracyLayers *layers, size_t *nonfinite, size_t *negative);
 
 typedef enum {
     ACCURACY_MEASURED,
-    ACCURACY_REFERENCE,   // it is what the others are held against: times, but no errors
-    ACCURACY_UNAVAILABLE, // row.failure tells why
+    ACCURACY_REFERENCE,   // it is what the others are held to: times, but no errors
+    ACCURACY_UNAVAILABLE, // row->failure tells why
+    ACCURACY_STATUS_COUNT
 } AccuracyStatus;
-extern const char *const accuracy_status_names[3];
+extern const char *const accuracy_status_names[ACCURACY_STATUS_COUNT];
 
 enum { CROSSED_NONFINITE = 1, CROSSED_NEGATIVE = 2, CROSSED_OBJECT = 4, CROSSED_SHADOW = 8 };
 
 typedef struct {
-    BenchRow row; // precision, lanes, bvh; times, rays, kernel's hash
+    const BenchRow *row; // precision, lanes, bvh; times, rays, the kernel's hash
     uint32_t samples;
     AccuracyStatus status;
     AccuracyErrors errors;
+    float *picture;       // linear, 3 per pixel; NULL where unavailable
     unsigned crossed_out; // set of CROSSED_…: why its speed does not count
-    unsigned pareto;      // set of 1 << AccuracyKind: no other has as small an error in less time
-    float *picture;       // linear, 3 per pixel; NULL where unavailable; the reference's, too
+    unsigned pareto;      // set of 1 << AccuracyKind: no other is as good in less time
 } AccuracyVariant;
 
-// An error that a user allows, and what meets it.
+// An error that a user allows, and the fastest that keeps within it.
 enum { BUDGET_COUNT = 3 };
-extern const double accuracy_budgets[BUDGET_COUNT]; // 1e-2, 1e-4, 1e-6
+extern const double accuracy_budgets[BUDGET_COUNT];
 
 typedef struct {
-    AccuracyKind measure; // shading, or image where that is all that there is
+    AccuracyKind measure; // shading, or image where there are colors only
     size_t variant;       // SIZE_MAX: none
 } AccuracyPick;
 
 typedef struct {
     const char *path;
     uint32_t width, height, light_count, bounce_count;
-    const char *reference_file; // NULL: it was rendered
-    const char *reference_precision, *reference_bvh;
-    uint32_t reference_lanes, reference_samples;
-    uint64_t reference_kernel_hash;
-    size_t reference_nonfinite, reference_negative; // pixels
-    float *reference_picture;                       // linear, 3 per pixel
-    bool display_values;                            // the scene's colors are display values already
-    // pixels of the reference's edges, widened by one; why_not: a file has none
-    size_t silhouette_pixels, *shadow_edge_pixels, path_edge_pixels; // shadow: of each light
-    const char *edges_why_not;
+    bool display_values;
+    struct {
+        const char *file; // NULL: it was rendered as the next say
+        const char *precision, *bvh;
+        uint32_t lanes, samples;
+        uint64_t kernel_hash;
+        size_t nonfinite, negative; // pixels
+        float *picture;             // linear, 3 per pixel
+    } reference;
+    AccuracyEdges edges;
     AccuracyVariant *variants;
     size_t variant_count;
     AccuracyPick picks[BUDGET_COUNT];
 } AccuracyScene;
+
+void accuracy_scene_free(AccuracyScene *scene); // with its pictures; and zeroes
+
+// The plotted figure of a kind, or why there is none.
+Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);
+// From its errors, what crosses a variant out.
+unsigned accuracy_faults(const AccuracyErrors *errors);
+// From errors and times: sets each variant's crossed_out and pareto, and the picks.
+void accuracy_judge(AccuracyScene *scene);

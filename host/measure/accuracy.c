@@ -1,0 +1,316 @@
+#include "host/measure/accuracy.h"
+
+#include "host/base/fault.h"
+#include "host/measure/percentile.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+static size_t pixel_count(const AccuracyLayers *layers)
+{
+    return (size_t)layers->width * layers->height;
+}
+
+void accuracy_layers_free(AccuracyLayers *layers)
+{
+    free(layers->colors);
+    free(layers->t);
+    free(layers->normal);
+    free(layers->object);
+    free(layers->shadow);
+    free(layers->path);
+    *layers = (AccuracyLayers){0};
+}
+
+// A map of what each pixel has `stride` values of.
+typedef struct {
+    const uint32_t *values;
+    uint32_t width, height, stride, offset;
+} ValueMap;
+
+static uint32_t map_at(const ValueMap *map, size_t x, size_t y)
+{
+    return map->values[(y * map->width + x) * map->stride + map->offset];
+}
+
+static bool differs_from_neighbor(const ValueMap *map, size_t x, size_t y)
+{
+    uint32_t value = map_at(map, x, y);
+    return (x > 0 && map_at(map, x - 1, y) != value) ||
+           (x + 1 < map->width && map_at(map, x + 1, y) != value) ||
+           (y > 0 && map_at(map, x, y - 1) != value) ||
+           (y + 1 < map->height && map_at(map, x, y + 1) != value);
+}
+
+// Marks the map's edges in `edges`, laid out as the map is; returns how many pixels they have.
+static size_t edges_mark(const ValueMap *map, bool *edges)
+{
+    size_t count = 0;
+    for (size_t y = 0; y < map->height; y++)
+        for (size_t x = 0; x < map->width; x++) {
+            if (!differs_from_neighbor(map, x, y)) continue;
+            // the pixel and those around it
+            for (size_t v = y > 0 ? y - 1 : 0; v <= y + 1 && v < map->height; v++)
+                for (size_t u = x > 0 ? x - 1 : 0; u <= x + 1 && u < map->width; u++) {
+                    bool *edge = &edges[(v * map->width + u) * map->stride + map->offset];
+                    count += !*edge;
+                    *edge = true;
+                }
+        }
+    return count;
+}
+
+void accuracy_edges_find(AccuracyEdges *edges, const AccuracyLayers *reference)
+{
+    *edges = (AccuracyEdges){0};
+    const size_t pixels = pixel_count(reference);
+    ValueMap map = {reference->object, reference->width, reference->height, 1, 0};
+    if (reference->object) {
+        edges->silhouette = memory_allocate_zeroed(pixels, sizeof(bool));
+        edges->silhouette_pixels = edges_mark(&map, edges->silhouette);
+    }
+    if (reference->path) {
+        edges->path = memory_allocate_zeroed(pixels, sizeof(bool));
+        map.values = reference->path;
+        edges->path_pixels = edges_mark(&map, edges->path);
+    }
+    if (reference->shadow) {
+        const uint32_t lights = reference->light_count;
+        edges->shadow = memory_allocate_zeroed(pixels * lights + 1, sizeof(bool));
+        edges->shadow_edge_pixels = memory_allocate_zeroed(lights + 1, sizeof(size_t));
+        map = (ValueMap){reference->shadow, reference->width, reference->height, lights, 0};
+        for (; map.offset < lights; map.offset++)
+            edges->shadow_edge_pixels[map.offset] = edges_mark(&map, edges->shadow);
+    }
+}
+
+void accuracy_edges_free(AccuracyEdges *edges)
+{
+    free(edges->silhouette);
+    free(edges->shadow);
+    free(edges->path);
+    free(edges->shadow_edge_pixels);
+    *edges = (AccuracyEdges){0};
+}
+
+void accuracy_count_unsound(const AccuracyLayers *layers, size_t *nonfinite, size_t *negative)
+{
+    *nonfinite = *negative = 0;
+    for (size_t i = 0; i < pixel_count(layers); i++) {
+        const double *color = layers->colors + 3 * i;
+        *nonfinite += !isfinite(color[0]) || !isfinite(color[1]) || !isfinite(color[2]);
+        *negative += color[0] < 0 || color[1] < 0 || color[2] < 0;
+    }
+}
+
+typedef struct {
+    const AccuracyLayers *reference, *variant;
+    const AccuracyEdges *edges;
+    AccuracyErrors *errors;
+    // pixels that are compared further
+    double *expected, *found; // colors of shaded ones
+    float *t_relative, *t_ulps, *normal;
+} Comparison;
+
+static double value_error(double reference, double variant)
+{
+    if (isfinite(reference) && isfinite(variant)) return fabs(variant - reference);
+    return isfinite(reference) || isfinite(variant) ? INFINITY : 0;
+}
+
+// The channel in which a pixel's colors differ most.
+static size_t worst_channel(const Comparison *comparison, size_t pixel)
+{
+    const double *reference = comparison->reference->colors + 3 * pixel;
+    const double *variant = comparison->variant->colors + 3 * pixel;
+    size_t worst = 0;
+    for (size_t i = 1; i < 3; i++)
+        if (value_error(reference[i], variant[i]) > value_error(reference[worst], variant[worst])) worst = i;
+    return worst;
+}
+
+static double color_error(const Comparison *comparison, size_t pixel)
+{
+    size_t value = 3 * pixel + worst_channel(comparison, pixel);
+    return value_error(comparison->reference->colors[value], comparison->variant->colors[value]);
+}
+
+// Keeps the error if it is the worst of its kind so far; one away from edges is worse than any at them.
+static void worst_offer(const Comparison *comparison, AccuracyKind kind, size_t pixel,
+                        const AccuracyWorst *offered)
+{
+    AccuracyWorst *worst = &comparison->errors->worst[kind];
+    if (worst->found &&
+        (worst->away > offered->away || (worst->away == offered->away && !(offered->error > worst->error))))
+        return;
+    *worst = *offered;
+    worst->found = true;
+    worst->x = (uint32_t)(pixel % comparison->reference->width);
+    worst->y = (uint32_t)(pixel / comparison->reference->width);
+    for (size_t i = 0; i < 3; i++) {
+        worst->reference_color[i] = comparison->reference->colors[3 * pixel + i];
+        worst->variant_color[i] = comparison->variant->colors[3 * pixel + i];
+    }
+}
+
+static void count_wrong(const Comparison *comparison, AccuracyKind kind, EdgeCount *count, size_t pixel,
+                        bool edge, const uint32_t values[2], uint32_t light)
+{
+    if (edge)
+        count->edge++;
+    else
+        count->away++;
+    worst_offer(comparison, kind, pixel,
+                &(AccuracyWorst){.away = !edge,
+                                 .light = light,
+                                 .error = color_error(comparison, pixel),
+                                 .reference = values[0],
+                                 .variant = values[1]});
+}
+
+// Returns whether every light's bit is the reference's.
+static bool shadows_compare(const Comparison *comparison, size_t pixel)
+{
+    const uint32_t lights = comparison->reference->light_count;
+    bool equal = true;
+    for (uint32_t light = 0; light < lights; light++) {
+        const size_t bit = pixel * lights + light;
+        const uint32_t values[2] = {comparison->reference->shadow[bit], comparison->variant->shadow[bit]};
+        if (values[0] == values[1]) continue;
+        equal = false;
+        count_wrong(comparison, ACCURACY_SHADOW, &comparison->errors->shadow, pixel,
+                    comparison->edges->shadow[bit], values, light);
+    }
+    return equal;
+}
+
+static bool path_compare(const Comparison *comparison, size_t pixel)
+{
+    const uint32_t values[2] = {comparison->reference->path[pixel], comparison->variant->path[pixel]};
+    if (values[0] == values[1]) return true;
+    count_wrong(comparison, ACCURACY_PATH, &comparison->errors->path, pixel, comparison->edges->path[pixel],
+                values, 0);
+    return false;
+}
+
+// The gap between the numbers of a precision around a positive value.
+static double unit_in_last_place(double value, bool wide)
+{
+    int exponent;
+    frexp(value, &exponent);
+    return ldexp(1, exponent - (wide ? DBL_MANT_DIG : FLT_MANT_DIG));
+}
+
+// The angle between two vectors of about unit length, also where it is small or near pi.
+static double vector_angle(const double a[3], const double b[3])
+{
+    double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    double sine = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+    double angle = atan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+    return isfinite(angle) ? angle : INFINITY;
+}
+
+static void surface_compare(const Comparison *comparison, size_t pixel)
+{
+    AccuracyErrors *errors = comparison->errors;
+    const size_t place = errors->surface_pixels++;
+    const double expected = comparison->reference->t[pixel], found = comparison->variant->t[pixel];
+    const double difference = value_error(expected, found), relative = difference / fabs(expected);
+    const double ulps = difference / unit_in_last_place(expected, comparison->variant->wide);
+    const double angle =
+        vector_angle(comparison->reference->normal + 3 * pixel, comparison->variant->normal + 3 * pixel);
+    comparison->t_relative[place] = (float)relative;
+    comparison->t_ulps[place] = (float)ulps;
+    comparison->normal[place] = (float)angle;
+    errors->t_relative.largest = fmax(errors->t_relative.largest, relative);
+    errors->t_ulps.largest = fmax(errors->t_ulps.largest, ulps);
+    errors->normal.largest = fmax(errors->normal.largest, angle);
+    if (relative > 0)
+        worst_offer(comparison, ACCURACY_T, pixel,
+                    &(AccuracyWorst){.error = relative, .reference = expected, .variant = found});
+    if (angle > 0) worst_offer(comparison, ACCURACY_NORMAL, pixel, &(AccuracyWorst){.error = angle});
+}
+
+static void color_offer(const Comparison *comparison, AccuracyKind kind, size_t pixel)
+{
+    const size_t value = 3 * pixel + worst_channel(comparison, pixel);
+    AccuracyWorst offered = {.error = color_error(comparison, pixel),
+                             .reference = comparison->reference->colors[value],
+                             .variant = comparison->variant->colors[value]};
+    if (offered.error > 0) worst_offer(comparison, kind, pixel, &offered);
+}
+
+static void pixel_compare(const Comparison *comparison, size_t pixel)
+{
+    AccuracyErrors *errors = comparison->errors;
+    color_offer(comparison, ACCURACY_IMAGE, pixel);
+    if (errors->why_colors_only) return;
+    const uint32_t objects[2] = {comparison->reference->object[pixel], comparison->variant->object[pixel]};
+    if (objects[0] != objects[1]) {
+        count_wrong(comparison, ACCURACY_OBJECT, &errors->object, pixel, comparison->edges->silhouette[pixel],
+                    objects, 0);
+        return;
+    }
+    bool same_shadows = shadows_compare(comparison, pixel), same_path = path_compare(comparison, pixel);
+    if (objects[0] == UINT32_MAX) return;
+    surface_compare(comparison, pixel);
+    if (!same_shadows || !same_path) return;
+    for (size_t i = 0; i < 3; i++) {
+        comparison->expected[3 * errors->shading_pixels + i] = comparison->reference->colors[3 * pixel + i];
+        comparison->found[3 * errors->shading_pixels + i] = comparison->variant->colors[3 * pixel + i];
+    }
+    errors->shading_pixels++;
+    color_offer(comparison, ACCURACY_SHADING, pixel);
+}
+
+static ImageMetrics display_compare(const AccuracyLayers *reference, const AccuracyLayers *variant,
+                                    bool display_values)
+{
+    const size_t count = 3 * pixel_count(reference);
+    Image images[2];
+    for (size_t i = 0; i < 2; i++) {
+        const double *colors = i == 0 ? reference->colors : variant->colors;
+        images[i] = (Image){
+            .width = reference->width, .height = reference->height, .channels = 3, .display = display_values};
+        images[i].values = memory_allocate(count, sizeof(float));
+        for (size_t k = 0; k < count; k++)
+            images[i].values[k] = (float)colors[k];
+    }
+    ImageMetrics metrics = image_metrics(&images[0], &images[1]);
+    image_free(&images[0]);
+    image_free(&images[1]);
+    return metrics;
+}
+
+void accuracy_compare(AccuracyErrors *errors, const AccuracyLayers *reference, const AccuracyEdges *edges,
+                      const AccuracyLayers *variant, bool display_values)
+{
+    *errors = (AccuracyErrors){0};
+    if (!reference->object) errors->why_colors_only = "the reference has colors only";
+    accuracy_count_unsound(variant, &errors->nonfinite, &errors->negative);
+    const size_t pixels = pixel_count(reference);
+    Comparison comparison = {
+        .reference = reference,
+        .variant = variant,
+        .edges = edges,
+        .errors = errors,
+        .expected = memory_allocate(pixels, 3 * sizeof(double)),
+        .found = memory_allocate(pixels, 3 * sizeof(double)),
+        .t_relative = memory_allocate(pixels, sizeof(float)),
+        .t_ulps = memory_allocate(pixels, sizeof(float)),
+        .normal = memory_allocate(pixels, sizeof(float)),
+    };
+    for (size_t pixel = 0; pixel < pixels; pixel++)
+        pixel_compare(&comparison, pixel);
+    errors->shading = error_summarize(comparison.expected, comparison.found, 3 * errors->shading_pixels);
+    errors->t_relative.percentile_999 = percentile_999(comparison.t_relative, errors->surface_pixels);
+    errors->t_ulps.percentile_999 = percentile_999(comparison.t_ulps, errors->surface_pixels);
+    errors->normal.percentile_999 = percentile_999(comparison.normal, errors->surface_pixels);
+    errors->image = error_summarize(reference->colors, variant->colors, 3 * pixels);
+    errors->display = display_compare(reference, variant, display_values);
+    free(comparison.expected);
+    free(comparison.found);
+    free(comparison.t_relative);
+    free(comparison.t_ulps);
+    free(comparison.normal);
+}

@@ -1,0 +1,128 @@
+// What follows from the variants' errors and times together.
+#include "host/base/fault.h"
+#include "host/measure/accuracy.h"
+#include <stdlib.h>
+
+const char *const accuracy_kind_names[ACCURACY_KIND_COUNT] = {"object", "shadow", "path",  "shading",
+                                                              "t",      "normal", "image", "flip"};
+
+const char *const accuracy_status_names[ACCURACY_STATUS_COUNT] = {"measured", "reference", "unavailable"};
+
+const double accuracy_budgets[BUDGET_COUNT] = {1e-2, 1e-4, 1e-6};
+
+void accuracy_scene_free(AccuracyScene *scene)
+{
+    for (size_t i = 0; i < scene->variant_count; i++)
+        free(scene->variants[i].picture);
+    free(scene->variants);
+    free(scene->reference.picture);
+    accuracy_edges_free(&scene->edges);
+    *scene = (AccuracyScene){0};
+}
+
+static double sum_of(EdgeCount count)
+{
+    return (double)count.edge + (double)count.away;
+}
+
+Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind)
+{
+    const AccuracyErrors *errors = &variant->errors;
+    if (variant->status == ACCURACY_REFERENCE)
+        return (Figure){.why_not = "it is the reference, which the others are held to"};
+    if (variant->status == ACCURACY_UNAVAILABLE) return (Figure){.why_not = variant->row->failure};
+    if (errors->why_colors_only && kind != ACCURACY_IMAGE && kind != ACCURACY_FLIP)
+        return (Figure){.why_not = errors->why_colors_only};
+    switch (kind) {
+    case ACCURACY_OBJECT:
+        return (Figure){.value = sum_of(errors->object)};
+    case ACCURACY_SHADOW:
+        return (Figure){.value = sum_of(errors->shadow)};
+    case ACCURACY_PATH:
+        return (Figure){.value = sum_of(errors->path)};
+    case ACCURACY_SHADING:
+        return (Figure){errors->shading.rmse, errors->shading_pixels > 0 ? NULL : "no pixel shows the same"};
+    case ACCURACY_T:
+        return (Figure){errors->t_relative.percentile_999,
+                        errors->surface_pixels > 0 ? NULL : "no pixel shows the same object"};
+    case ACCURACY_NORMAL:
+        return (Figure){errors->normal.percentile_999,
+                        errors->surface_pixels > 0 ? NULL : "no pixel shows the same object"};
+    case ACCURACY_IMAGE:
+        return (Figure){errors->image.rmse, errors->image.count > 0 ? NULL : "no value is finite"};
+    default:
+        return (Figure){.value = errors->display.flip_mean};
+    }
+}
+
+unsigned accuracy_faults(const AccuracyErrors *errors)
+{
+    return (errors->nonfinite > 0 ? CROSSED_NONFINITE : 0u) | (errors->negative > 0 ? CROSSED_NEGATIVE : 0u) |
+           (errors->object.away > 0 ? CROSSED_OBJECT : 0u) | (errors->shadow.away > 0 ? CROSSED_SHADOW : 0u);
+}
+
+static bool competes(const AccuracyVariant *variant)
+{
+    return variant->status == ACCURACY_REFERENCE ||
+           (variant->status == ACCURACY_MEASURED && variant->crossed_out == 0);
+}
+
+static double frame_median(const AccuracyVariant *variant)
+{
+    return series_summarize(&variant->row->times.frame).median;
+}
+
+// Whether a is at least as good as b and better in something. The reference has no error to compare: none is
+// better.
+static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, AccuracyKind kind)
+{
+    Figure error_a = accuracy_figure(a, kind), error_b = accuracy_figure(b, kind);
+    double time_a = frame_median(a), time_b = frame_median(b);
+    if (a->status == ACCURACY_REFERENCE) return time_a < time_b;
+    if (error_a.why_not || error_a.value > error_b.value || time_a > time_b) return false;
+    return error_a.value < error_b.value || time_a < time_b;
+}
+
+static bool on_front(const AccuracyScene *scene, const AccuracyVariant *variant, AccuracyKind kind)
+{
+    if (variant->status != ACCURACY_MEASURED || variant->crossed_out) return false;
+    if (accuracy_figure(variant, kind).why_not) return false;
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        const AccuracyVariant *other = &scene->variants[i];
+        if (other != variant && competes(other) && dominates(other, variant, kind)) return false;
+    }
+    return true;
+}
+
+static AccuracyPick pick_find(const AccuracyScene *scene, double budget, AccuracyKind measure)
+{
+    AccuracyPick pick = {measure, SIZE_MAX};
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        const AccuracyVariant *variant = &scene->variants[i];
+        if (!competes(variant)) continue;
+        if (variant->status == ACCURACY_MEASURED) {
+            Figure error = accuracy_figure(variant, measure);
+            if (error.why_not || !(error.value <= budget)) continue;
+        }
+        if (pick.variant == SIZE_MAX || frame_median(variant) < frame_median(&scene->variants[pick.variant]))
+            pick.variant = i;
+    }
+    return pick;
+}
+
+void accuracy_judge(AccuracyScene *scene)
+{
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        AccuracyVariant *variant = &scene->variants[i];
+        variant->crossed_out = variant->status == ACCURACY_MEASURED ? accuracy_faults(&variant->errors) : 0;
+    }
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        AccuracyVariant *variant = &scene->variants[i];
+        variant->pareto = 0;
+        for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
+            if (on_front(scene, variant, (AccuracyKind)kind)) variant->pareto |= 1u << kind;
+    }
+    AccuracyKind measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
+    for (size_t i = 0; i < BUDGET_COUNT; i++)
+        scene->picks[i] = pick_find(scene, accuracy_budgets[i], measure);
+}
