@@ -7,8 +7,10 @@
 #include "host/cli/options.h"
 #include "host/render/camera_basis.h"
 #include <getopt.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { OPTION_JSON = OPTION_OWN };
@@ -25,8 +27,9 @@ static const struct option long_options[] = {
 };
 
 static const char help_text[] =
-    "usage: glint verify [OPTIONS]\n\n"
-    "Runs the hard cases on a device and holds each to its bound; exit status 3 if any fails.\n\n"
+    "usage: glint verify [CASE...] [OPTIONS]\n\n"
+    "Runs the hard cases, or those named, on a device and holds each to its bound; exit status 3 if any "
+    "fails.\n\n"
     "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
     "else a "
     "CPU)\n"
@@ -38,6 +41,7 @@ static const char help_text[] =
 typedef struct {
     CommonOptions common;
     bool every_precision, json;
+    VerifyChoice cases; // none named: all
 } VerifyOptions;
 
 // The renderer as the cases see it.
@@ -45,17 +49,21 @@ typedef struct {
     Compute *compute;
     const VerifyOptions *options;
     Precision precision;
+    uint64_t trace_kernel, render_kernel; // the last ones' hashes
 } Prober;
 
 // With every feature built in, so that one program serves all scenes.
-static void *prober_open(void *context, const Scene *scene, bool hierarchy)
+static Renderer *scene_open_renderer(const Prober *prober, const Scene *scene, bool hierarchy, uint32_t width,
+                                     uint32_t height)
 {
-    const Prober *prober = context;
+    bool picture = width > 0;
     RenderSettings settings = {
-        .width = 1,
-        .height = 1,
-        .region_width = 1,
-        .region_height = 1,
+        .width = picture ? width : 1,
+        .height = picture ? height : 1,
+        .region_width = picture ? width : 1,
+        .region_height = picture ? height : 1,
+        .bounce_count = picture ? 5 : 0,
+        .shift_to_eye = picture,
         .sample_count = 1,
         .precision = prober->precision,
         .lanes = prober->options->common.lanes,
@@ -72,14 +80,72 @@ static void *prober_open(void *context, const Scene *scene, bool hierarchy)
     return renderer;
 }
 
+typedef struct {
+    Prober *prober;
+    Renderer *renderer;
+} OpenScene;
+
+static void *prober_open(void *context, const Scene *scene, bool hierarchy)
+{
+    OpenScene *opened = memory_allocate(1, sizeof *opened);
+    *opened = (OpenScene){context, scene_open_renderer(context, scene, hierarchy, 0, 0)};
+    return opened;
+}
+
 static void prober_trace(void *opened, const ProbeRay *rays, size_t count, ProbeHit *hits)
 {
-    renderer_trace(opened, rays, count, hits);
+    const OpenScene *scene = opened;
+    renderer_trace(scene->renderer, rays, count, hits);
+    scene->prober->trace_kernel = renderer_report(scene->renderer)->kernel_hash;
 }
 
 static void prober_close(void *opened)
 {
-    renderer_close(opened);
+    OpenScene *scene = opened;
+    renderer_close(scene->renderer);
+    free(scene);
+}
+
+static void widen(double *target, const void *values, size_t count, bool wide)
+{
+    for (size_t i = 0; i < count; i++)
+        target[i] = wide ? ((const double *)values)[i] : (double)((const float *)values)[i];
+}
+
+typedef struct {
+    VerifyPicture *picture;
+    bool wide;
+} PictureSink;
+
+static bool picture_take_band(void *context, const Band *band, double fraction_done)
+{
+    (void)fraction_done;
+    const PictureSink *sink = context;
+    VerifyPicture *picture = sink->picture;
+    size_t first = (size_t)band->first_row * picture->width, count = (size_t)band->row_count * picture->width;
+    widen(picture->color + 3 * first, band->colors, 3 * count, sink->wide);
+    widen(picture->t + first, band->t, count, sink->wide);
+    widen(picture->normal + 3 * first, band->normal, 3 * count, sink->wide);
+    widen(picture->position + 3 * first, band->position, 3 * count, sink->wide);
+    widen(picture->ray + 3 * first, band->ray, 3 * count, sink->wide);
+    memcpy(picture->object + first, band->object, count * sizeof *picture->object);
+    memcpy(picture->path + first, band->path, count * sizeof *picture->path);
+    if (picture->light_count > 0)
+        memcpy(picture->shadow + first * picture->light_count, band->shadow,
+               count * picture->light_count * sizeof *picture->shadow);
+    return true;
+}
+
+static void prober_render(void *context, const Scene *scene, bool hierarchy, VerifyPicture *picture)
+{
+    Prober *prober = context;
+    Renderer *renderer = scene_open_renderer(prober, scene, hierarchy, picture->width, picture->height);
+    const RenderReport *report = renderer_report(renderer);
+    const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
+    PictureSink sink = {picture, report->wide};
+    if (!renderer_render(renderer, aovs, picture_take_band, &sink)) fault("a picture ended early");
+    prober->render_kernel = report->kernel_hash;
+    renderer_close(renderer);
 }
 
 static void prober_camera_axes(const Camera *camera, Vector3 axes[3])
@@ -107,9 +173,9 @@ static void result_tell(const VerifyResult *result, const Report *report)
 {
     printf("  %-3s %c  %-60s ", result->name, report->tier, result->title);
     if (result->bound > 0)
-        printf("%8.3g of %-8.3g ulp", result->worst, result->bound);
+        printf("%8.3g of %-8.3g %-4s", result->worst, result->bound, result->unit);
     else
-        printf("%24s", "");
+        printf("%20zu rays", result->ray_count);
     printf("  %s", verify_holds(result) ? "ok" : "FAIL");
     const struct {
         size_t count;
@@ -124,6 +190,13 @@ static void result_tell(const VerifyResult *result, const Report *report)
     fflush(stdout);
 }
 
+static void hash_add_json(Json *json, const char *key, uint64_t hash)
+{
+    char digits[17];
+    snprintf(digits, sizeof digits, "%016" PRIx64, hash);
+    json_text(json, key, digits);
+}
+
 static void result_add_json(Json *json, const VerifyResult *result)
 {
     json_begin_object(json, NULL);
@@ -135,8 +208,10 @@ static void result_add_json(Json *json, const VerifyResult *result)
     json_integer(json, "leaks", (int64_t)result->leaks);
     json_integer(json, "unsound", (int64_t)result->unsound);
     json_integer(json, "differing", (int64_t)result->differing);
-    json_number(json, "worst_ulp", result->bound > 0 ? result->worst : NAN);
-    json_number(json, "bound_ulp", result->bound > 0 ? result->bound : NAN);
+    json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
+    json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
+    if (result->bound > 0) json_text(json, "unit", result->unit);
+    hash_add_json(json, "hash", result->hash);
     json_end(json);
 }
 
@@ -157,8 +232,9 @@ static void result_take(void *context, const VerifyResult *result)
 static size_t precision_verify(Compute *compute, const VerifyOptions *options, Precision precision,
                                Json *json)
 {
-    Prober prober = {compute, options, precision};
-    const VerifyRenderer renderer = {&prober, prober_open, prober_trace, prober_close, prober_camera_axes};
+    Prober prober = {.compute = compute, .options = options, .precision = precision};
+    const VerifyRenderer renderer = {&prober,      prober_open,   prober_trace,
+                                     prober_close, prober_render, prober_camera_axes};
     // perturbed, a device is inexact: `single` cannot be held to its bounds, `strict` repairs what it does
     bool inexact = options->common.perturb_seed > 0 && precision == PRECISION_SINGLE;
     VerifyTier tier = inexact ? TIER_A : tier_of[precision];
@@ -173,17 +249,21 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
         printf("%s\n", name);
     }
     double start = clock_seconds();
-    verify_run(&renderer, tier, result_take, &report);
+    verify_run(&renderer, tier, options->cases.count > 0 ? &options->cases : NULL, result_take, &report);
     double seconds = clock_seconds() - start;
     if (json) {
         json_end(json);
+        hash_add_json(json, "trace_kernel", prober.trace_kernel);
+        hash_add_json(json, "render_kernel", prober.render_kernel);
         json_integer(json, "held", (int64_t)report.held);
         json_integer(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
         json_end(json);
     } else {
-        printf("  tier %c: %zu of %zu cases held, in %.1f s\n", report.tier, report.held,
-               report.held + report.failed, seconds);
+        printf("  tier %c: %zu of %zu cases held, in %.1f s; kernels: trace %016" PRIx64
+               ", render %016" PRIx64 "\n",
+               report.tier, report.held, report.held + report.failed, seconds, prober.trace_kernel,
+               prober.render_kernel);
     }
     return report.failed;
 }
@@ -236,7 +316,13 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
         else if (option_common(&options->common, option, optarg, &valid) && !valid)
             return EXIT_USER;
     }
-    if (optind < argument_count) return option_usage_fault("verify", "takes no scene; its cases are its own");
+    options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
+    for (size_t i = 0; i < options->cases.count; i++)
+        if (!verify_is_case(options->cases.names[i])) {
+            fprintf(stderr, "glint: verify: there is no case \"%s\"; docs/verify.md lists them\n",
+                    options->cases.names[i]);
+            return EXIT_USER;
+        }
     return EXIT_DONE;
 }
 

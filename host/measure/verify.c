@@ -5,10 +5,11 @@
 #include "host/measure/verify_run.h"
 #include "host/measure/verify_tables.h"
 #include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { CHECKS_LARGEST = 2, BATCH = 1 << 16 };
+enum { CHECKS_LARGEST = 3, BATCH = 1 << 16 };
 
 // Each has the tables of its name, and its own checks.
 static const struct {
@@ -88,6 +89,11 @@ static bool is_finite(const double vector[3])
     return isfinite(vector[0]) && isfinite(vector[1]) && isfinite(vector[2]);
 }
 
+static bool is_unit(const VerifyRun *run, const double v[3])
+{
+    return fabs(sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - 1) <= 4 * verify_roundoff(run);
+}
+
 static bool is_sound(const VerifyRun *run, const ProbeRay *ray, const ProbeHit *hit)
 {
     if (!verify_is_hit(hit)) return true;
@@ -95,26 +101,112 @@ static bool is_sound(const VerifyRun *run, const ProbeRay *ray, const ProbeHit *
     if (!is_finite(hit->normal) || !is_finite(hit->position)) return false;
     if (!is_finite(hit->mirrored_origin) || !is_finite(hit->mirrored_direction)) return false;
     if (!is_finite(hit->passed_origin) || !is_finite(hit->passed_direction)) return false;
-    if (run->tier == TIER_A) return true;
-    const double *n = hit->normal;
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    return fabs(length - 1) <= 4 * verify_roundoff(run);
+    return run->tier == TIER_A || is_unit(run, hit->normal);
 }
 
-static void count_unsound(VerifyRun *run, const ProbeRay *rays, const ProbeHit *hits, size_t count)
+// FNV-1a (Fowler, Noll, Vo) by words of 64 bits, with the upper half folded into the lower.
+static void hash_word(VerifyRun *run, uint64_t word)
+{
+    uint64_t hash = (run->result->hash ^ word) * 0x100000001b3u;
+    run->result->hash = hash ^ hash >> 32;
+}
+
+static void hash_numbers(VerifyRun *run, const double *numbers, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        uint64_t bits;
+        memcpy(&bits, &numbers[i], sizeof bits);
+        hash_word(run, bits);
+    }
+}
+
+static void hash_integers(VerifyRun *run, const uint32_t *integers, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        run->result->unsound += !is_sound(run, &rays[i], &hits[i]);
+        hash_word(run, integers[i]);
+}
+
+// Of a miss only `light` has a meaning.
+static void hash_hit(VerifyRun *run, const ProbeHit *hit)
+{
+    hash_word(run, hit->object);
+    hash_numbers(run, &hit->light, 1);
+    if (!verify_is_hit(hit)) return;
+    hash_numbers(run, &hit->t, 1);
+    hash_numbers(run, hit->normal, 3);
+    hash_numbers(run, hit->position, 3);
+    hash_numbers(run, hit->mirrored_origin, 3);
+    hash_numbers(run, hit->mirrored_direction, 3);
+    hash_numbers(run, hit->passed_origin, 3);
+    hash_numbers(run, hit->passed_direction, 3);
+    hash_numbers(run, &hit->passed, 1);
+}
+
+void verify_trace_opened(VerifyRun *run, void *opened, const ProbeRay *rays, size_t count, ProbeHit *hits)
+{
+    run->renderer->trace(opened, rays, count, hits);
     run->result->ray_count += count;
+    for (size_t i = 0; i < count; i++) {
+        run->result->unsound += !is_sound(run, &rays[i], &hits[i]);
+        hash_hit(run, &hits[i]);
+    }
 }
 
 void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const ProbeRay *rays, size_t count,
                   ProbeHit *hits)
 {
     void *opened = run->renderer->open(run->renderer->context, scene, hierarchy);
-    run->renderer->trace(opened, rays, count, hits);
+    verify_trace_opened(run, opened, rays, count, hits);
     run->renderer->close(opened);
-    count_unsound(run, rays, hits, count);
+}
+
+static bool is_pixel_sound(const VerifyRun *run, const VerifyPicture *picture, size_t i)
+{
+    const double *color = &picture->color[3 * i], *normal = &picture->normal[3 * i];
+    if (!is_finite(color) || color[0] < 0 || color[1] < 0 || color[2] < 0) return false;
+    if (!is_finite(&picture->ray[3 * i])) return false;
+    if (picture->object[i] == UINT32_MAX) return isinf(picture->t[i]);
+    if (!(picture->t[i] > 0) || !isfinite(picture->t[i])) return false;
+    if (!is_finite(normal) || !is_finite(&picture->position[3 * i])) return false;
+    return run->tier == TIER_A || is_unit(run, normal);
+}
+
+VerifyPicture verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+                            uint32_t height)
+{
+    VerifyPicture picture = {width, height, (uint32_t)scene->lights.count, 0, 0, 0, 0, 0, 0, 0, 0};
+    size_t pixels = verify_pixel_count(&picture), shadows = pixels * picture.light_count;
+    double **const vectors[] = {&picture.color, &picture.normal, &picture.position, &picture.ray};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        *vectors[i] = memory_allocate(3 * pixels, sizeof **vectors[i]);
+    picture.t = memory_allocate(pixels, sizeof *picture.t);
+    picture.object = memory_allocate(pixels, sizeof *picture.object);
+    picture.shadow = memory_allocate(shadows + 1, sizeof *picture.shadow);
+    picture.path = memory_allocate(pixels, sizeof *picture.path);
+    run->renderer->render(run->renderer->context, scene, hierarchy, &picture);
+    run->result->ray_count += pixels;
+    for (size_t i = 0; i < pixels; i++)
+        run->result->unsound += !is_pixel_sound(run, &picture, i);
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        hash_numbers(run, *vectors[i], 3 * pixels);
+    hash_numbers(run, picture.t, pixels);
+    hash_integers(run, picture.object, pixels);
+    hash_integers(run, picture.shadow, shadows);
+    hash_integers(run, picture.path, pixels);
+    return picture;
+}
+
+void verify_picture_free(VerifyPicture *picture)
+{
+    free(picture->color);
+    free(picture->t);
+    free(picture->normal);
+    free(picture->position);
+    free(picture->ray);
+    free(picture->object);
+    free(picture->shadow);
+    free(picture->path);
+    *picture = (VerifyPicture){0};
 }
 
 bool verify_same_bits(const ProbeHit *a, const ProbeHit *b)
@@ -123,7 +215,7 @@ bool verify_same_bits(const ProbeHit *a, const ProbeHit *b)
     return memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0;
 }
 
-void verify_note_error(VerifyRun *run, double error, double bound)
+void verify_note(VerifyRun *run, double error, double bound, const char *unit)
 {
     VerifyResult *result = run->result;
     if (!(error <= bound)) result->wrong++;
@@ -133,7 +225,13 @@ void verify_note_error(VerifyRun *run, double error, double bound)
     if (part > worst_part || (result->worst == 0 && bound > result->bound)) {
         result->worst = error;
         result->bound = bound;
+        result->unit = unit;
     }
+}
+
+void verify_note_error(VerifyRun *run, double error, double bound)
+{
+    verify_note(run, error, bound, "ulp");
 }
 
 Scene verify_scene(const char *objects)
@@ -148,6 +246,14 @@ Scene verify_scene(const char *objects)
     message_list_free(&messages);
     text_free(&text);
     return scene;
+}
+
+Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
+{
+    return (Camera){.position = position,
+                    .look_at = look_at,
+                    .up = {0, 1, 0},
+                    .half_tangent = tan(fov_degrees * (M_PI / 360))};
 }
 
 static void judge(VerifyRun *run, const ProbeHit *hit, const Expected *expected)
@@ -233,8 +339,7 @@ static void run_family(VerifyRun *run, const ProbeTable *table, const Scene *sce
             rays[i] = table->family(first + i);
             verify_round_ray(run, &rays[i]);
         }
-        run->renderer->trace(opened, rays, count, hits);
-        count_unsound(run, rays, hits, count);
+        verify_trace_opened(run, opened, rays, count, hits);
         for (size_t i = 0; i < count; i++) {
             run->result->leaks += table->closed && !verify_is_hit(&hits[i]);
             if (first + i < table->expected_count[width])
@@ -262,10 +367,26 @@ static void run_table(VerifyRun *run, const ProbeTable *table)
     scene_free(&scene);
 }
 
-void verify_run(const VerifyRenderer *renderer, VerifyTier tier, VerifySink sink, void *context)
+bool verify_is_case(const char *name)
+{
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        if (strcmp(cases[i].name, name) == 0) return true;
+    return false;
+}
+
+static bool is_chosen(const VerifyChoice *choice, const char *name)
+{
+    for (size_t i = 0; choice && i < choice->count; i++)
+        if (strcmp(choice->names[i], name) == 0) return true;
+    return !choice;
+}
+
+void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
+                void *context)
 {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        VerifyResult result = {.name = cases[i].name, .title = cases[i].title};
+        if (!is_chosen(choice, cases[i].name)) continue;
+        VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
         VerifyRun run = {renderer, tier, &result};
         for (size_t k = 0; k < probe_table_count; k++)
             if (strcmp(probe_tables[k].name, result.name) == 0) run_table(&run, &probe_tables[k]);

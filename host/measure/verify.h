@@ -6,10 +6,23 @@
 #include "host/scene/scene.h"
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 // What is owed: A is hygiene and holds at every precision; B, C and D are accuracy at `single`, `strict` and
 // `double`, and hold A as well.
 typedef enum { TIER_A, TIER_B, TIER_C, TIER_D, TIER_COUNT } VerifyTier;
+
+// A picture and what lies behind its pixels, row by row from the top left; numbers widened to double.
+typedef struct {
+    uint32_t width, height, light_count;
+    double *color;             // 3 per pixel
+    double *t;                 // infinity where nothing was hit
+    double *normal, *position; // 3 per pixel; 0 where nothing was hit; from the eye
+    double *ray;               // 3 per pixel: the direction that was traced, from the eye
+    uint32_t *object;          // UINT32_MAX where nothing was hit
+    uint32_t *shadow;          // 1 per light and pixel
+    uint32_t *path;            // the signature of the ray's way (kernels/types.h)
+} VerifyPicture;
 
 // The renderer under test, at one precision.
 typedef struct {
@@ -18,6 +31,8 @@ typedef struct {
     void *(*open)(void *context, const Scene *scene, bool hierarchy);
     void (*trace)(void *opened, const ProbeRay *rays, size_t count, ProbeHit *hits);
     void (*close)(void *opened);
+    // Fills a picture of the scene, all arrays of which are there.
+    void (*render)(void *context, const Scene *scene, bool hierarchy, VerifyPicture *picture);
     // The forward axis, and those along the picture's width and height, of a camera.
     void (*camera_axes)(const Camera *camera, Vector3 axes[3]);
 } VerifyRenderer;
@@ -25,18 +40,28 @@ typedef struct {
 // How one case went.
 typedef struct {
     const char *name, *title;
-    size_t ray_count;
+    size_t ray_count; // and pixels
     size_t wrong;     // hits that should be misses, misses that should be hits, the wrong object, t or place
     size_t leaks;     // misses of what is closed
     size_t unsound;   // no numbers, hits behind the ray's start, normals that are not unit
     size_t differing; // answers whose bits depend on what they must not depend on
-    double worst,
-        bound; // the distance's error that is the largest part of its bound, both in ulp; 0, 0: none
+    double worst, bound; // the error that is the largest part of its bound; 0, 0: none
+    const char *unit;    // of both
+    uint64_t hash;       // of every answer's bits, in order
 } VerifyResult;
 
 bool verify_holds(const VerifyResult *result);
 
 typedef void (*VerifySink)(void *context, const VerifyResult *result);
 
-// Runs every case in turn.
-void verify_run(const VerifyRenderer *renderer, VerifyTier tier, VerifySink sink, void *context);
+// Which cases to run, by name; NULL: all.
+typedef struct {
+    char *const *names;
+    size_t count;
+} VerifyChoice;
+
+bool verify_is_case(const char *name);
+
+// Runs the cases in turn.
+void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
+                void *context);

@@ -24,6 +24,24 @@ VerifyCheck verify_hierarchy;         // M6
 VerifyCheck verify_critical_angle;    // R4
 VerifyCheck verify_camera_frames;     // R8
 
+VerifyCheck verify_far_fringe;       // S2
+VerifyCheck verify_ground_horizon;   // S4
+VerifyCheck verify_plane_horizon;    // P1
+VerifyCheck verify_plane_acne;       // P2
+VerifyCheck verify_thin_plate;       // P6
+VerifyCheck verify_wire;             // C3
+VerifyCheck verify_apex;             // C6
+VerifyCheck verify_far_torus;        // T1
+VerifyCheck verify_tangent_circle;   // T4
+VerifyCheck verify_thin_ring;        // T5
+VerifyCheck verify_contact_shadow;   // R1
+VerifyCheck verify_nested_spheres;   // R2
+VerifyCheck verify_matched_glass;    // R3
+VerifyCheck verify_highlights;       // R5
+VerifyCheck verify_scaled_scenes;    // R6
+VerifyCheck verify_mirrored_scenes;  // R7
+VerifyCheck verify_degenerate_views; // R8
+
 static inline bool verify_is_wide(const VerifyRun *run)
 {
     return run->tier == TIER_D;
@@ -43,10 +61,30 @@ static inline bool verify_is_hit(const ProbeHit *hit)
 // counted.
 void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const ProbeRay *rays, size_t count,
                   ProbeHit *hits);
+// The same at a scene that is open already.
+void verify_trace_opened(VerifyRun *run, void *opened, const ProbeRay *rays, size_t count, ProbeHit *hits);
 bool verify_same_bits(const ProbeHit *a, const ProbeHit *b); // object, distance and normal
 
 // Notes an error of t, in ulp of it, and counts it as wrong where it is beyond the bound.
 void verify_note_error(VerifyRun *run, double error, double bound);
+// The same for an error in another unit.
+void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 
 // Reads a scene of objects, without a camera, that the program itself carries.
 Scene verify_scene(const char *objects);
+Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
+
+// Renders a picture and counts what is unsound in it; verify_picture_free frees it.
+VerifyPicture verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+                            uint32_t height);
+void verify_picture_free(VerifyPicture *picture);
+
+static inline size_t verify_pixel_count(const VerifyPicture *picture)
+{
+    return (size_t)picture->width * picture->height;
+}
+
+static inline Vector3 verify_vector(const double *parts)
+{
+    return (Vector3){parts[0], parts[1], parts[2]};
+}

@@ -112,8 +112,7 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, void *opened, size_
         rays[i] = ray_of(run, vector_from(first->mirrored_origin), direction);
         rays[DIRECTIONS + i] = ray_of(run, vector_from(first->passed_origin), vector_scale(direction, -1));
     }
-    run->renderer->trace(opened, rays, 2 * (size_t)DIRECTIONS, hits);
-    run->result->ray_count += 2 * (size_t)DIRECTIONS;
+    verify_trace_opened(run, opened, rays, 2 * (size_t)DIRECTIONS, hits);
     for (size_t i = 0; i < DIRECTIONS; i++) {
         run->result->wrong += hits[i].object == sphere;
         double exit = sphere_exit(&scene->objects.items[sphere], &rays[DIRECTIONS + i]);
@@ -136,7 +135,7 @@ void verify_leaving_spheres(VerifyRun *run)
         Scene scene = spheres_of_all_sizes(run, group);
         rays_at_spheres(run, &scene, group, rays);
         void *opened = run->renderer->open(run->renderer->context, &scene, false);
-        run->renderer->trace(opened, rays, SPHERES, hits);
+        verify_trace_opened(run, opened, rays, SPHERES, hits);
         for (size_t i = 0; i < SPHERES; i++)
             if (hits[i].object == i) leave_sphere(run, &scene, opened, i, &hits[i]);
         run->renderer->close(opened);
