@@ -15,8 +15,6 @@ typedef struct {
     real travelled; // from the eye to the origin, for pictures on surfaces
     // for boxes: 1 / direction; huge where the component is 0
     Vector inverse;
-    // for the hierarchy: the origin moved both ways along each axis by what hits may be off
-    Vector origin_up, origin_down;
     // for triangles: unit vectors across the direction, and along it
     Vector across_u, across_v, along;
 } Ray;

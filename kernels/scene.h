@@ -129,69 +129,119 @@ static inline void search_shapes(Search *search, const Scene *scene, const Ray *
     SHAPE_LIST(SEARCH_SHAPES)
 }
 
-// Where the ray enters a box, or LARGEST where it does not before `limit`. The box counts as larger by the
-// slack that origin_up and origin_down hold, so that no hit is lost to rounding: neither the box's nor the
-// shape's own.
-static inline real bvh_enter(scalar4 low, scalar4 high, const Ray *ray, real limit)
+// A packet's rays as boxes are tested with them. All of them run to the same side along each axis, so that
+// which of a box's planes is the near one is known for the packet.
+typedef struct {
+    Vector inverse;         // 1 / direction, bounded
+    Vector to_near, to_far; // a plane's distance is plane * inverse + this
+    uint near[3], far[3]; // which of a box's numbers is the near plane along each axis, and which the far one
+    uint signs;           // bit i: the direction's component i is negative
+} BoxRays;
+
+// How far a hit may lie outside its primitive's box, for any shape: each test is off by a few u times the
+// distance between the ray's start and the shape, across the ray and along it. Boxes count as larger by that.
+//
+// Products are bounded: 1 / direction is held below 2^120 (2^1000) by the scene's size, where the ray does
+// not move along that axis by as much as the slack, however far it goes.
+static inline BoxRays box_rays(const Ray *ray, scalar extent, uint signs)
 {
-    real to_low_x = ((real)(low.x) - ray->origin_up.x) * ray->inverse.x;
-    real to_low_y = ((real)(low.y) - ray->origin_up.y) * ray->inverse.y;
-    real to_low_z = ((real)(low.z) - ray->origin_up.z) * ray->inverse.z;
-    real to_high_x = ((real)(high.x) - ray->origin_down.x) * ray->inverse.x;
-    real to_high_y = ((real)(high.y) - ray->origin_down.y) * ray->inverse.y;
-    real to_high_z = ((real)(high.z) - ray->origin_down.z) * ray->inverse.z;
-    real near = real_max(real_max(real_min(to_low_x, to_high_x), real_min(to_low_y, to_high_y)),
-                         real_min(to_low_z, to_high_z));
-    real far = real_min(real_min(real_max(to_low_x, to_high_x), real_max(to_low_y, to_high_y)),
-                        real_max(to_low_z, to_high_z));
-    near = real_max(near, ray->near);
-    mask meets = (near <= far) & (near <= limit);
-    return lanes_select(meets, near, (real)(LARGEST));
+    real size = vector_magnitude(ray->origin) + (real)(extent);
+    real slack = (real)(64 * UNIT_ROUNDOFF) * size;
+    real largest = (real)(1 / SMALLEST_RATIO) * real_inverse_power(size);
+    BoxRays rays;
+    rays.inverse = (Vector){real_min(real_max(ray->inverse.x, -largest), largest),
+                            real_min(real_max(ray->inverse.y, -largest), largest),
+                            real_min(real_max(ray->inverse.z, -largest), largest)};
+    Vector inverse = rays.inverse;
+    Vector to_origin = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
+    Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
+    rays.to_near = vector_subtract(to_origin, around);
+    rays.to_far = vector_add(to_origin, around);
+    for (uint axis = 0; axis < 3; axis++) {
+        rays.near[axis] = signs >> axis & 1 ? axis + 4 : axis;
+        rays.far[axis] = signs >> axis & 1 ? axis : axis + 4;
+    }
+    rays.signs = signs;
+    return rays;
+}
+
+// Where the rays enter a box, given by its low corner's numbers, one unused, and its high one's.
+static inline real box_rays_enter(const BoxRays *rays, global const scalar *box, real near)
+{
+    real x = fma((real)(box[rays->near[0]]), rays->inverse.x, rays->to_near.x);
+    real y = fma((real)(box[rays->near[1]]), rays->inverse.y, rays->to_near.y);
+    real z = fma((real)(box[rays->near[2]]), rays->inverse.z, rays->to_near.z);
+    return real_max(real_max(x, y), real_max(z, near));
+}
+
+static inline real box_rays_leave(const BoxRays *rays, global const scalar *box, real limit)
+{
+    real x = fma((real)(box[rays->far[0]]), rays->inverse.x, rays->to_far.x);
+    real y = fma((real)(box[rays->far[1]]), rays->inverse.y, rays->to_far.y);
+    real z = fma((real)(box[rays->far[2]]), rays->inverse.z, rays->to_far.z);
+    return real_min(real_min(x, y), real_min(z, limit));
 }
 
 // Down the tree, the nearer child first; a packet visits what any of its lanes meets.
-static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray)
+static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays,
+                              mask members)
 {
-    uint2 children[BVH_DEPTH_LARGEST + 1];
-    real nears[BVH_DEPTH_LARGEST + 1];
-    uint stacked = 1;
-    children[0] = (uint2)(0, BVH_NODE);
-    nears[0] = ray->near;
-    while (stacked > 0) {
-        stacked--;
-        if (!lanes_any(search->open & (nears[stacked] <= search->hit.t))) continue;
-        uint2 child = children[stacked];
-        if (child.y != BVH_NODE) {
-            search_shapes(search, scene, ray, child.y & 0xff, child.x, child.x + (child.y >> 8));
-            if (search->any && !lanes_any(search->open)) return;
-            continue;
+    uint2 waiting[BVH_DEPTH_LARGEST];
+    real waiting_nears[BVH_DEPTH_LARGEST];
+    uint waiting_count = 0;
+    uint2 child = (uint2)(0, BVH_NODE);
+    // no further than this is any lane interested; not at all where it has found what it looked for
+    real limit = lanes_select(members & search->open, search->hit.t, (real)(-LARGEST));
+    for (;;) {
+        if ((child.y & 0xff) == BVH_NODE) {
+            global const BvhNode *node = &scene->nodes[child.x];
+            global const scalar *box_0 = (global const scalar *)&node->low_0;
+            global const scalar *box_1 = (global const scalar *)&node->low_1;
+            real near_0 = box_rays_enter(rays, box_0, ray->near);
+            real near_1 = box_rays_enter(rays, box_1, ray->near);
+            bool meets_0 = lanes_any(near_0 <= box_rays_leave(rays, box_0, limit));
+            bool meets_1 = lanes_any(near_1 <= box_rays_leave(rays, box_1, limit));
+            uint4 children = node->children;
+            if (meets_0 & meets_1) {
+                bool second_nearer = rays->signs >> (children.y >> BVH_AXIS_SHIFT) & 1;
+                waiting[waiting_count] = second_nearer ? children.xy : children.zw;
+                waiting_nears[waiting_count++] = second_nearer ? near_0 : near_1;
+                child = second_nearer ? children.zw : children.xy;
+                continue;
+            }
+            if (meets_0 | meets_1) {
+                child = meets_0 ? children.xy : children.zw;
+                continue;
+            }
+        } else {
+            search_shapes(search, scene, ray, child.y & 0xff, child.x, child.x + (child.y >> 8 & 0xff));
+            limit = lanes_select(members & search->open, search->hit.t, (real)(-LARGEST));
         }
-        BvhNode node = scene->nodes[child.x];
-        real near_0 = bvh_enter(node.low_0, node.high_0, ray, search->hit.t);
-        real near_1 = bvh_enter(node.low_1, node.high_1, ray, search->hit.t);
-        bool first_nearer = lanes_any(search->open & (near_0 < near_1));
-        uint2 far_child = first_nearer ? node.children.zw : node.children.xy;
-        uint2 near_child = first_nearer ? node.children.xy : node.children.zw;
-        real far_near = first_nearer ? near_1 : near_0;
-        real near_near = first_nearer ? near_0 : near_1;
-        if (lanes_any(search->open & (far_near < (real)(LARGEST)))) {
-            children[stacked] = far_child;
-            nears[stacked++] = far_near;
-        }
-        if (lanes_any(search->open & (near_near < (real)(LARGEST)))) {
-            children[stacked] = near_child;
-            nears[stacked++] = near_near;
-        }
+        do {
+            if (waiting_count == 0) return;
+            waiting_count--;
+        } while (!lanes_any(waiting_nears[waiting_count] <= limit));
+        child = waiting[waiting_count];
     }
 }
 
-// How far a hit may lie outside its primitive's box, for any shape: each test is off by a few u times the
-// distance between the ray's start and the shape, across the ray and along it.
-static inline void ray_prepare_for_bvh(Ray *ray, global const SceneHeader *header)
+// Rays of one packet mostly run to the same sides; where they do not, those that do go together.
+static inline void search_hierarchy(Search *search, const Scene *scene, const Ray *ray)
 {
-    real slack = (real)(64 * UNIT_ROUNDOFF) * (vector_magnitude(ray->origin) + (real)(header->extent.x));
-    ray->origin_up = (Vector){ray->origin.x + slack, ray->origin.y + slack, ray->origin.z + slack};
-    ray->origin_down = (Vector){ray->origin.x - slack, ray->origin.y - slack, ray->origin.z - slack};
+    const integer none = (integer)(8);
+    Vector d = ray->direction;
+    integer signs = lanes_select(d.x < (real)(0), (integer)(1), (integer)(0)) |
+                    lanes_select(d.y < (real)(0), (integer)(2), (integer)(0)) |
+                    lanes_select(d.z < (real)(0), (integer)(4), (integer)(0));
+    integer pending = lanes_select(search->open, signs, none);
+    for (;;) {
+        scalar_integer first = lanes_smallest(pending);
+        if (first == 8) break;
+        mask members = pending == (integer)(first);
+        pending = lanes_select(members, none, pending);
+        BoxRays rays = box_rays(ray, scene->header->extent.x, (uint)first);
+        search_bvh(search, scene, ray, &rays, members);
+    }
 }
 
 static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool any)
@@ -204,11 +254,7 @@ static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool 
         search_shapes(&search, scene, ray, KIND_##feature, bounded_counts[KIND_##feature],                   \
                       counts[KIND_##feature]);
     SHAPE_LIST(SEARCH_PLAINLY)
-    if (HAS_BVH) {
-        Ray prepared = *ray;
-        ray_prepare_for_bvh(&prepared, scene->header);
-        search_bvh(&search, scene, &prepared);
-    }
+    if (HAS_BVH) search_hierarchy(&search, scene, ray);
     return search;
 }
 

@@ -108,11 +108,12 @@ enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
 // primitives first .. first + count of one kind.
 typedef struct {
     scalar4 low_0, high_0, low_1, high_1;
-    uint4 children; // x: first child's node or first primitive, y: BVH_NODE or count << 8 | kind; z, w: the
-                    // second's
+    // x: first child's node or first primitive, y: BVH_NODE or count << 8 | kind, with the axis along which
+    // the second child lies behind the first in the bits from BVH_AXIS_SHIFT; z, w: the second's
+    uint4 children;
 } BvhNode;
 
-enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
+enum { BVH_NODE = 0xff, BVH_AXIS_SHIFT = 16, BVH_DEPTH_LARGEST = 80 };
 
 // Where an object's id leads.
 typedef struct {

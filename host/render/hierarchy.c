@@ -191,6 +191,22 @@ static scalar4 corner_of(const BvhBox *box, const double corner[3])
     return (scalar4){corner[0], corner[1], corner[2], 0};
 }
 
+// The axis along which a node's children lie farthest apart, and whether the second lies before the first.
+static unsigned children_axis(const BvhNodeBuild *node, bool *swapped)
+{
+    const BvhBox *a = &node->children[0].box, *b = &node->children[1].box;
+    unsigned axis = 0;
+    double farthest = 0;
+    for (unsigned k = 0; k < 3; k++) {
+        double apart = b->low[k] + b->high[k] - (a->low[k] + a->high[k]);
+        if (!(fabs(apart) > fabs(farthest))) continue;
+        farthest = apart;
+        axis = k;
+    }
+    *swapped = farthest < 0;
+    return axis;
+}
+
 static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded)
 {
     free(flat->arrays[FLAT_NODES].items);
@@ -198,15 +214,18 @@ static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded)
     BvhNode *nodes = flat->arrays[FLAT_NODES].items;
     uint32_t *order = order_in_kinds(bvh, bounded);
     for (size_t i = 0; i < bvh->node_count; i++) {
-        const BvhChild *children = bvh->nodes[i].children;
+        bool swapped;
+        unsigned axis = children_axis(&bvh->nodes[i], &swapped);
+        const BvhChild *first = &bvh->nodes[i].children[swapped], *second = &bvh->nodes[i].children[!swapped];
         nodes[i] = (BvhNode){
-            .low_0 = corner_of(&children[0].box, children[0].box.low),
-            .high_0 = corner_of(&children[0].box, children[0].box.high),
-            .low_1 = corner_of(&children[1].box, children[1].box.low),
-            .high_1 = corner_of(&children[1].box, children[1].box.high),
+            .low_0 = corner_of(&first->box, first->box.low),
+            .high_0 = corner_of(&first->box, first->box.high),
+            .low_1 = corner_of(&second->box, second->box.low),
+            .high_1 = corner_of(&second->box, second->box.high),
         };
-        child_write(&children[0], bvh, bounded, order, &nodes[i].children.x, &nodes[i].children.y);
-        child_write(&children[1], bvh, bounded, order, &nodes[i].children.z, &nodes[i].children.w);
+        child_write(first, bvh, bounded, order, &nodes[i].children.x, &nodes[i].children.y);
+        child_write(second, bvh, bounded, order, &nodes[i].children.z, &nodes[i].children.w);
+        nodes[i].children.y |= axis << BVH_AXIS_SHIFT;
     }
     free(order);
 }
