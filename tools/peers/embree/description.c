@@ -55,6 +55,12 @@ static float read_number(Reader *reader)
     return number;
 }
 
+static void read_numbers(Reader *reader, size_t count, float *numbers)
+{
+    for (size_t i = 0; i < count; i++)
+        numbers[i] = read_number(reader);
+}
+
 static int read_index(Reader *reader, size_t limit)
 {
     char *end;
@@ -82,17 +88,16 @@ static size_t read_list(Reader *reader, const char *name)
 static Mesh read_mesh(Reader *reader, size_t material_count)
 {
     Mesh mesh = {.vertex_count = read_list(reader, "vertices")};
-    mesh.vertices = memory_get(mesh.vertex_count, sizeof *mesh.vertices);
-    mesh.normals = memory_get(mesh.vertex_count, sizeof *mesh.normals);
+    mesh.vertices = memory_get(3 * mesh.vertex_count, sizeof *mesh.vertices);
+    mesh.normals = memory_get(3 * mesh.vertex_count, sizeof *mesh.normals);
     for (size_t i = 0; i < mesh.vertex_count; i++) {
-        mesh.vertices[i] = read_vector(reader);
-        mesh.normals[i] = read_vector(reader);
+        read_numbers(reader, 3, &mesh.vertices[3 * i]);
+        read_numbers(reader, 3, &mesh.normals[3 * i]);
     }
     mesh.face_count = read_list(reader, "faces");
-    mesh.faces = memory_get(mesh.face_count, sizeof *mesh.faces);
-    for (size_t i = 0; i < mesh.face_count; i++)
-        for (int corner = 0; corner < 3; corner++)
-            mesh.faces[i][corner] = read_index(reader, mesh.vertex_count);
+    mesh.faces = memory_get(3 * mesh.face_count, sizeof *mesh.faces);
+    for (size_t i = 0; i < 3 * mesh.face_count; i++)
+        mesh.faces[i] = read_index(reader, mesh.vertex_count);
     mesh.material = read_index(reader, material_count);
     return mesh;
 }
@@ -118,14 +123,8 @@ Description description_read(const char *path)
         scene.lights[i].color = read_vector(&reader);
     }
     scene.material_count = read_list(&reader, "materials");
-    scene.materials = memory_get(scene.material_count, sizeof *scene.materials);
-    for (size_t i = 0; i < scene.material_count; i++) {
-        Material *material = &scene.materials[i];
-        material->ambient = read_vector(&reader);
-        material->diffuse = read_vector(&reader);
-        material->specular = read_number(&reader);
-        material->shininess = read_number(&reader);
-    }
+    scene.materials = memory_get(MATERIAL_PARTS * scene.material_count, sizeof *scene.materials);
+    read_numbers(&reader, MATERIAL_PARTS * scene.material_count, scene.materials);
     scene.plane_count = read_list(&reader, "planes");
     scene.planes = memory_get(scene.plane_count, sizeof *scene.planes);
     for (size_t i = 0; i < scene.plane_count; i++) {

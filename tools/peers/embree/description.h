@@ -17,10 +17,14 @@ typedef struct {
     Vector position, color;
 } Light;
 
-typedef struct {
-    Vector ambient, diffuse; // the ambient light and the material's color are in them
-    float specular, shininess;
-} Material;
+// Flat arrays, here and in a mesh: only from those do compilers gather.
+enum {
+    MATERIAL_AMBIENT = 0, // a color; the ambient light and the material's own color are in it
+    MATERIAL_DIFFUSE = 3, // a color, likewise
+    MATERIAL_SPECULAR = 6,
+    MATERIAL_SHININESS = 7,
+    MATERIAL_PARTS = 8
+};
 
 typedef struct {
     Vector point, normal; // the normal is unit
@@ -33,8 +37,8 @@ typedef struct {
 } Sphere;
 
 typedef struct {
-    Vector *vertices, *normals; // one normal a vertex
-    int (*faces)[3];
+    float *vertices, *normals; // three numbers of each
+    int *faces;                // three vertices of each
     size_t vertex_count, face_count;
     int material;
 } Mesh;
@@ -43,7 +47,7 @@ typedef struct {
     Camera camera;
     Vector background;
     Light *lights;
-    Material *materials;
+    float *materials; // MATERIAL_PARTS of each
     Plane *planes;
     Sphere *spheres;
     int *sphere_materials;

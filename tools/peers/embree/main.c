@@ -86,8 +86,8 @@ static RTCScene scene_build(RTCDevice device, const Description *description, co
         const Mesh *mesh = &description->meshes[i];
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
         buffer_copy(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh->vertices,
-                    sizeof *mesh->vertices, mesh->vertex_count);
-        buffer_copy(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh->faces, sizeof *mesh->faces,
+                    3 * sizeof *mesh->vertices, mesh->vertex_count);
+        buffer_copy(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh->faces, 3 * sizeof *mesh->faces,
                     mesh->face_count);
         geometry_attach(scene, geometry, quality);
     }

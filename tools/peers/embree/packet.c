@@ -7,8 +7,8 @@
 static const int valid_lane = -1; // as Embree has it
 
 // A plane is not put to Embree: 16 rays against one are few instructions, and leave it shorter rays. This is
-// faster than two large triangles in its hierarchy.
-enum { NO_PLANE = -1 };
+// faster than two large triangles in its hierarchy. Plane k is noted in hits as geometry FIRST_PLANE + k.
+enum { FIRST_PLANE = 1 << 30 };
 
 typedef struct {
     alignas(64) float x[LANES];
@@ -17,7 +17,7 @@ typedef struct {
 
 typedef struct {
     alignas(64) int found[LANES]; // valid_lane or 0
-    int plane[LANES];
+    int geometry[LANES];
     Vectors position, start; // start: a little off the surface, for shadow rays
     Vectors normal;          // to shade with, unit, towards the eye
     Vectors to_eye;          // unit
@@ -53,25 +53,31 @@ static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, s
         rays->ray.flags[i] = 0;
         rays->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
         rays->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        rays->hit.Ng_x[i] = rays->hit.Ng_y[i] = rays->hit.Ng_z[i] = 0;
         valid[i] = column < width && row < height ? valid_lane : 0;
     }
 }
 
 // Ends the rays where they meet a plane.
-static void planes_meet(const Description *scene, struct RTCRay16 *ray, int *plane_met)
+static void planes_meet(const Description *scene, struct RTCRayHit16 *rays)
 {
-    FOR_LANES plane_met[i] = NO_PLANE;
     for (size_t k = 0; k < scene->plane_count; k++) {
-        Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
+        const Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
+        const unsigned geometry = FIRST_PLANE + (unsigned)k;
         FOR_LANES
         {
-            float height = normal.x * (point.x - ray->org_x[i]) + normal.y * (point.y - ray->org_y[i]) +
-                           normal.z * (point.z - ray->org_z[i]);
-            float along = normal.x * ray->dir_x[i] + normal.y * ray->dir_y[i] + normal.z * ray->dir_z[i];
+            float height = normal.x * (point.x - rays->ray.org_x[i]) +
+                           normal.y * (point.y - rays->ray.org_y[i]) +
+                           normal.z * (point.z - rays->ray.org_z[i]);
+            float along =
+                normal.x * rays->ray.dir_x[i] + normal.y * rays->ray.dir_y[i] + normal.z * rays->ray.dir_z[i];
             float t = height / along;
-            bool nearer = t > 0 && t < ray->tfar[i];
-            ray->tfar[i] = nearer ? t : ray->tfar[i];
-            plane_met[i] = nearer ? (int)k : plane_met[i];
+            bool nearer = (t > 0) & (t < rays->ray.tfar[i]);
+            rays->ray.tfar[i] = nearer ? t : rays->ray.tfar[i];
+            rays->hit.geomID[i] = nearer ? geometry : rays->hit.geomID[i];
+            rays->hit.Ng_x[i] = nearer ? normal.x : rays->hit.Ng_x[i];
+            rays->hit.Ng_y[i] = nearer ? normal.y : rays->hit.Ng_y[i];
+            rays->hit.Ng_z[i] = nearer ? normal.z : rays->hit.Ng_z[i];
         }
     }
 }
@@ -98,6 +104,7 @@ static void rays_intersect(const Renderer *renderer, const int *valid, struct RT
                     .mask = ~0U},
             .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .instID = {RTC_INVALID_GEOMETRY_ID}}};
         rtcIntersect1(renderer->scene, &context, &one);
+        if (one.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
         rays->ray.tfar[i] = one.ray.tfar;
         rays->hit.geomID[i] = one.hit.geomID;
         rays->hit.primID[i] = one.hit.primID;
@@ -134,20 +141,31 @@ static void rays_occlude(const Renderer *renderer, const int *valid, struct RTCR
     }
 }
 
-// Normals of a mesh's vertices, blended where the rays meet it, in place of the triangles' own.
-static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit16 *hit, Vectors *normal)
+static unsigned mesh_geometry(const Description *scene, size_t mesh)
 {
-    const float *normals = &mesh->normals[0].x;
-    const int *faces = mesh->faces[0];
+    return (unsigned)mesh + (scene->sphere_count > 0);
+}
+
+// Normals of a mesh's vertices, blended where the rays meet it, in place of the triangles' own.
+static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit16 *hit, const int *flip,
+                        Vectors *normal)
+{
+    const float *normals = mesh->normals;
+    const int *faces = mesh->faces;
     FOR_LANES
     {
         if (hit->geomID[i] != geometry) continue;
         int face = 3 * (int)hit->primID[i];
         int a = 3 * faces[face], b = 3 * faces[face + 1], c = 3 * faces[face + 2];
         float u = hit->u[i], v = hit->v[i], w = 1 - u - v;
-        normal->x[i] = w * normals[a] + u * normals[b] + v * normals[c];
-        normal->y[i] = w * normals[a + 1] + u * normals[b + 1] + v * normals[c + 1];
-        normal->z[i] = w * normals[a + 2] + u * normals[b + 2] + v * normals[c + 2];
+        float x = w * normals[a] + u * normals[b] + v * normals[c];
+        float y = w * normals[a + 1] + u * normals[b + 1] + v * normals[c + 1];
+        float z = w * normals[a + 2] + u * normals[b + 2] + v * normals[c + 2];
+        float shorten = 1 / sqrtf(x * x + y * y + z * z);
+        shorten = flip[i] ? -shorten : shorten;
+        normal->x[i] = shorten * x;
+        normal->y[i] = shorten * y;
+        normal->z[i] = shorten * z;
     }
 }
 
@@ -164,58 +182,53 @@ static void normals_face(Vectors *normal, const int *flip)
     }
 }
 
-// Sets materials to what the rays meet, geometric normals in `outward` to the planes', and tells which rays
-// meet something.
-static bool surfaces_find(const Renderer *renderer, const int *valid, const struct RTCRayHit16 *rays,
-                          Surfaces *surfaces, int *material, Vectors *outward)
+// Which rays meet something, and of what material; 0 for those that do not.
+static bool surfaces_find(const Description *scene, const int *valid, const struct RTCHit16 *hit,
+                          Surfaces *surfaces, int *material)
 {
-    const Description *scene = renderer->description;
-    const struct RTCHit16 *hit = &rays->hit;
-    const int *sphere_materials = scene->sphere_materials;
-    const unsigned spheres = scene->sphere_count > 0 ? 0 : RTC_INVALID_GEOMETRY_ID - 1;
     FOR_LANES
     {
-        bool embree = hit->geomID[i] != RTC_INVALID_GEOMETRY_ID;
-        surfaces->plane[i] = embree ? NO_PLANE : surfaces->plane[i];
-        surfaces->found[i] = embree || surfaces->plane[i] != NO_PLANE ? valid[i] : 0;
-        outward->x[i] = hit->Ng_x[i];
-        outward->y[i] = hit->Ng_y[i];
-        outward->z[i] = hit->Ng_z[i];
+        surfaces->found[i] = hit->geomID[i] != RTC_INVALID_GEOMETRY_ID ? valid[i] : 0;
+        surfaces->geometry[i] = (int)hit->geomID[i];
         material[i] = 0;
-        if (hit->geomID[i] == spheres) material[i] = sphere_materials[hit->primID[i]];
     }
-    for (size_t k = 0; k < scene->mesh_count; k++) {
-        unsigned geometry = (unsigned)k + (scene->sphere_count > 0);
-        FOR_LANES material[i] = hit->geomID[i] == geometry ? scene->meshes[k].material : material[i];
-    }
-    for (size_t k = 0; k < scene->plane_count; k++) {
-        const Plane *plane = &scene->planes[k];
+    if (scene->sphere_count > 0) {
+        const int *sphere_materials = scene->sphere_materials;
         FOR_LANES
         {
-            bool met = surfaces->plane[i] == (int)k;
-            material[i] = met ? plane->material : material[i];
-            outward->x[i] = met ? plane->normal.x : outward->x[i];
-            outward->y[i] = met ? plane->normal.y : outward->y[i];
-            outward->z[i] = met ? plane->normal.z : outward->z[i];
+            if (hit->geomID[i] == 0) material[i] = sphere_materials[(int)hit->primID[i]];
         }
+    }
+    for (size_t k = 0; k < scene->mesh_count; k++) {
+        const unsigned geometry = mesh_geometry(scene, k);
+        const int of_mesh = scene->meshes[k].material;
+        FOR_LANES material[i] = hit->geomID[i] == geometry ? of_mesh : material[i];
+    }
+    for (size_t k = 0; k < scene->plane_count; k++) {
+        const unsigned geometry = FIRST_PLANE + (unsigned)k;
+        const int of_plane = scene->planes[k].material;
+        FOR_LANES material[i] = hit->geomID[i] == geometry ? of_plane : material[i];
     }
     return lanes_any(surfaces->found);
 }
 
-static void surfaces_place(const Renderer *renderer, const struct RTCRayHit16 *rays, Surfaces *surfaces,
-                           Vectors *outward)
+static void surfaces_place(const Description *scene, const struct RTCRayHit16 *rays, Surfaces *surfaces)
 {
-    const Description *scene = renderer->description;
     const struct RTCRay16 *ray = &rays->ray;
+    Vectors outward;
     alignas(64) int flip[LANES];
-    FOR_LANES flip[i] =
-        outward->x[i] * ray->dir_x[i] + outward->y[i] * ray->dir_y[i] + outward->z[i] * ray->dir_z[i] > 0;
-    surfaces->normal = *outward;
+    FOR_LANES
+    {
+        outward.x[i] = rays->hit.Ng_x[i];
+        outward.y[i] = rays->hit.Ng_y[i];
+        outward.z[i] = rays->hit.Ng_z[i];
+        flip[i] =
+            outward.x[i] * ray->dir_x[i] + outward.y[i] * ray->dir_y[i] + outward.z[i] * ray->dir_z[i] > 0;
+    }
+    normals_face(&outward, flip);
+    surfaces->normal = outward;
     for (size_t k = 0; k < scene->mesh_count; k++)
-        mesh_smooth(&scene->meshes[k], (unsigned)k + (scene->sphere_count > 0), &rays->hit,
-                    &surfaces->normal);
-    normals_face(&surfaces->normal, flip);
-    normals_face(outward, flip);
+        mesh_smooth(&scene->meshes[k], mesh_geometry(scene, k), &rays->hit, flip, &surfaces->normal);
     const Vector eye = scene->camera.eye;
     FOR_LANES
     {
@@ -228,30 +241,60 @@ static void surfaces_place(const Renderer *renderer, const struct RTCRayHit16 *r
         surfaces->position.x[i] = x;
         surfaces->position.y[i] = y;
         surfaces->position.z[i] = z;
-        surfaces->start.x[i] = x + off * outward->x[i];
-        surfaces->start.y[i] = y + off * outward->y[i];
-        surfaces->start.z[i] = z + off * outward->z[i];
+        surfaces->start.x[i] = x + off * outward.x[i];
+        surfaces->start.y[i] = y + off * outward.y[i];
+        surfaces->start.z[i] = z + off * outward.z[i];
         surfaces->to_eye.x[i] = -ray->dir_x[i];
         surfaces->to_eye.y[i] = -ray->dir_y[i];
         surfaces->to_eye.z[i] = -ray->dir_z[i];
     }
 }
 
+// Gathers from tables take long, and the rays of a packet mostly meet one material.
+static bool all_equal(const int *numbers)
+{
+    int different = 0;
+    for (int i = 0; i < LANES; i++)
+        different |= numbers[i] ^ numbers[0];
+    return different == 0;
+}
+
 static void surfaces_color(const Description *scene, const int *material, Surfaces *surfaces)
 {
-    const float *table = &scene->materials[0].ambient.x;
-    const int stride = sizeof(Material) / sizeof(float);
+    const float *table = scene->materials;
+    if (all_equal(material)) {
+        const float *entry = table + (size_t)MATERIAL_PARTS * (size_t)material[0];
+        FOR_LANES
+        {
+            surfaces->color.x[i] = entry[MATERIAL_AMBIENT];
+            surfaces->color.y[i] = entry[MATERIAL_AMBIENT + 1];
+            surfaces->color.z[i] = entry[MATERIAL_AMBIENT + 2];
+            surfaces->diffuse.x[i] = entry[MATERIAL_DIFFUSE];
+            surfaces->diffuse.y[i] = entry[MATERIAL_DIFFUSE + 1];
+            surfaces->diffuse.z[i] = entry[MATERIAL_DIFFUSE + 2];
+            surfaces->specular[i] = entry[MATERIAL_SPECULAR];
+            surfaces->shininess[i] = entry[MATERIAL_SHININESS];
+        }
+    } else {
+        FOR_LANES
+        {
+            int entry = MATERIAL_PARTS * material[i];
+            surfaces->color.x[i] = table[entry + MATERIAL_AMBIENT];
+            surfaces->color.y[i] = table[entry + MATERIAL_AMBIENT + 1];
+            surfaces->color.z[i] = table[entry + MATERIAL_AMBIENT + 2];
+            surfaces->diffuse.x[i] = table[entry + MATERIAL_DIFFUSE];
+            surfaces->diffuse.y[i] = table[entry + MATERIAL_DIFFUSE + 1];
+            surfaces->diffuse.z[i] = table[entry + MATERIAL_DIFFUSE + 2];
+            surfaces->specular[i] = table[entry + MATERIAL_SPECULAR];
+            surfaces->shininess[i] = table[entry + MATERIAL_SHININESS];
+        }
+    }
+    const Vector background = scene->background;
     FOR_LANES
     {
-        int entry = stride * material[i];
-        surfaces->color.x[i] = surfaces->found[i] ? table[entry + 0] : scene->background.x;
-        surfaces->color.y[i] = surfaces->found[i] ? table[entry + 1] : scene->background.y;
-        surfaces->color.z[i] = surfaces->found[i] ? table[entry + 2] : scene->background.z;
-        surfaces->diffuse.x[i] = table[entry + 3];
-        surfaces->diffuse.y[i] = table[entry + 4];
-        surfaces->diffuse.z[i] = table[entry + 5];
-        surfaces->specular[i] = table[entry + 6];
-        surfaces->shininess[i] = table[entry + 7];
+        surfaces->color.x[i] = surfaces->found[i] ? surfaces->color.x[i] : background.x;
+        surfaces->color.y[i] = surfaces->found[i] ? surfaces->color.y[i] : background.y;
+        surfaces->color.z[i] = surfaces->found[i] ? surfaces->color.z[i] : background.z;
     }
 }
 
@@ -260,6 +303,7 @@ static void planes_occlude(const Description *scene, const Surfaces *surfaces, V
 {
     for (size_t k = 0; k < scene->plane_count; k++) {
         Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
+        const int geometry = FIRST_PLANE + (int)k;
         float light_height =
             normal.x * (light.x - point.x) + normal.y * (light.y - point.y) + normal.z * (light.z - point.z);
         FOR_LANES
@@ -267,7 +311,7 @@ static void planes_occlude(const Description *scene, const Surfaces *surfaces, V
             float height = normal.x * (surfaces->start.x[i] - point.x) +
                            normal.y * (surfaces->start.y[i] - point.y) +
                            normal.z * (surfaces->start.z[i] - point.z);
-            bool between = surfaces->plane[i] != (int)k && height * light_height < 0;
+            bool between = (surfaces->geometry[i] != geometry) & (height * light_height < 0);
             lit[i] = between ? 0 : lit[i];
         }
     }
@@ -327,7 +371,9 @@ static void light_add(const Renderer *renderer, const Light *light, Surfaces *su
             float cosine = (twice * normal->x[i] - to_light.x[i]) * to_eye->x[i] +
                            (twice * normal->y[i] - to_light.y[i]) * to_eye->y[i] +
                            (twice * normal->z[i] - to_light.z[i]) * to_eye->z[i];
-            highlight[i] = surfaces->specular[i] * powf(fmaxf(cosine, 1e-20F), surfaces->shininess[i]);
+            float exponent = surfaces->shininess[i] * log2f(fmaxf(cosine, 1e-20F));
+            highlight[i] =
+                surfaces->specular[i] * exp2f(fmaxf(exponent, -100)); // powers that underflow are slow
         }
     }
     const Vector color = light->color;
@@ -358,16 +404,15 @@ void packet_render(const Renderer *renderer, unsigned x, unsigned y)
     struct RTCRayHit16 rays;
     alignas(64) int valid[LANES];
     camera_rays(renderer, x, y, &rays, valid);
-    Surfaces surfaces;
-    planes_meet(scene, &rays.ray, surfaces.plane);
+    planes_meet(scene, &rays);
     rays_intersect(renderer, valid, &rays);
 
+    Surfaces surfaces;
     alignas(64) int material[LANES];
-    Vectors outward;
-    bool any = surfaces_find(renderer, valid, &rays, &surfaces, material, &outward);
+    bool any = surfaces_find(scene, valid, &rays.hit, &surfaces, material);
     surfaces_color(scene, material, &surfaces);
     if (any) {
-        surfaces_place(renderer, &rays, &surfaces, &outward);
+        surfaces_place(scene, &rays, &surfaces);
         for (size_t i = 0; i < scene->light_count; i++)
             light_add(renderer, &scene->lights[i], &surfaces);
     }
