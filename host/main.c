@@ -18,6 +18,7 @@ static const struct {
     {"devices", command_devices, "list the OpenCL devices"},
     {"diff", command_diff, "tell how far apart two pictures are"},
     {"bench", command_bench, "tell how fast this device renders scenes"},
+    {"accuracy", command_accuracy, "tell how fast and how exact each way of rendering is"},
     {"verify", command_verify, "run the hard cases on a device"},
 };
 

@@ -31,7 +31,7 @@ in_fish() {
 }
 
 failed=0
-subcommands='render trace check devices diff bench verify'
+subcommands='render trace check devices diff bench accuracy verify'
 for subcommand in $subcommands; do
     help=$(in_help "$subcommand")
     if [ -z "$help" ]; then

@@ -7,4 +7,5 @@ int command_check(int argument_count, char **arguments);
 int command_devices(int argument_count, char **arguments);
 int command_diff(int argument_count, char **arguments);
 int command_bench(int argument_count, char **arguments);
+int command_accuracy(int argument_count, char **arguments);
 int command_verify(int argument_count, char **arguments);

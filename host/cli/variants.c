@@ -108,6 +108,8 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
         .region_width = width,
         .region_height = height,
         .bounce_count = options->bounce_count,
+        .perturb_seed = options->common.perturb_seed,
+        .perturb_scale = options->common.perturb_scale,
         .shift_to_eye = true,
     };
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;

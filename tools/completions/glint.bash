@@ -10,6 +10,8 @@ _glint_options() {
     diff) echo "--heatmap --json -h --help" ;;
     bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --tolerance --device" \
         "--lenient -h --help" ;;
+    accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --json --perturb" \
+        "--device --lenient -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --json -h --help" ;;
     *) echo "--version --help" ;;
     esac
@@ -19,7 +21,7 @@ _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
     if [ "$COMP_CWORD" -eq 1 ]; then
-        mapfile -t COMPREPLY < <(compgen -W "render trace check devices diff bench verify $(_glint_options)" -- "$word")
+        mapfile -t COMPREPLY < <(compgen -W "render trace check devices diff bench accuracy verify $(_glint_options)" -- "$word")
         return
     fi
     # bash splits --option=value into three words.

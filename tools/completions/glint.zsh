@@ -90,6 +90,25 @@ _glint_bench() {
         '*:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
 
+_glint_accuracy() {
+    _arguments \
+        '--reference[linear colors to compare with]:picture:_files -g "*.(exr|npy)"' \
+        '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
+        '--lanes[pixels a work-item carries]:list:_sequence compadd - 1 4 8 16' \
+        '--bvh[use a hierarchy]:list:_sequence compadd - auto on off' \
+        '--samples[rays for each pixel]:list:' \
+        '--bounces[reflections and refractions at most]:number:' \
+        '--size[width and height in pixels]:WxH:' \
+        '--seconds[end the runs after so long]:seconds:' \
+        '--save[where all that is compared goes]:folder:_files -/' \
+        '--json[for programs]' \
+        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
+        '--device[device to render on]:device:(cpu gpu)' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '*:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
+}
+
 _glint() {
     local -a subcommands=(
         'render:render a picture'
@@ -98,6 +117,7 @@ _glint() {
         'devices:list the OpenCL devices'
         'diff:tell how far apart two pictures are'
         'bench:tell how fast this device renders scenes'
+        'accuracy:tell how fast and how exact each way of rendering is'
         'verify:run the hard cases on a device'
     )
     if ((CURRENT == 2)); then

@@ -1,0 +1,319 @@
+// glint accuracy: speed against error, for each way of rendering.
+#include "host/base/fault.h"
+#include "host/cli/accuracy_report.h"
+#include "host/cli/commands.h"
+#include "host/cli/layers.h"
+#include "host/cli/variants.h"
+#include "host/image/image.h"
+#include <errno.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_SAVE, OPTION_JSON };
+
+static const struct option long_options[] = {
+    {"reference", required_argument, NULL, OPTION_REFERENCE},
+    {"samples", required_argument, NULL, OPTION_SAMPLES},
+    {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"save", required_argument, NULL, OPTION_SAVE},
+    {"json", no_argument, NULL, OPTION_JSON},
+    VARIANT_LONG_OPTIONS,
+    PERTURB_LONG_OPTION,
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint accuracy SCENE... [OPTIONS]\n\n"
+    "Renders each scene in each way asked for, and tells the times beside the errors against a reference.\n\n"
+    "      --reference FILE  linear colors to compare with, .exr or .npy (default: the device's own picture "
+    "at "
+    "double)\n"
+    "      --samples LIST    per pixel, each on its own; the reference takes the most of them (default: 1)\n"
+    "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
+    "      --save FOLDER     write all that is compared there, as .npy\n"
+    "      --json            for programs\n"
+    "      --precision LIST  of fast, single, strict, double (default: all of them)\n";
+
+typedef struct {
+    VariantOptions variants;
+    const char *reference_path, *folder;
+    bool as_json;
+} AccuracyOptions;
+
+typedef struct {
+    AccuracyOptions options;
+    OpenDevice open;
+    VariantSet set;
+    AccuracyLayers reference; // of the scene at work; read from a file: of the only one
+    AccuracyScene *scenes;
+    MessageList messages;
+} Accuracy;
+
+static bool option_take(AccuracyOptions *options, int option, const char *value)
+{
+    bool valid = true;
+    if (variant_option(&options->variants, option, value, &valid)) return valid;
+    switch (option) {
+    case OPTION_REFERENCE:
+        options->reference_path = value;
+        return true;
+    case OPTION_SAVE:
+        options->folder = value;
+        return true;
+    case OPTION_JSON:
+        options->as_json = true;
+        return true;
+    default:
+        return false;
+    }
+}
+
+// EXIT_DONE: go on. *helped: the help was printed, stop.
+static int options_read(AccuracyOptions *options, int argument_count, char **arguments, bool *helped)
+{
+    *options = (AccuracyOptions){.variants = variant_options_default};
+    options->variants.precisions = (1u << PRECISION_COUNT) - 1;
+    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
+        if (option == 'h') {
+            printf("%s%s%s", help_text, variant_options_help, perturb_option_help);
+            *helped = true;
+            return EXIT_DONE;
+        }
+        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
+    }
+    if (optind == argument_count) return option_usage_fault("accuracy", "which scenes?");
+    if (options->reference_path && optind + 1 != argument_count)
+        return option_usage_fault("accuracy", "a reference is for one scene");
+    return EXIT_DONE;
+}
+
+// Before anything is measured. False: told why.
+static bool reference_read(Accuracy *accuracy)
+{
+    const char *path = accuracy->options.reference_path;
+    const RenderSettings *settings = &accuracy->set.variants[0].settings;
+    Image image;
+    double *colors = image_read_doubles(&image, path, &accuracy->messages);
+    if (!colors) return false;
+    const char *fault = image.display         ? "display values; linear light is needed, of an .exr or .npy"
+                        : image.channels != 3 ? "no colors"
+                                              : NULL;
+    if (fault) message_add(&accuracy->messages, MESSAGE_ERROR, "the reference '%s' holds %s", path, fault);
+    bool fits = image.width == settings->width && image.height == settings->height;
+    if (!fault && !fits)
+        message_add(&accuracy->messages, MESSAGE_ERROR,
+                    "the reference '%s' has %ux%u pixels, the pictures have %ux%u", path, image.width,
+                    image.height, settings->width, settings->height);
+    accuracy->reference =
+        (AccuracyLayers){.width = image.width, .height = image.height, .wide = true, .colors = colors};
+    image_free(&image);
+    return !fault && fits;
+}
+
+static float *narrowed(const AccuracyLayers *layers)
+{
+    const size_t count = (size_t)layers->width * layers->height * 3;
+    float *values = memory_allocate(count, sizeof *values);
+    for (size_t i = 0; i < count; i++)
+        values[i] = (float)layers->colors[i];
+    return values;
+}
+
+// The scene's picture in double with the most samples of any variant, unperturbed. EXIT_DONE, or why not.
+static int reference_render(Accuracy *accuracy, AccuracyScene *scene, const Variant *variants)
+{
+    RenderSettings settings = variants[0].settings;
+    settings.precision = PRECISION_DOUBLE;
+    settings.lanes = 0;
+    settings.bvh = BVH_AUTO;
+    settings.perturb_seed = settings.perturb_scale = 0;
+    for (size_t i = 0; i < scene->variant_count; i++)
+        if (variants[i].settings.sample_count > settings.sample_count)
+            settings.sample_count = variants[i].settings.sample_count;
+    Renderer *renderer =
+        renderer_open(&accuracy->open.compute, variants[0].scene, &settings, &accuracy->messages);
+    if (!renderer) return EXIT_USER;
+    bool whole = layers_render(&accuracy->reference, renderer, &settings, scene->light_count);
+    scene->reference.precision = precision_names[settings.precision];
+    scene->reference.bvh = bvh_choice_names[settings.bvh];
+    scene->reference.lanes = renderer_report(renderer)->lanes;
+    scene->reference.samples = settings.sample_count;
+    scene->reference.kernel_hash = renderer_report(renderer)->kernel_hash;
+    renderer_close(renderer);
+    return whole ? EXIT_DONE : EXIT_INTERRUPTED;
+}
+
+static bool is_reference(const AccuracyScene *scene, const AccuracyVariant *variant)
+{
+    return !scene->reference.file && variant->samples == scene->reference.samples &&
+           variant->row->kernel_hash == scene->reference.kernel_hash;
+}
+
+static AccuracyReport report_of(const Accuracy *accuracy)
+{
+    const CommonOptions *common = &accuracy->options.variants.common;
+    return (AccuracyReport){
+        .device = accuracy->open.compute.device,
+        .perturb_seed = common->perturb_seed,
+        .perturb_scale = common->perturb_scale,
+        .scenes = accuracy->scenes,
+        .scene_count = accuracy->set.scene_count,
+        .folder = accuracy->options.folder,
+    };
+}
+
+static bool layers_keep(Accuracy *accuracy, size_t scene, const AccuracyVariant *variant,
+                        const AccuracyLayers *layers)
+{
+    if (!accuracy->options.folder) return true;
+    const AccuracyReport report = report_of(accuracy);
+    Text prefix = {0};
+    accuracy_saved_prefix(&prefix, &report, scene, variant);
+    bool saved = layers_save(layers, text_c(&prefix), &accuracy->messages);
+    text_free(&prefix);
+    return saved;
+}
+
+static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVariant *compared,
+                           const Variant *variant)
+{
+    AccuracyScene *scene = &accuracy->scenes[scene_index];
+    if (!variant->renderer) {
+        compared->status = ACCURACY_UNAVAILABLE;
+        return EXIT_DONE;
+    }
+    AccuracyLayers layers;
+    if (!layers_render(&layers, variant->renderer, &variant->settings, scene->light_count))
+        return EXIT_INTERRUPTED;
+    compared->picture = narrowed(&layers);
+    if (is_reference(scene, compared))
+        compared->status = ACCURACY_REFERENCE;
+    else
+        accuracy_compare(&compared->errors, &accuracy->reference, &scene->edges, &layers,
+                         scene->display_values);
+    bool saved = layers_keep(accuracy, scene_index, compared, &layers);
+    accuracy_layers_free(&layers);
+    return saved ? EXIT_DONE : EXIT_USER;
+}
+
+// Holds the variants of one scene, `first` and on, to its reference.
+static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
+{
+    AccuracyScene *scene = &accuracy->scenes[scene_index];
+    const Variant *variants = &accuracy->set.variants[first];
+    int status = scene->reference.file ? EXIT_DONE : reference_render(accuracy, scene, variants);
+    if (status != EXIT_DONE) return status;
+    const AccuracyLayers *reference = &accuracy->reference;
+    accuracy_count_unsound(reference, &scene->reference.nonfinite, &scene->reference.negative);
+    accuracy_edges_find(&scene->edges, reference);
+    scene->reference.picture = narrowed(reference);
+    if (!layers_keep(accuracy, scene_index, NULL, reference)) status = EXIT_USER;
+    for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++)
+        status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);
+    accuracy_layers_free(&accuracy->reference);
+    if (status == EXIT_DONE) accuracy_judge(scene);
+    return status;
+}
+
+// The scenes' variants, before any is held to anything.
+static void scenes_prepare(Accuracy *accuracy)
+{
+    const VariantSet *set = &accuracy->set;
+    accuracy->scenes = memory_allocate_zeroed(set->scene_count, sizeof *accuracy->scenes);
+    for (size_t i = 0; i < set->count; i++) {
+        AccuracyScene *scene = &accuracy->scenes[set->scene_indices[i]];
+        if (!scene->variants) {
+            const Scene *source = set->variants[i].scene;
+            const RenderSettings *settings = &set->variants[i].settings;
+            scene->path = set->rows[i].key.scene;
+            scene->width = settings->width;
+            scene->height = settings->height;
+            scene->light_count = (uint32_t)source->lights.count;
+            scene->bounce_count = settings->bounce_count;
+            scene->display_values = source->color_meaning == COLORS_DISPLAY;
+            scene->reference.file = accuracy->options.reference_path;
+            scene->variants = memory_allocate_zeroed(set->count, sizeof *scene->variants);
+        }
+        scene->variants[scene->variant_count++] =
+            (AccuracyVariant){.row = &set->rows[i], .samples = set->variants[i].settings.sample_count};
+    }
+}
+
+static bool folder_make(Accuracy *accuracy)
+{
+    const char *folder = accuracy->options.folder;
+    if (!folder || mkdir(folder, 0777) == 0 || errno == EEXIST) return true;
+    message_add(&accuracy->messages, MESSAGE_ERROR, "cannot make the folder '%s': %s", folder,
+                strerror(errno));
+    return false;
+}
+
+static bool has_reference(Accuracy *accuracy)
+{
+    const Device *device = accuracy->open.compute.device;
+    if (accuracy->options.reference_path || device->fp64) return true;
+    message_add(&accuracy->messages, MESSAGE_ERROR,
+                "the device \"%s\" has no 64-bit floating point to make a reference with: name one with "
+                "--reference",
+                device->name);
+    return false;
+}
+
+static int accuracy_run(Accuracy *accuracy)
+{
+    VariantSet *set = &accuracy->set;
+    if (!has_reference(accuracy) || !folder_make(accuracy)) return EXIT_USER;
+    Progress progress;
+    progress_open(&progress, accuracy->options.as_json);
+    bool whole =
+        variant_set_measure(set, &accuracy->options.variants, &accuracy->open.compute, false, &progress);
+    scenes_prepare(accuracy);
+    int status = whole ? EXIT_DONE : EXIT_INTERRUPTED;
+    for (size_t i = 0, first = 0; i < set->scene_count && status == EXIT_DONE; i++) {
+        status = scene_compare(accuracy, i, first);
+        first += accuracy->scenes[i].variant_count;
+    }
+    progress_close(&progress);
+    if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);
+    if (status != EXIT_DONE) return status;
+    const AccuracyReport report = report_of(accuracy);
+    if (accuracy->options.as_json)
+        json_print(accuracy_json(&report), stdout);
+    else
+        accuracy_print_text(&report, stdout);
+    if (variant_set_any_measured(set)) return EXIT_DONE;
+    fputs("glint accuracy: no variant could be rendered\n", stderr);
+    return EXIT_USER;
+}
+
+static void accuracy_close(Accuracy *accuracy)
+{
+    for (size_t i = 0; accuracy->scenes && i < accuracy->set.scene_count; i++)
+        accuracy_scene_free(&accuracy->scenes[i]);
+    free(accuracy->scenes);
+    accuracy_layers_free(&accuracy->reference);
+    variant_set_close(&accuracy->set);
+    messages_tell(&accuracy->messages, NULL);
+}
+
+int command_accuracy(int argument_count, char **arguments)
+{
+    Accuracy accuracy = {0};
+    bool helped = false;
+    int status = options_read(&accuracy.options, argument_count, arguments, &helped);
+    if (status != EXIT_DONE || helped) return status;
+    const AccuracyOptions *options = &accuracy.options;
+    const size_t scene_count = (size_t)(argument_count - optind);
+    status = EXIT_USER;
+    bool opened = variant_set_open(&accuracy.set, &options->variants, arguments + optind, scene_count) &&
+                  (!options->reference_path || reference_read(&accuracy)) &&
+                  device_open(&accuracy.open, options->variants.common.device);
+    if (opened) status = accuracy_run(&accuracy);
+    accuracy_close(&accuracy);
+    if (opened) device_close(&accuracy.open);
+    return status;
+}

@@ -1,0 +1,456 @@
+#include "host/cli/accuracy_report.h"
+
+#include "host/cli/bench_json.h"
+#include "host/cli/version.h"
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+static const char is_reference[] =
+    "it is the reference: the others are held to it, and it has no errors of its own here";
+
+void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
+                           const AccuracyVariant *variant)
+{
+    const char *path = report->scenes[scene].path, *slash = strrchr(path, '/');
+    const char *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    size_t length = dot && dot > name ? (size_t)(dot - name) : strlen(name);
+    text_appendf(text, "%s/%zu-%.*s", report->folder, scene, (int)length, name);
+    if (variant)
+        text_appendf(text, "-%s-%u-%s-%u", variant->row->key.precision, variant->row->key.lanes,
+                     variant->row->key.bvh, variant->samples);
+    else
+        text_appendf(text, "-reference");
+}
+
+void accuracy_variant_name(Text *text, const AccuracyScene *scene, const AccuracyVariant *variant)
+{
+    const BenchKey *key = &variant->row->key;
+    bool lanes = false, bvh = false, samples = false;
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        const AccuracyVariant *other = &scene->variants[i];
+        // precisions may differ in the lanes that are the device's own
+        lanes |=
+            strcmp(other->row->key.precision, key->precision) == 0 && other->row->key.lanes != key->lanes;
+        bvh |= strcmp(other->row->key.bvh, key->bvh) != 0;
+        samples |= other->samples != variant->samples;
+    }
+    text_appendf(text, "%s", key->precision);
+    if (lanes) text_appendf(text, " with %u %s", key->lanes, key->lanes == 1 ? "lane" : "lanes");
+    if (bvh) text_appendf(text, " with hierarchy %s", key->bvh);
+    if (samples)
+        text_appendf(text, " with %u %s", variant->samples, variant->samples == 1 ? "sample" : "samples");
+}
+
+const char *accuracy_crossed_words(const AccuracyVariant *variant, size_t index)
+{
+    static const struct {
+        unsigned fault;
+        const char *words;
+    } faults[] = {
+        {CROSSED_NONFINITE, "pixels that are not finite"},
+        {CROSSED_NEGATIVE, "negative pixels"},
+        {CROSSED_OBJECT, "another object away from the silhouettes"},
+        {CROSSED_SHADOW, "wrong shadows away from the shadows' edges"},
+    };
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
+        if ((variant->crossed_out & faults[i].fault) && index-- == 0) return faults[i].words;
+    return NULL;
+}
+
+static double frame_ms(const AccuracyVariant *variant)
+{
+    return 1e3 * series_summarize(&variant->row->times.frame).median;
+}
+
+void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
+{
+    const AccuracyPick *picked = &scene->picks[pick];
+    text_appendf(text, "for an error of at most %g: ", accuracy_budgets[pick]);
+    if (picked->variant == SIZE_MAX) {
+        text_appendf(text, "none of these");
+        return;
+    }
+    const AccuracyVariant *variant = &scene->variants[picked->variant];
+    accuracy_variant_name(text, scene, variant);
+    text_appendf(text, ", %.3g ms", frame_ms(variant));
+    if (variant->status == ACCURACY_REFERENCE) {
+        text_appendf(text, ", the reference itself");
+        return;
+    }
+    text_appendf(text, ", %.2g", accuracy_figure(variant, picked->measure).value);
+    size_t objects = variant->errors.object.edge, shadows = variant->errors.shadow.edge;
+    if (objects > 0)
+        text_appendf(text, "; %zu %s at silhouettes %s another object", objects,
+                     objects == 1 ? "pixel" : "pixels", objects == 1 ? "shows" : "show");
+    if (shadows > 0) text_appendf(text, "; %zu wrong at the edges of shadows", shadows);
+}
+
+static const char table_head[] =
+    "                              frame   wrong object   wrong shadow     wrong path          shading"
+    "             t     normal  picture   8-bit values         FLIP\n"
+    "  precision lanes bvh  samp.     ms   edge    away   edge    away   edge    away     RMSE      max"
+    "   99.9% ulp   99.9%       dB  off 1   more     mean    max\n";
+
+static void count_print(EdgeCount count, FILE *stream)
+{
+    fprintf(stream, " %6zu %7zu", count.edge, count.away);
+}
+
+static void errors_print(const AccuracyErrors *errors, FILE *stream)
+{
+    if (errors->why_colors_only) {
+        fprintf(stream, " %6s %7s %6s %7s %6s %7s  %7s  %7s  %10s %8s", "-", "-", "-", "-", "-", "-", "-",
+                "-", "-", "-");
+    } else {
+        count_print(errors->object, stream);
+        count_print(errors->shadow, stream);
+        count_print(errors->path, stream);
+        fprintf(stream, "  %7.1e  %7.1e  %10.3g %8.1e", errors->shading.rmse, errors->shading.largest,
+                errors->t_ulps.percentile_999, errors->normal.percentile_999);
+    }
+    fprintf(stream, " %8.1f %6zu %6zu  %7.1e %6.3f\n", errors->image.psnr, errors->display.off_by_1,
+            errors->display.off_by_more, errors->display.flip_mean, errors->display.flip_max);
+}
+
+static void crossed_print(const AccuracyVariant *variant, FILE *stream)
+{
+    if (variant->crossed_out == 0) return;
+    fputs("            crossed out:", stream);
+    const char *words;
+    for (size_t i = 0; (words = accuracy_crossed_words(variant, i)); i++)
+        fprintf(stream, "%s %s", i > 0 ? "," : "", words);
+    if (variant->crossed_out & (CROSSED_NONFINITE | CROSSED_NEGATIVE))
+        fprintf(stream, " (%zu not finite, %zu negative)", variant->errors.nonfinite,
+                variant->errors.negative);
+    fputc('\n', stream);
+}
+
+static void variant_print(const AccuracyVariant *variant, FILE *stream)
+{
+    const BenchKey *key = &variant->row->key;
+    fprintf(stream, "%c %-9s %5u %-4s %5u", variant->crossed_out ? 'x' : ' ', key->precision, key->lanes,
+            key->bvh, variant->samples);
+    if (variant->status == ACCURACY_UNAVAILABLE) {
+        fprintf(stream, "  cannot be had: %s\n", variant->row->failure);
+        return;
+    }
+    fprintf(stream, " %6.4g", frame_ms(variant));
+    if (variant->status == ACCURACY_REFERENCE)
+        fputs("  the reference, which the others are held to\n", stream);
+    else
+        errors_print(&variant->errors, stream);
+    crossed_print(variant, stream);
+}
+
+static void reference_print(const AccuracyScene *scene, FILE *stream)
+{
+    if (scene->reference.file)
+        fprintf(stream, "  reference: %s, colors only", scene->reference.file);
+    else
+        fprintf(stream, "  reference: %s, %u lanes, %u %s; %zu pixels at silhouettes",
+                scene->reference.precision, scene->reference.lanes, scene->reference.samples,
+                scene->reference.samples == 1 ? "sample" : "samples", scene->edges.silhouette_pixels);
+    if (scene->reference.nonfinite + scene->reference.negative > 0)
+        fprintf(stream, "; %zu of its pixels are not finite, %zu negative", scene->reference.nonfinite,
+                scene->reference.negative);
+    fputc('\n', stream);
+}
+
+static void kernels_print(const AccuracyScene *scene, FILE *stream)
+{
+    fputs("  kernels:", stream);
+    for (size_t i = 0, told = 0; i < scene->variant_count; i++) {
+        const AccuracyVariant *variant = &scene->variants[i];
+        if (variant->status == ACCURACY_UNAVAILABLE) continue;
+        Text name = {0};
+        accuracy_variant_name(&name, scene, variant);
+        fprintf(stream, "%s %s %016" PRIx64, told++ > 0 ? "," : "", text_c(&name), variant->row->kernel_hash);
+        text_free(&name);
+    }
+    fputc('\n', stream);
+}
+
+void accuracy_print_text(const AccuracyReport *report, FILE *stream)
+{
+    const Device *device = report->device;
+    fprintf(stream, "%s, %s %s\n", device->name, device->platform_name, device->driver);
+    if (report->perturb_seed > 0)
+        fprintf(stream, "every variant errs as devices may: --perturb %u:%u\n", report->perturb_seed,
+                report->perturb_scale);
+    for (size_t i = 0; i < report->scene_count; i++) {
+        const AccuracyScene *scene = &report->scenes[i];
+        fprintf(stream, "\n%s, %ux%u\n", scene->path, scene->width, scene->height);
+        reference_print(scene, stream);
+        fputs(table_head, stream);
+        for (size_t k = 0; k < scene->variant_count; k++)
+            variant_print(&scene->variants[k], stream);
+        kernels_print(scene, stream);
+        for (size_t k = 0; k < BUDGET_COUNT; k++) {
+            Text sentence = {0};
+            accuracy_pick_sentence(&sentence, scene, k);
+            fprintf(stream, "  %s\n", text_c(&sentence));
+            text_free(&sentence);
+        }
+    }
+}
+
+static void absent_json(Json *json, const char *key, const char *reason)
+{
+    json_begin_object(json, key);
+    unavailable_json(json, reason);
+    json_end(json);
+}
+
+static void color_json(Json *json, const char *key, const double color[3])
+{
+    json_begin_array(json, key);
+    for (size_t i = 0; i < 3; i++)
+        json_number(json, NULL, color[i]);
+    json_end(json);
+}
+
+static void saved_json(Json *json, const AccuracyReport *report, size_t scene, const AccuracyVariant *variant)
+{
+    if (!report->folder) return;
+    Text prefix = {0};
+    accuracy_saved_prefix(&prefix, report, scene, variant);
+    json_text(json, "saved", text_c(&prefix));
+    text_free(&prefix);
+}
+
+static void reference_json(Json *json, const AccuracyReport *report, size_t index)
+{
+    const AccuracyScene *scene = &report->scenes[index];
+    json_begin_object(json, "reference");
+    json_text(json, "kind", scene->reference.file ? "file" : "render");
+    if (scene->reference.file) {
+        json_text(json, "file", scene->reference.file);
+    } else {
+        json_text(json, "precision", scene->reference.precision);
+        json_integer(json, "lanes", scene->reference.lanes);
+        json_text(json, "bvh", scene->reference.bvh);
+        json_integer(json, "samples", scene->reference.samples);
+        kernel_hash_json(json, scene->reference.kernel_hash);
+    }
+    json_integer(json, "nonfinite", (int64_t)scene->reference.nonfinite);
+    json_integer(json, "negative", (int64_t)scene->reference.negative);
+    saved_json(json, report, index, NULL);
+    json_end(json);
+
+    json_begin_object(json, "edges");
+    if (scene->reference.file) {
+        unavailable_json(json, "the reference has colors only");
+    } else {
+        json_integer(json, "silhouette", (int64_t)scene->edges.silhouette_pixels);
+        json_begin_array(json, "shadow");
+        for (uint32_t i = 0; i < scene->light_count; i++)
+            json_integer(json, NULL, (int64_t)scene->edges.shadow_edge_pixels[i]);
+        json_end(json);
+        json_integer(json, "path", (int64_t)scene->edges.path_pixels);
+    }
+    json_end(json);
+}
+
+static void count_json(Json *json, const char *key, EdgeCount count)
+{
+    json_begin_object(json, key);
+    json_integer(json, "edge", (int64_t)count.edge);
+    json_integer(json, "away", (int64_t)count.away);
+    json_end(json);
+}
+
+static void extent_json(Json *json, const char *key, Extent extent)
+{
+    if (key) json_begin_object(json, key);
+    json_number(json, "max", extent.largest);
+    json_number(json, "p99_9", extent.percentile_999);
+    if (key) json_end(json);
+}
+
+static void kinds_json(Json *json, const AccuracyErrors *errors)
+{
+    count_json(json, "object", errors->object);
+    count_json(json, "shadow", errors->shadow);
+    count_json(json, "path", errors->path);
+    if (errors->shading_pixels > 0) {
+        json_begin_object(json, "shading");
+        json_integer(json, "pixels", (int64_t)errors->shading_pixels);
+        json_number(json, "max", errors->shading.largest);
+        json_number(json, "rmse", errors->shading.rmse);
+        json_number(json, "p99_9", errors->shading.percentile_999);
+        json_number(json, "bias", errors->shading.bias);
+        json_end(json);
+    } else {
+        absent_json(json, "shading", "no pixel shows a surface in the same way");
+    }
+    if (errors->surface_pixels > 0) {
+        json_begin_object(json, "t");
+        json_integer(json, "pixels", (int64_t)errors->surface_pixels);
+        extent_json(json, "relative", errors->t_relative);
+        extent_json(json, "ulps", errors->t_ulps);
+        json_end(json);
+        json_begin_object(json, "normal");
+        json_integer(json, "pixels", (int64_t)errors->surface_pixels);
+        extent_json(json, NULL, errors->normal);
+        json_end(json);
+    } else {
+        absent_json(json, "t", "no pixel shows the same object");
+        absent_json(json, "normal", "no pixel shows the same object");
+    }
+}
+
+static void errors_json(Json *json, const AccuracyErrors *errors)
+{
+    json_begin_object(json, "errors");
+    json_integer(json, "nonfinite", (int64_t)errors->nonfinite);
+    json_integer(json, "negative", (int64_t)errors->negative);
+    if (errors->why_colors_only)
+        for (unsigned kind = 0; kind < ACCURACY_IMAGE; kind++)
+            absent_json(json, accuracy_kind_names[kind], errors->why_colors_only);
+    else
+        kinds_json(json, errors);
+    const ImageMetrics *display = &errors->display;
+    json_begin_object(json, "image");
+    json_number(json, "rmse", errors->image.rmse);
+    json_number(json, "psnr", errors->image.psnr);
+    json_number(json, "rel_mse", errors->image.rel_mse);
+    json_number(json, "srgb_psnr", display->srgb_psnr);
+    json_integer(json, "off_by_1", (int64_t)display->off_by_1);
+    json_integer(json, "off_by_more", (int64_t)display->off_by_more);
+    json_number(json, "flip_mean", display->flip_mean);
+    json_number(json, "flip_max", display->flip_max);
+    json_end(json);
+    json_end(json);
+}
+
+static void worst_json(Json *json, AccuracyKind kind, const AccuracyWorst *worst)
+{
+    const char *name = accuracy_kind_names[kind];
+    if (!worst->found) {
+        json_null(json, name);
+        return;
+    }
+    json_begin_object(json, name);
+    json_integer(json, "x", worst->x);
+    json_integer(json, "y", worst->y);
+    if (kind <= ACCURACY_PATH) json_boolean(json, "away", worst->away);
+    if (kind == ACCURACY_SHADOW) json_integer(json, "light", worst->light);
+    json_number(json, "error", worst->error);
+    if (kind != ACCURACY_NORMAL) {
+        json_number(json, "reference", worst->reference);
+        json_number(json, "variant", worst->variant);
+    }
+    color_json(json, "reference_color", worst->reference_color);
+    color_json(json, "variant_color", worst->variant_color);
+    json_end(json);
+}
+
+static void measured_json(Json *json, const AccuracyVariant *variant)
+{
+    json_boolean(json, "crossed_out", variant->crossed_out != 0);
+    json_begin_array(json, "why");
+    const char *words;
+    for (size_t i = 0; (words = accuracy_crossed_words(variant, i)); i++)
+        json_text(json, NULL, words);
+    json_end(json);
+    errors_json(json, &variant->errors);
+    json_begin_object(json, "worst");
+    for (unsigned kind = 0; kind < ACCURACY_FLIP; kind++)
+        worst_json(json, (AccuracyKind)kind, &variant->errors.worst[kind]);
+    json_end(json);
+    json_begin_object(json, "pareto");
+    for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
+        if (!accuracy_figure(variant, (AccuracyKind)kind).why_not)
+            json_boolean(json, accuracy_kind_names[kind], variant->pareto >> kind & 1);
+    json_end(json);
+}
+
+static void variant_json(Json *json, const AccuracyReport *report, size_t scene,
+                         const AccuracyVariant *variant)
+{
+    const BenchKey *key = &variant->row->key;
+    json_begin_object(json, NULL);
+    json_text(json, "precision", key->precision);
+    json_integer(json, "lanes", key->lanes);
+    json_text(json, "bvh", key->bvh);
+    json_integer(json, "samples", variant->samples);
+    json_text(json, "status", accuracy_status_names[variant->status]);
+    if (variant->status == ACCURACY_UNAVAILABLE) json_text(json, "reason", variant->row->failure);
+    if (variant->status == ACCURACY_REFERENCE) json_text(json, "reason", is_reference);
+    if (variant->status != ACCURACY_UNAVAILABLE) {
+        kernel_hash_json(json, variant->row->kernel_hash);
+        times_json(json, variant->row);
+        rays_json(json, variant->row);
+        saved_json(json, report, scene, variant);
+    }
+    if (variant->status == ACCURACY_MEASURED) measured_json(json, variant);
+    json_end(json);
+}
+
+static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
+{
+    const AccuracyPick *pick = &scene->picks[index];
+    json_begin_object(json, NULL);
+    json_number(json, "budget", accuracy_budgets[index]);
+    json_text(json, "measure", accuracy_kind_names[pick->measure]);
+    if (pick->variant == SIZE_MAX) {
+        json_null(json, "variant");
+    } else {
+        const AccuracyVariant *variant = &scene->variants[pick->variant];
+        Figure error = accuracy_figure(variant, pick->measure);
+        json_integer(json, "variant", (int64_t)pick->variant);
+        if (error.why_not)
+            json_null(json, "error");
+        else
+            json_number(json, "error", error.value);
+        json_number(json, "frame_ms", frame_ms(variant));
+    }
+    Text sentence = {0};
+    accuracy_pick_sentence(&sentence, scene, index);
+    json_text(json, "text", text_c(&sentence));
+    text_free(&sentence);
+    json_end(json);
+}
+
+static void scene_json(Json *json, const AccuracyReport *report, size_t index)
+{
+    const AccuracyScene *scene = &report->scenes[index];
+    json_begin_object(json, NULL);
+    json_text(json, "scene", scene->path);
+    size_json(json, scene->width, scene->height);
+    json_integer(json, "pixels", (int64_t)scene->width * scene->height);
+    json_integer(json, "bounces", scene->bounce_count);
+    json_integer(json, "lights", scene->light_count);
+    reference_json(json, report, index);
+    json_begin_array(json, "variants");
+    for (size_t i = 0; i < scene->variant_count; i++)
+        variant_json(json, report, index, &scene->variants[i]);
+    json_end(json);
+    json_begin_array(json, "picks");
+    for (size_t i = 0; i < BUDGET_COUNT; i++)
+        pick_json(json, scene, i);
+    json_end(json);
+    json_end(json);
+}
+
+Json *accuracy_json(const AccuracyReport *report)
+{
+    Json *json = json_open();
+    json_integer(json, "schema", 1);
+    json_text(json, "glint", glint_version());
+    json_begin_object(json, "device");
+    device_json(json, report->device);
+    json_end(json);
+    if (report->perturb_seed > 0) {
+        json_begin_object(json, "perturb");
+        json_integer(json, "seed", report->perturb_seed);
+        json_integer(json, "scale", report->perturb_scale);
+        json_end(json);
+    }
+    json_begin_array(json, "scenes");
+    for (size_t i = 0; i < report->scene_count; i++)
+        scene_json(json, report, i);
+    json_end(json);
+    return json;
+}
