@@ -1,0 +1,354 @@
+// The errors of pictures made by hand, in which the count of each kind is known, and what follows from errors
+// and times. tests/accuracy.sh holds the same figures of rendered pictures to those of an independent script.
+#include "host/measure/accuracy.h"
+
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 12, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, LIGHTS = 2, NOTHING_FROM = 10 };
+
+static void assert_near(double value, double expected, double tolerance)
+{
+    if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g", value, expected);
+}
+
+static void *array_of(size_t count, size_t size)
+{
+    void *array = calloc(count, size);
+    assert_non_null(array);
+    return array;
+}
+
+static size_t at(size_t x, size_t y)
+{
+    return y * WIDTH + x;
+}
+
+// Object 0 in the left half, 1 in the right one, nothing from column NOTHING_FROM on; the lower half lies in
+// the shadow of light 0. Gray 0.5, 8 away, seen along z.
+static AccuracyLayers layers_make(void)
+{
+    AccuracyLayers layers = {
+        .width = WIDTH,
+        .height = HEIGHT,
+        .light_count = LIGHTS,
+        .colors = array_of(PIXELS, 3 * sizeof(double)),
+        .t = array_of(PIXELS, sizeof(double)),
+        .normal = array_of(PIXELS, 3 * sizeof(double)),
+        .object = array_of(PIXELS, sizeof(uint32_t)),
+        .shadow = array_of(PIXELS, LIGHTS * sizeof(uint32_t)),
+        .path = array_of(PIXELS, sizeof(uint32_t)),
+    };
+    for (size_t i = 0; i < PIXELS; i++) {
+        size_t x = i % WIDTH, y = i / WIDTH;
+        bool nothing = x >= NOTHING_FROM;
+        for (size_t k = 0; k < 3; k++)
+            layers.colors[3 * i + k] = 0.5;
+        layers.t[i] = nothing ? (double)INFINITY : 8;
+        layers.normal[3 * i + 2] = nothing ? 0 : 1;
+        layers.object[i] = nothing ? UINT32_MAX : x < WIDTH / 2 ? 0 : 1;
+        layers.shadow[LIGHTS * i] = y >= HEIGHT / 2 && !nothing;
+        layers.path[i] = layers.object[i] + 77;
+    }
+    return layers;
+}
+
+static AccuracyErrors compare(const AccuracyLayers *reference, const AccuracyLayers *variant)
+{
+    AccuracyEdges edges;
+    AccuracyErrors errors;
+    accuracy_edges_find(&edges, reference);
+    accuracy_compare(&errors, reference, &edges, variant, false);
+    accuracy_edges_free(&edges);
+    return errors;
+}
+
+static void test_edges(void **state)
+{
+    (void)state;
+    AccuracyLayers layers = layers_make();
+    AccuracyEdges edges;
+    accuracy_edges_find(&edges, &layers);
+    // columns 4 to 7 and 8 to 11
+    assert_int_equal(edges.silhouette_pixels, 8 * HEIGHT);
+    assert_int_equal(edges.path_pixels, 8 * HEIGHT);
+    for (size_t y = 0; y < HEIGHT; y++)
+        for (size_t x = 0; x < WIDTH; x++) {
+            assert_int_equal(edges.silhouette[at(x, y)], x >= 4);
+            // rows 2 to 5, where something is hit, and around the lower end of what is
+            bool shadow = (y >= 2 && y <= 5 && x <= NOTHING_FROM) || (y >= 3 && x >= NOTHING_FROM - 2);
+            assert_int_equal(edges.shadow[LIGHTS * at(x, y)], shadow);
+            assert_false(edges.shadow[LIGHTS * at(x, y) + 1]);
+        }
+    assert_int_equal(edges.shadow_edge_pixels[1], 0);
+    accuracy_edges_free(&edges);
+
+    // a lone pixel in a corner: itself and its two neighbors differ, and what is around these three
+    memset(layers.object, 0, PIXELS * sizeof *layers.object);
+    layers.object[0] = 5;
+    accuracy_edges_find(&edges, &layers);
+    assert_int_equal(edges.silhouette_pixels, 8);
+    assert_true(edges.silhouette[at(2, 1)] && edges.silhouette[at(1, 2)] && !edges.silhouette[at(2, 2)]);
+    accuracy_edges_free(&edges);
+    accuracy_layers_free(&layers);
+}
+
+static void test_equal(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    AccuracyErrors errors = compare(&reference, &variant);
+    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT);
+    assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT);
+    assert_int_equal(errors.image.count, 3 * PIXELS);
+    assert_true(errors.shading.rmse == 0 && errors.image.rmse == 0 && isinf(errors.image.psnr));
+    assert_true(errors.t_relative.largest == 0 && errors.normal.largest == 0);
+    for (size_t kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
+        assert_false(errors.worst[kind].found);
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_wrong_objects(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    variant.object[at(5, 0)] = 1;
+    variant.object[at(7, 6)] = UINT32_MAX;
+    variant.colors[3 * at(5, 0)] = 0.9;
+    AccuracyErrors errors = compare(&reference, &variant);
+    assert_int_equal(errors.object.edge, 2);
+    assert_int_equal(errors.object.away, 0);
+    assert_int_equal(accuracy_faults(&errors), 0);
+    const AccuracyWorst *worst = &errors.worst[ACCURACY_OBJECT];
+    assert_true(worst->found && worst->x == 5 && worst->y == 0 && !worst->away);
+    assert_true(worst->reference == 0 && worst->variant == 1);
+    assert_near(worst->error, 0.4, 1e-15);
+
+    // a leak, whose color is less far off
+    variant.object[at(1, 1)] = UINT32_MAX;
+    variant.colors[3 * at(1, 1) + 2] = 0.4;
+    // what else is wrong there does not count: it is another object
+    variant.shadow[LIGHTS * at(1, 1) + 1] = 1;
+    variant.path[at(1, 1)] = 3;
+    variant.t[at(1, 1)] = (double)INFINITY;
+    errors = compare(&reference, &variant);
+    assert_int_equal(errors.object.edge, 2);
+    assert_int_equal(errors.object.away, 1);
+    assert_int_equal(errors.shadow.edge + errors.shadow.away + errors.path.edge + errors.path.away, 0);
+    assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT - 3);
+    assert_true(errors.t_relative.largest == 0 && errors.shading.largest == 0);
+    assert_near(errors.image.largest, 0.4, 1e-15);
+    assert_int_equal(accuracy_faults(&errors), CROSSED_OBJECT);
+    assert_true(worst->x == 1 && worst->y == 1 && worst->away && worst->variant == (double)UINT32_MAX);
+    assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_wrong_shadows(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    variant.shadow[LIGHTS * at(0, 3)] = 1; // at light 0's edge
+    variant.colors[3 * at(0, 3)] = 0;
+    AccuracyErrors errors = compare(&reference, &variant);
+    assert_int_equal(errors.shadow.edge, 1);
+    assert_int_equal(errors.shadow.away, 0);
+    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 1);
+    assert_true(errors.shading.largest == 0);
+
+    variant.shadow[LIGHTS * at(0, 3) + 1] = 1; // no edge of light 1
+    variant.shadow[LIGHTS * at(2, 7)] = 0;     // acne, or light behind a wall
+    errors = compare(&reference, &variant);
+    assert_int_equal(errors.shadow.edge, 1);
+    assert_int_equal(errors.shadow.away, 2);
+    assert_int_equal(accuracy_faults(&errors), CROSSED_SHADOW);
+    const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];
+    assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_wrong_paths(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    variant.path[at(6, 1)] = 1;
+    variant.path[at(1, 1)] = 2;
+    variant.path[at(2, 1)] = 2;
+    variant.colors[3 * at(2, 1) + 1] = 0.75;
+    AccuracyErrors errors = compare(&reference, &variant);
+    assert_int_equal(errors.path.edge, 1);
+    assert_int_equal(errors.path.away, 2);
+    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 3);
+    assert_true(errors.shading.largest == 0 && errors.worst[ACCURACY_PATH].x == 2);
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_shading(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    variant.colors[3 * at(0, 0)] += 0.25;
+    variant.colors[3 * at(3, 4) + 2] -= 0.125;
+    variant.colors[3 * at(11, 4)] += 0.375; // the background is no shading
+    AccuracyErrors errors = compare(&reference, &variant);
+    const double values = 3.0 * NOTHING_FROM * HEIGHT, squares = 0.25 * 0.25 + 0.125 * 0.125;
+    assert_near(errors.shading.largest, 0.25, 0);
+    assert_near(errors.shading.rmse, sqrt(squares / values), 1e-16);
+    assert_near(errors.shading.bias, 0.125 / values, 1e-16);
+    assert_near(errors.shading.percentile_999, 0.25, 0); // of 240 values all are 99.9 %
+    assert_near(errors.image.rmse, sqrt((squares + 0.375 * 0.375) / (3.0 * PIXELS)), 1e-16);
+    const AccuracyWorst *worst = errors.worst;
+    assert_true(worst[ACCURACY_SHADING].x == 0 && worst[ACCURACY_SHADING].variant == 0.75);
+    assert_true(worst[ACCURACY_IMAGE].x == 11 && worst[ACCURACY_IMAGE].y == 4);
+    assert_int_equal(errors.display.off_by_more, 3);
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_distances_and_normals(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    variant.t[at(2, 2)] = 8 + 3 * 8 * (double)FLT_EPSILON;
+    // 10 degrees about y, and a tiny angle that the cosine cannot show
+    const double angle = acos(-1) / 18, tiny = 1e-12;
+    double *normal = variant.normal + 3 * at(4, 4);
+    normal[0] = sin(angle), normal[2] = cos(angle);
+    variant.normal[3 * at(5, 4) + 1] = tiny;
+    AccuracyErrors errors = compare(&reference, &variant);
+    assert_near(errors.t_relative.largest, 3 * (double)FLT_EPSILON, 1e-22);
+    assert_near(errors.t_ulps.largest, 3, 1e-12);
+    assert_near(errors.normal.largest, angle, 1e-15);
+    assert_true(errors.worst[ACCURACY_T].x == 2 && errors.worst[ACCURACY_NORMAL].x == 4);
+    normal[0] = 0, normal[2] = 1;
+    assert_near(compare(&reference, &variant).normal.largest, tiny, 1e-24);
+
+    // in units of double, where it was computed in double
+    variant.wide = true;
+    variant.t[at(2, 2)] = 8 + 8 * DBL_EPSILON;
+    assert_near(compare(&reference, &variant).t_ulps.largest, 1, 0);
+    // no number is as far off as can be
+    variant.t[at(2, 2)] = (double)NAN;
+    normal[0] = (double)NAN;
+    errors = compare(&reference, &variant);
+    assert_true(isinf(errors.t_relative.largest) && isinf(errors.normal.largest));
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_unsound_pixels(void **state)
+{
+    (void)state;
+    AccuracyLayers reference = layers_make(), variant = layers_make();
+    variant.colors[3 * at(3, 3)] = (double)NAN;
+    variant.colors[3 * at(3, 3) + 1] = -1; // counts for both
+    variant.colors[3 * at(4, 3) + 2] = -(double)INFINITY;
+    variant.colors[3 * at(5, 3) + 2] = -0.0;
+    AccuracyErrors errors = compare(&reference, &variant);
+    assert_int_equal(errors.nonfinite, 2);
+    assert_int_equal(errors.negative, 2);
+    assert_int_equal(accuracy_faults(&errors), CROSSED_NONFINITE | CROSSED_NEGATIVE);
+    assert_int_equal(errors.image.count, 3 * PIXELS - 2);
+    assert_true(isfinite(errors.image.rmse) && isfinite(errors.display.flip_mean));
+    assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);
+    accuracy_layers_free(&reference);
+    accuracy_layers_free(&variant);
+}
+
+static void test_colors_only(void **state)
+{
+    (void)state;
+    AccuracyLayers variant = layers_make(), source = layers_make();
+    AccuracyLayers reference = {.width = WIDTH, .height = HEIGHT, .colors = source.colors};
+    variant.colors[3 * at(3, 3)] = 0.75;
+    AccuracyVariant compared = {.errors = compare(&reference, &variant)};
+    assert_non_null(compared.errors.why_colors_only);
+    assert_non_null(accuracy_figure(&compared, ACCURACY_OBJECT).why_not);
+    assert_non_null(accuracy_figure(&compared, ACCURACY_SHADING).why_not);
+    assert_near(accuracy_figure(&compared, ACCURACY_IMAGE).value, 0.25 / sqrt(3.0 * PIXELS), 1e-16);
+    assert_null(accuracy_figure(&compared, ACCURACY_FLIP).why_not);
+    accuracy_layers_free(&source);
+    accuracy_layers_free(&variant);
+}
+
+enum { VARIANTS = 5 };
+
+static void test_judgement(void **state)
+{
+    (void)state;
+    // time of a frame, RMSE of the shading, leaks
+    static const struct {
+        double seconds, rmse;
+        size_t leaks;
+    } given[VARIANTS] = {{1, 1e-5, 3}, {2, 1e-3, 0}, {3, 1e-5, 0}, {4, 1e-4, 0}, {9, 0, 0}};
+    BenchRow rows[VARIANTS] = {0};
+    AccuracyScene scene = {.variants = array_of(VARIANTS, sizeof(AccuracyVariant)),
+                           .variant_count = VARIANTS};
+    for (size_t i = 0; i < VARIANTS; i++) {
+        series_add(&rows[i].times.frame, given[i].seconds);
+        scene.variants[i] = (AccuracyVariant){.row = &rows[i]};
+        scene.variants[i].errors.shading.rmse = given[i].rmse;
+        scene.variants[i].errors.shading_pixels = 1;
+        scene.variants[i].errors.object.away = given[i].leaks;
+    }
+    scene.variants[4].status = ACCURACY_REFERENCE;
+    accuracy_judge(&scene);
+    const unsigned shading = 1u << ACCURACY_SHADING;
+    assert_int_equal(scene.variants[0].crossed_out, CROSSED_OBJECT);
+    assert_int_equal(scene.variants[0].pareto, 0);
+    assert_true(scene.variants[1].pareto & shading);
+    assert_true(scene.variants[2].pareto & shading);
+    assert_false(scene.variants[3].pareto & shading); // slower than the third and worse
+    assert_int_equal(scene.variants[4].pareto, 0);
+    // all but the first have no wrong object: only the fastest of them is on that front
+    assert_true(scene.variants[1].pareto & 1u << ACCURACY_OBJECT);
+    assert_false(scene.variants[2].pareto & 1u << ACCURACY_OBJECT);
+    assert_int_equal(scene.picks[0].measure, ACCURACY_SHADING);
+    assert_int_equal(scene.picks[0].variant, 1);
+    assert_int_equal(scene.picks[1].variant, 2);
+    assert_int_equal(scene.picks[2].variant, 4);
+
+    // a reference that is faster than all leaves nothing to pick but itself
+    rows[4].times.frame.items[0] = 0.5;
+    accuracy_judge(&scene);
+    assert_int_equal(scene.picks[0].variant, 4);
+    assert_int_equal(scene.variants[1].pareto | scene.variants[2].pareto, 0);
+
+    // no reference among them, and none exact enough
+    scene.variants[4].status = ACCURACY_UNAVAILABLE;
+    accuracy_judge(&scene);
+    assert_true(scene.picks[2].variant == SIZE_MAX);
+    for (size_t i = 0; i < VARIANTS; i++)
+        bench_times_free(&rows[i].times);
+    accuracy_scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_edges),
+        cmocka_unit_test(test_equal),
+        cmocka_unit_test(test_wrong_objects),
+        cmocka_unit_test(test_wrong_shadows),
+        cmocka_unit_test(test_wrong_paths),
+        cmocka_unit_test(test_shading),
+        cmocka_unit_test(test_distances_and_normals),
+        cmocka_unit_test(test_unsound_pixels),
+        cmocka_unit_test(test_colors_only),
+        cmocka_unit_test(test_judgement),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
