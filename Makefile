@@ -80,13 +80,29 @@ $(BUILD)/peers/embree: $(embree_sources) $(embree_headers) Makefile
 	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp-simd $(embree_sources) \
 	    -lembree3 -lm -lpthread -o $@
 
+# make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are
+# installed (docs/performance.md), half an hour of a machine that does nothing else.
+ROUNDS        ?= 3
+RUNGS         ?=
+SPD           ?=
+PEERS_SCENES  ?= $(BUILD)/peers/scenes
+PEERS_OPTIONS ?= --whole
+PEERS_JSON    ?= docs/measurements/bench-peers.json
+has_embree := $(wildcard /usr/include/embree3/rtcore.h)
+
+bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree)
+	tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
+	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS)
+	$(if $(SPD),tools/peers/compare --glint $(BUILD)/glint --runs $(ROUNDS) --size 1024x1024 \
+	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
+
 # Pinned to one release of clang's tools: what they ask for changes with each.
 CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 linted := $(sources) $(test_programs) $(test_helpers) \
-          $(if $(wildcard /usr/include/embree3/rtcore.h),$(embree_sources))
+          $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(kernels) $(wildcard host/*/*.h tests/*.h tests/oracle/*.h) $(embree_sources) $(embree_headers)
 
@@ -130,7 +146,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test format lint lint-format lint-tidy lint-cppcheck lint-man install uninstall clean FORCE
+.PHONY: all tests test bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(objects:.o=.d) $(tests:=.d) $(test_objects:.o=.d)

@@ -1,0 +1,53 @@
+"""Runs programs, and compares the pictures that they leave."""
+import collections
+import concurrent.futures
+import operator
+import os
+import subprocess
+import tempfile
+import time
+
+
+def apart(function, *arguments):
+    """In a process of its own: Linux counts what this one has held into the peak of the programs that it starts."""
+    with concurrent.futures.ProcessPoolExecutor(1) as child:
+        return child.submit(function, *arguments).result()
+
+
+def run_once(command, environment=None):
+    """Seconds from start to end, peak bytes, and what was printed."""
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
+        start = time.monotonic()
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=errors, env=environment)
+        _, status, usage = os.wait4(process.pid, 0)
+        seconds = time.monotonic() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        texts = []
+        for stream in out, errors:
+            stream.seek(0)
+            texts.append(stream.read())
+    if process.returncode != 0:
+        raise RuntimeError(f"{' '.join(map(str, command))}: exit status {process.returncode}: {texts[1][-2000:]}")
+    return seconds, usage.ru_maxrss * 1024, *texts
+
+
+def read_ppm(path):
+    """The bytes of a picture of 8 bits a channel."""
+    content, at, words = path.read_bytes(), 0, []
+    while len(words) < 4:
+        end = content.index(b"\n", at)
+        words += content[at:end].split(b"#")[0].split()
+        at = end + 1
+    assert words[0] == b"P6" and words[3] == b"255" and len(content) - at == 3 * int(words[1]) * int(words[2]), path
+    return content[at:]
+
+
+def picture_difference(path, other_path):
+    """Mean and largest absolute difference in 255ths; which part of all channels is off by more than 16 of them, and
+    which part of the pixels by more than 2 in some channel."""
+    off = bytes(map(abs, map(operator.sub, read_ppm(path), read_ppm(other_path))))
+    worst = bytes(map(max, off[0::3], off[1::3], off[2::3]))
+    channels, pixels = collections.Counter(off), collections.Counter(worst)
+    return {"mean": sum(value * count for value, count in channels.items()) / len(off), "max": max(channels),
+            "far": sum(count for value, count in channels.items() if value > 16) / len(off),
+            "pixels_off": sum(count for value, count in pixels.items() if value > 2) / len(worst)}
