@@ -10,37 +10,84 @@
 // Whether intersections use the compensated forms.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
 
-// Correctly rounded at `strict` on every device. Where the device promises only 2.5 ulp (REPAIRS_DIVIDE), one
-// Newton step on the reciprocal and a last step on the quotient's exact remainder make it so (Markstein,
-// Computation of elementary functions on the IBM RISC System/6000 processor, 1990, section 3). A quotient of
-// 0 or beyond the range is left as the device gives it.
+// Where a device's own quotients and roots are inexact (REPAIRS_DIVIDE, at `strict`, in floats) they are
+// taken of the operands' mantissas alone, so that nothing on the way is too large or too small, brought
+// within an ulp by a Newton step, and then chosen among three neighbors by comparisons that are exact. A
+// Newton step cannot choose: of 1 - 2^-24 the root lies 2^-27 ulp from the middle between two floats.
+#define EXPONENT_BITS ((integer)(0x7f800000))
+#define SIGN_BIT      ((integer)(~0x7fffffff))
+#define BITS_OF_ONE   ((integer)(0x3f800000))
+
+static inline mask real_is_normal(real a)
+{
+    return (fabs(a) >= (real)(0x1p-126f)) & (fabs(a) <= (real)(LARGEST));
+}
+
+static inline real real_power_of_two(integer exponent)
+{
+    return real_from_bits(BITS_OF_ONE + (exponent << 23));
+}
+
+// The neighbors of a > 0.
+static inline real real_above(real a)
+{
+    return real_from_bits(bits_from_real(a) + (integer)(1));
+}
+
+static inline real real_below(real a)
+{
+    return real_from_bits(bits_from_real(a) - (integer)(1));
+}
+
+// Of a quotient within an ulp the remainder is exact, and so is its comparison with half the way to a
+// neighbor.
+static inline real repaired_quotient(real a, real b)
+{
+    integer a_bits = bits_from_real(a), b_bits = bits_from_real(b);
+    a = real_from_bits((a_bits & MANTISSA) | BITS_OF_ONE);
+    b = real_from_bits((b_bits & MANTISSA) | BITS_OF_ONE);
+    real quotient = device_divide(a, b);
+    quotient = fma(fma(-quotient, b, a), device_divide((real)(1), b), quotient);
+    real remainder_ = fma(-quotient, b, a), half_b = (real)(0.5f) * b;
+    real up = real_above(quotient), down = real_below(quotient);
+    mask rises = remainder_ > (up - quotient) * half_b, falls = remainder_ < (down - quotient) * half_b;
+    quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
+    quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & SIGN_BIT));
+    // in two factors: one may be beyond the largest real where the product is not
+    integer exponent = ((a_bits & EXPONENT_BITS) >> 23) - ((b_bits & EXPONENT_BITS) >> 23);
+    integer half_exponent = exponent >> 1;
+    return quotient * real_power_of_two(half_exponent) * real_power_of_two(exponent - half_exponent);
+}
+
+// By Tuckerman's test: root (root - ulp) < a <= root (root + ulp) (Agarwal, Cooley, Gustavson, Shearer,
+// Slishman, Tuckerman, New scalar and vector elementary functions for the IBM System/370, IBM Journal of
+// Research and Development 30(2), 1986).
+static inline real repaired_root(real a)
+{
+    integer half_exponent = (bits_from_real(a) - BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
+    a = real_from_bits(bits_from_real(a) - (half_exponent << 24));
+    real root = device_sqrt(a);
+    root = fma(fma(-root, root, a), device_divide((real)(0.5f), root), root);
+    real up = real_above(root), down = real_below(root);
+    mask rises = fma(-root, up, a) > (real)(0), falls = fma(-root, down, a) <= (real)(0);
+    return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
+}
+
+// Correctly rounded at `strict` on every device, but for numbers below the smallest normal one.
 static inline real real_divide(real a, real b)
 {
     real quotient = device_divide(a, b);
-    if (REPAIRS_DIVIDE) {
-        real reciprocal = device_divide((real)(1), b);
-        reciprocal = fma(fma(-b, reciprocal, (real)(1)), reciprocal, reciprocal);
-        real better = fma(fma(-quotient, b, a), reciprocal, quotient);
-        better = fma(fma(-better, b, a), reciprocal, better);
-        mask ordinary = (fabs(quotient) > (real)(0x1p-100f)) & (fabs(quotient) < (real)(0x1p100f)) &
-                        (fabs(b) > (real)(0x1p-100f)) & (fabs(b) < (real)(0x1p100f));
-        quotient = lanes_select(ordinary, better, quotient);
-    }
-    return quotient;
+    if (!REPAIRS_DIVIDE) return quotient;
+    mask ordinary = real_is_normal(a) & real_is_normal(b) & real_is_normal(quotient);
+    return lanes_select(ordinary, repaired_quotient(a, b), quotient);
 }
 
 // Correctly rounded at `strict`, likewise; 0 for 0. The argument is never negative.
 static inline real real_sqrt(real a)
 {
     real root = device_sqrt(a);
-    if (REPAIRS_DIVIDE) {
-        real half_reciprocal = device_divide((real)(0.5f), root);
-        real better = fma(fma(-root, root, a), half_reciprocal, root);
-        better = fma(fma(-better, better, a), half_reciprocal, better);
-        mask ordinary = (a > (real)(0x1p-100f)) & (a < (real)(0x1p120f));
-        root = lanes_select(ordinary, better, root);
-    }
-    return root;
+    if (!REPAIRS_DIVIDE) return root;
+    return lanes_select(real_is_normal(a), repaired_root(a), root);
 }
 
 // One over the power of two at or below a > 0; huge for 0.
