@@ -16,6 +16,8 @@ SAME = fmpq(1, 2**200)  # places nearer than this are one: far below what roots 
 
 
 def rational(number):
+    if isinstance(number, fmpq):
+        return number
     exact = Fraction(number)
     return fmpq(exact.numerator, exact.denominator)
 
@@ -137,7 +139,7 @@ class Shape:
 class Sphere(Shape):
     def __init__(self, center, radius):
         self.center, self.squared = vector(center), rational(radius) ** 2
-        self.radius = self.size = float(radius)
+        self.radius = self.size = float(fraction(rational(radius)))
         self.reach = 2 * self.radius
 
     def places(self, ray):
@@ -194,11 +196,12 @@ class Box(Shape):
 
 
 class Revolution(Shape):
-    """A capped cylinder or cone from one point to another, or an endless cylinder along `axis`."""
+    """A cylinder or cone from one point to another, or an endless cylinder along `axis`. Without caps it is the part of
+    an endless solid's surface between its ends."""
 
-    def __init__(self, base, axis, radii, endless=False):
+    def __init__(self, base, axis, radii, endless=False, caps=True):
         self.base, self.axis = vector(base), vector(axis)
-        self.radii, self.endless = [rational(r) for r in radii], endless
+        self.radii, self.endless, self.caps = [rational(r) for r in radii], endless, caps
         self.along = dot(self.axis, self.axis)
         self.axis_length = length(self.axis)
         self.center = self.base if endless else [b + a / 2 for b, a in zip(self.base, self.axis)]
@@ -217,22 +220,31 @@ class Revolution(Shape):
         radius = self.radii[0] * ww + (self.radii[1] - self.radii[0]) * height
         side = p_p * ww**2 - height * height * ww - radius * radius
         found = polynomial_roots(side.coeffs())
-        if not self.endless and dot(d, w) != 0:
+        if self.has_ends() and dot(d, w) != 0:
             found += [(end - dot(f, w)) / dot(d, w) for end in (fmpq(0), ww)]
         return found
+
+    def has_ends(self):
+        return self.caps and not self.endless
+
+    def crossings(self, ray):
+        found = super().crossings(ray)
+        if self.caps or self.endless:
+            return found
+        return [t for t in found if 0 <= dot(subtract(ray.at(t), self.base), self.axis) <= self.along]
 
     def contains(self, point):
         p = subtract(point, self.base)
         height = dot(p, self.axis)
-        if not self.endless and not 0 <= height <= self.along:
+        if self.has_ends() and not 0 <= height <= self.along:
             return False
         radius = self.radii[0] * self.along + (self.radii[1] - self.radii[0]) * height
-        return (dot(p, p) * self.along - height**2) * self.along <= radius**2
+        return radius >= 0 and (dot(p, p) * self.along - height**2) * self.along <= radius**2
 
     def normal(self, point):
         p = subtract(point, self.base)
         height = dot(p, self.axis) / self.along
-        if not self.endless and min(abs(height), abs(height - 1)) < SAME:
+        if self.has_ends() and min(abs(height), abs(height - 1)) < SAME:
             return self.axis
         across = [x - height * a for x, a in zip(p, self.axis)]
         radius = self.radii[0] + (self.radii[1] - self.radii[0]) * height
@@ -254,36 +266,83 @@ class Revolution(Shape):
         return min(ends, 1 - across / max(radius * radius, 1e-300))
 
 
-class Torus(Shape):
-    """Around the z axis."""
+class DoubleCone(Shape):
+    """Both nappes of an endless cone. slope: radius over height. apart: how far the nappes' tips are from the apex
+    along the axis, in lengths of the axis; below 0 they overlap."""
 
-    def __init__(self, center, major, minor):
-        self.center, self.major, self.minor = vector(center), rational(major), rational(minor)
-        self.radius, self.size = float(minor), float(major) + float(minor)
-        self.major_radius = float(major)
-        self.reach = 1.5 * self.size
+    def __init__(self, apex, axis, slope, apart=0):
+        self.center, self.axis, self.slope, self.apart = vector(apex), vector(axis), rational(slope), rational(apart)
+        self.along = dot(self.axis, self.axis)
+        self.radius = self.size = 0.0
+
+    def tips(self):
+        """(tip, axis) of each nappe."""
+        for sign in (1, -1):
+            yield [c + sign * self.apart * a for c, a in zip(self.center, self.axis)], [sign * a for a in self.axis]
 
     def places(self, ray):
-        f, d = subtract(ray.origin, self.center), ray.direction
-        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
-        flat = fmpq_poly([f[0] ** 2 + f[1] ** 2, 2 * (f[0] * d[0] + f[1] * d[1]), d[0] ** 2 + d[1] ** 2])
-        sum_ = p_p + (self.major**2 - self.minor**2)
-        return polynomial_roots((sum_ * sum_ - 4 * self.major**2 * flat).coeffs())
+        # |p|^2 |w|^2 - h^2 = slope^2 h^2 with h = p . w
+        found = []
+        for tip, w in self.tips():
+            f, d = subtract(ray.origin, tip), ray.direction
+            height = fmpq_poly([dot(f, w), dot(d, w)])
+            p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+            found += polynomial_roots((p_p * self.along - height * height * (1 + self.slope**2)).coeffs())
+        return found
 
     def contains(self, point):
-        p = subtract(point, self.center)
-        return (dot(p, p) + self.major**2 - self.minor**2) ** 2 <= 4 * self.major**2 * (p[0] ** 2 + p[1] ** 2)
+        for tip, w in self.tips():
+            p = subtract(point, tip)
+            height = dot(p, w)
+            if height >= 0 and dot(p, p) * self.along <= (1 + self.slope**2) * height**2:
+                return True
+        return False
 
     def normal(self, point):
         p = subtract(point, self.center)
-        flat = middle(arb(p[0] ** 2 + p[1] ** 2).sqrt())
-        if flat == 0:
+        height = dot(p, self.axis) / self.along
+        return [x - height * (1 + self.slope**2) * a for x, a in zip(p, self.axis)]
+
+
+class Torus(Shape):
+    def __init__(self, center, major, minor, axis=(0, 0, 1)):
+        self.center, self.major, self.minor = vector(center), rational(major), rational(minor)
+        self.axis = vector(axis)
+        self.along = dot(self.axis, self.axis)
+        self.unit_axis = [x / length(self.axis) for x in floats(self.axis)]
+        self.radius, self.major_radius = floats([self.minor, self.major])
+        self.size = self.major_radius + self.radius
+        self.reach = 1.5 * self.size
+
+    def places(self, ray):
+        # (|p|^2 + R^2 - r^2)^2 = 4 R^2 (|p|^2 - h^2 / |w|^2) with h = p . w
+        f, d = subtract(ray.origin, self.center), ray.direction
+        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+        height = fmpq_poly([dot(f, self.axis), dot(d, self.axis)])
+        sum_ = p_p + (self.major**2 - self.minor**2)
+        flat = p_p - height * height / self.along
+        return polynomial_roots((sum_ * sum_ - 4 * self.major**2 * flat).coeffs())
+
+    def flat(self, p):
+        """The squared distance from the axis."""
+        return dot(p, p) - dot(p, self.axis) ** 2 / self.along
+
+    def contains(self, point):
+        p = subtract(point, self.center)
+        return (dot(p, p) + self.major**2 - self.minor**2) ** 2 <= 4 * self.major**2 * self.flat(p)
+
+    def normal(self, point):
+        p = subtract(point, self.center)
+        across = middle(arb(self.flat(p)).sqrt())
+        if across == 0:
             return p
-        return [p[0] * (1 - self.major / flat), p[1] * (1 - self.major / flat), p[2]]
+        height = dot(p, self.axis) / self.along
+        return [x - self.major / across * (x - height * a) for x, a in zip(p, self.axis)]
 
     def depth(self, p):
-        off = sqrt(p[0] ** 2 + p[1] ** 2) - self.major_radius
-        return 1 - (off * off + p[2] * p[2]) / self.radius**2
+        height = sum(x * y for x, y in zip(p, self.unit_axis))
+        off = sqrt(sum((x - height * y) ** 2 for x, y in zip(p, self.unit_axis))) - self.major_radius
+        return 1 - (off * off + height * height) / self.radius**2
 
 
 class Plane(Shape):

@@ -61,8 +61,27 @@ def open_at(tier, margin, band):
     return tier == "A" or abs(margin) <= band + 1e-13
 
 
+class Expected:
+    """What one ray owes. t: None for a miss. object: its index; None: any. bounds: what t may be off at each of the
+    width's tiers; is_open: whether hit or miss is left open there."""
+
+    def __init__(self, t, index, is_open, bounds):
+        self.t, self.object, self.is_open, self.bounds = t, index, is_open, bounds
+
+    def text(self):
+        """A row of the C table."""
+        bits = sum(1 << place for place, is_open in enumerate(self.is_open) if is_open)
+        if self.t is None:
+            return f"{{0, 0, {MISS}, {bits}, {{0}}}}"
+        middle = exact.fraction(self.t)
+        high = float(middle)
+        low = float(middle - exact.Fraction(high))
+        limits = ", ".join("INFINITY" if b == inf else f"{b:.3g}" for b in self.bounds)
+        name = ANY if self.object is None else str(self.object)
+        return f"{{{high.hex()}, {low:.3g}, {name}, {bits}, {{{limits}}}}}"
+
+
 def expected(shapes, ray, width, given, ulps, must):
-    """C text of what one ray owes."""
     found = [(hit, i) for i, hit in enumerate(shape.hit(ray) for shape in shapes) if hit is not None]
     t, index = min(found) if found else (None, None)
     # of a miss: the shape that is missed by the least decides
@@ -70,20 +89,16 @@ def expected(shapes, ray, width, given, ulps, must):
     nearest = index if found else max(range(len(shapes)), key=lambda i: margins[i])
     shape, margin = shapes[nearest], margins[nearest]
     rho = max(shape.distance(ray) / shape.radius, 1.0) if shape.radius else 1.0
-    bits, bounds = 0, []
+    is_open, bounds = [], []
     touch = t is None and given is not None and given.expect is not None
     if touch:
         t, index = exact.rational(given.expect), 0
-    for place, tier in enumerate(width.tiers):
+    for tier in width.tiers:
         band = 16 * width.u if tier in "CD" or isinstance(shape, exact.Triangle) else 4 * width.u * rho
-        if tier not in must and open_at(tier, margin, band):
-            bits |= 1 << place
+        is_open.append(tier not in must and open_at(tier, margin, band))
         bounds.append(0.0 if t is None else bound(shape, ray, t, width, tier, given, ulps, touch))
     if t is None:
-        return f"{{0, 0, {MISS}, {bits}, {{0}}}}"
-    middle = exact.fraction(t)
-    high = float(middle)
-    low = float(middle - exact.Fraction(high))
+        return Expected(None, None, is_open, bounds)
     if len(shapes) > 1:
         # an edge that triangles share is hit on any of them
         sharing = [triangle for triangle in shapes if is_close(triangle, ray, width)]
@@ -91,9 +106,7 @@ def expected(shapes, ray, width, given, ulps, must):
             bounds[place] = max([bounds[place]] + [bound(s, ray, t, width, tier, given, ulps, touch) for s in sharing])
         if is_unsettled(shapes, ray, t, width):
             bounds = [inf] * len(bounds)
-    limits = ", ".join("INFINITY" if b == inf else f"{b:.3g}" for b in bounds)
-    name = ANY if len(shapes) > 1 else str(index)
-    return f"{{{high.hex()}, {low:.3g}, {name}, {bits}, {{{limits}}}}}"
+    return Expected(t, None if len(shapes) > 1 else index, is_open, bounds)
 
 
 def is_close(triangle, ray, width):
@@ -168,12 +181,14 @@ class MeshOracle:
         return found
 
 
-def rows_of(set_, width):
+def answers(set_, width):
+    """(origin, direction, start, Expected) of each ray that is held to exact answers."""
     if set_.family is None:
         shapes = [make(width.rounding) for _, make in set_.objects]
         for given in set_.rays:
             for i, numbers in enumerate(width.neighbors(given)):
-                yield expected(shapes, exact.Ray(*numbers), width, given, set_.ulps, given.must if i == 0 else "")
+                must = given.must if i == 0 else ""
+                yield *numbers, expected(shapes, exact.Ray(*numbers), width, given, set_.ulps, must)
         return
     mesh = MESHES[set_.objects]() if isinstance(set_.objects, str) else None
     oracle = MeshOracle(mesh, width.rounding) if mesh else None
@@ -185,7 +200,7 @@ def rows_of(set_, width):
         origin, direction = [width.rounding(x) for x in origin], [width.rounding(x) for x in direction]
         if mesh:
             shapes = oracle.near(origin, direction)
-        yield expected(shapes, exact.Ray(origin, direction), width, None, set_.ulps, set_.must)
+        yield origin, direction, 0.0, expected(shapes, exact.Ray(origin, direction), width, None, set_.ulps, set_.must)
 
 
 def plain(number):
@@ -214,7 +229,7 @@ def write(out):
             family = f"family_{set_.family}"
         counts = []
         for width in (NARROW, WIDE):
-            lines = list(rows_of(set_, width))
+            lines = [row.text() for *_, row in answers(set_, width)]
             counts.append(len(lines))
             out.write(f"static const Expected {name}_{width.name}[] = {{\n")
             out.write("".join(f"    {line},\n" for line in lines))

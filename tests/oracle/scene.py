@@ -1,0 +1,129 @@
+"""Scenes for the oracle: the YAML of docs/scene-format.md, without meshes and pictures on surfaces.
+
+As docs/verify.md tells it, the eye is subtracted in double, then each number is rounded once to the precision; what is
+left is exact."""
+
+import exact
+import yaml
+from exact import dot, rational, subtract, vector
+from flint import arb
+
+class Material:
+    def __init__(self, given, rounding):
+        def number(name, default):
+            return rational(rounding(given.get(name, default)))
+
+        def color(values):
+            return [rational(rounding(x)) for x in values]
+
+        diffuse = given.get("diffuse", 1)
+        self.color = color(given.get("color", [1, 1, 1]))
+        self.diffuse = color(diffuse if isinstance(diffuse, list) else [diffuse] * 3)
+        self.ambient, self.specular = number("ambient", 1), number("specular", 0)
+        self.shininess = number("shininess", 32)
+        self.reflection, self.transmission = number("reflection", 0), number("transmission", 0)
+        self.ior = number("ior", 1.5)
+        self.checker = None
+        if "checker" in given:
+            self.checker = [color(c) for c in given["checker"]["colors"]]
+            self.square = rational(float(given["checker"].get("size", 1)))
+
+
+class Light:
+    def __init__(self, kind, given, rounding, from_eye):
+        self.kind = kind
+        intensity = float(given.get("intensity", 1))
+        self.color = [rational(rounding(float(x) * intensity)) for x in given.get("color", [1, 1, 1])]
+        if kind != "directional":
+            self.position = from_eye(given["position"])
+        if kind != "point":
+            there = given.get("direction") or [b - a for a, b in zip(given["position"], given["look_at"])]
+            self.direction = vector(float(x) for x in there)
+        if kind == "spot":
+            self.angle, self.penumbra = float(given["angle"]), float(given.get("penumbra", 0))
+
+
+class Thing:
+    """One object: its shape, from the eye, its material, and a smooth triangle's normals."""
+
+    def __init__(self, kind, given, material, from_eye, rounding):
+        self.kind, self.material, self.normals = kind, material, None
+        self.shape = self.make(kind, given, from_eye, rounding)
+        if "normals" in given:
+            self.normals = [vector(float(x) for x in normal) for normal in given["normals"]]
+
+    def make(self, kind, given, from_eye, rounding):
+        def size(name):
+            return rounding(given[name])
+
+        def way(name):
+            return [float(x) for x in given[name]]
+
+        if kind == "sphere":
+            return exact.Sphere(from_eye(given["center"]), size("radius"))
+        if kind == "plane":
+            return exact.Plane(from_eye(given["point"]), way("normal"))
+        if kind == "disc":
+            return exact.Disc(from_eye(given["center"]), way("normal"), size("radius"))
+        if kind == "box":
+            return exact.Box(from_eye(given["min"]), from_eye(given["max"]))
+        if kind == "torus":
+            return exact.Torus(from_eye(given["center"]), size("major"), size("minor"), way("axis"))
+        if kind == "triangle":
+            return exact.Triangle(*map(from_eye, given["vertices"]))
+        if "from" in given:
+            base = from_eye(given["from"])
+            axis = subtract(from_eye(given["to"]), base)
+            radii = given["radius"] if kind == "cone" else [given["radius"]] * 2
+            return exact.Revolution(base, axis, map(rounding, radii), caps=given.get("caps", True))
+        if kind == "cylinder":
+            return exact.Revolution(from_eye(given["point"]), way("axis"), [size("radius")] * 2, endless=True)
+        slope = exact.middle((arb(rational(float(given["angle"]))) * arb.pi() / 180).tan())
+        return exact.DoubleCone(from_eye(given["apex"]), way("axis"), slope)
+
+    def outward(self, point):
+        """The normal of the geometry, of any length."""
+        return self.shape.normal(point)
+
+    def shading(self, point, geometry):
+        """The normal of the shading, of any length, as balls: on a smooth triangle that of the place between the
+        vertices', each first made unit."""
+        if self.normals is None:
+            return [arb(x) for x in geometry]
+        a, b, c = self.shape.vertices
+        area = dot(geometry, geometry)
+        shares = [
+            dot(geometry, exact.cross(subtract(q, p), subtract(point, p))) / area for p, q in ((b, c), (c, a), (a, b))
+        ]
+        units = [unit(normal) for normal in self.normals]
+        return [sum(share * n[k] for share, n in zip(shares, units)) for k in range(3)]
+
+
+def unit(values):
+    balls = [arb(x) for x in values]
+    size = dot(balls, balls).sqrt()
+    return [x / size for x in balls]
+
+
+class Scene:
+    def __init__(self, text, width):
+        given = yaml.safe_load(text)
+        eye = [float(x) for x in given["camera"]["position"]]
+        rounding = width.rounding
+
+        def from_eye(point):
+            return vector(rounding(float(x) - e) for x, e in zip(point, eye))
+
+        materials = {name: Material(body, rounding) for name, body in given.get("materials", {}).items()}
+        self.eye = vector(eye)
+        self.ambient = [rational(rounding(x)) for x in given.get("ambient", [0, 0, 0])]
+        self.background = [rational(rounding(x)) for x in given.get("background", [0, 0, 0])]
+        self.lights = [
+            Light(kind, body, rounding, from_eye) for light in given.get("lights", []) for kind, body in light.items()
+        ]
+        self.things = []
+        for entry in given["objects"]:
+            for kind, body in entry.items():
+                name = body.get("material", {})
+                material = Material(name, rounding) if isinstance(name, dict) else materials[name]
+                self.things.append(Thing(kind, body, material, from_eye, rounding))

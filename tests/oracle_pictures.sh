@@ -1,0 +1,15 @@
+#!/bin/bash
+# Small pictures of every shape and light, of mirrors and glass, at each precision, pixel by pixel against the exact oracle.
+# With GLINT_LONG_TESTS=1 also larger ones of each shape by itself (some minutes).
+# Takes the program from BUILD: the kernels are the same in every build, so that the first build's run is enough.
+. "$(dirname "$0")/support.bash"
+
+python_with flint=python-flint yaml=PyYAML numpy
+long=
+[ "${GLINT_LONG_TESTS-}" != 1 ] || long=--long
+if "$python" -B tests/oracle/pictures.py "${BUILD:-build}/glint" "$scratch" $long; then
+    pass
+else
+    fail "pictures are what the oracle says"
+fi
+finish
