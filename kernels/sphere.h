@@ -4,6 +4,12 @@
 
 #include "quadratic.h"
 
+// a r^2 - |E|^2 for the line's moment E = f x d and a = d . d.
+static inline Pair sphere_discriminant(real radius, Pair a, PairVector moment)
+{
+    return pair_subtract(pair_multiply(a, pair_product(radius, radius)), pair_vector_dot(moment, moment));
+}
+
 // The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4
 // u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
 // intersection, Ray Tracing Gems, 2019, chapter 7). The compensated form takes the discriminant from the
@@ -33,9 +39,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         PairVector exact_f = pair_vector_difference(ray->origin, center);
         PairVector moment = pair_vector_cross(exact_f, ray->direction);
         Pair a = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
-        Pair squared_radius = pair_product(radius, radius);
-        Pair discriminant = pair_subtract(pair_multiply(a, squared_radius), pair_vector_dot(moment, moment));
-        Pair c = pair_subtract(pair_vector_dot(exact_f, exact_f), squared_radius);
+        Pair discriminant = sphere_discriminant(radius, a, moment);
+        Pair c = pair_subtract(pair_vector_dot(exact_f, exact_f), pair_product(radius, radius));
         real exact_b = pair_vector_dot_vector(exact_f, ray->direction).high;
         hit = hit & (discriminant.high >= (real)(0));
         roots = quadratic_roots(a.high, exact_b, c.high, discriminant.high);
@@ -61,8 +66,9 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     return hit & (*t > ray->near);
 }
 
-// The compensated normal is built from the moment as well, n = (l -+ h d) / r with l = d x E / a, so that it
-// does not lose bits with the distance; the point is the center plus r n.
+// The compensated normal is built from the moment as well, n = (l -+ h d) / r with l = d x E / a and h the
+// root of the discriminant over a, so that it does not lose bits with the distance, nor at a low angle to a
+// large sphere; the point is the center plus r n.
 static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -70,10 +76,12 @@ static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
     Vector outward;
     if (IS_COMPENSATED) {
         PairVector f = pair_vector_difference(ray->origin, center);
-        Vector moment = pair_vector_high(pair_vector_cross(f, ray->direction));
-        Vector l = vector_scale(vector_cross(ray->direction, moment), real_divide((real)(1), ray->squared));
-        real half_chord_squared = real_max(fma(radius, radius, -vector_dot(l, l)), (real)(0));
-        real h = real_sqrt(real_divide(half_chord_squared, ray->squared));
+        PairVector moment = pair_vector_cross(f, ray->direction);
+        Pair a = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
+        real discriminant = real_max(sphere_discriminant(radius, a, moment).high, (real)(0));
+        Vector l = vector_scale(vector_cross(ray->direction, pair_vector_high(moment)),
+                                real_divide((real)(1), ray->squared));
+        real h = real_divide(real_sqrt(discriminant), ray->squared);
         real b = pair_vector_dot_vector(f, ray->direction).high;
         mask far_side = fma(ray->squared, t, b) > (real)(0);
         outward = vector_fma(ray->direction, lanes_select(far_side, h, -h), l);

@@ -96,7 +96,8 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
         PairVector f = pair_vector_difference(ray->origin, center);
         Vector moment = pair_vector_high(pair_vector_cross(f, ray->direction));
         closest = vector_scale(vector_cross(ray->direction, moment), ray->inverse_squared);
-        closest_t = -pair_vector_dot_vector(f, ray->direction).high * ray->inverse_squared;
+        Pair squared = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
+        closest_t = -real_divide(pair_vector_dot_vector(f, ray->direction).high, squared.high);
     } else {
         Vector f = vector_subtract(ray->origin, center);
         closest =

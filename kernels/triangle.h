@@ -88,7 +88,10 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     real nearest = real_min(real_min(edges.a_depth, edges.b_depth), edges.c_depth) * per_depth;
     real farthest = real_max(real_max(edges.a_depth, edges.b_depth), edges.c_depth) * per_depth;
     real distance_ = triangle_plane_distance(triangle, ray, (real)(0.5f) * (nearest + farthest));
-    *t = real_min(real_max(distance_, nearest), farthest);
+    // the vertices' own depths are off by up to 4 u, which the compensated distance is not
+    real slack =
+        IS_COMPENSATED ? (real)(4 * UNIT_ROUNDOFF) * real_max(fabs(nearest), fabs(farthest)) : (real)(0);
+    *t = real_min(real_max(distance_, nearest - slack), farthest + slack);
     return hit & (*t > ray->near);
 }
 

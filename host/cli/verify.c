@@ -180,10 +180,9 @@ static void result_tell(const VerifyResult *result, const Report *report)
     const struct {
         size_t count;
         const char *what;
-    } faults[] = {{result->wrong, "wrong"},
-                  {result->leaks, "leaks"},
-                  {result->unsound, "unsound"},
-                  {result->differing, "differ"}};
+    } faults[] = {{result->wrong, "wrong"},           {result->leaks, "leaks"},
+                  {result->unsound, "unsound"},       {result->off, "off the surface"},
+                  {result->turned, "normals turned"}, {result->differing, "differ"}};
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
         if (faults[i].count > 0) printf("  %zu %s", faults[i].count, faults[i].what);
     putchar('\n');
@@ -207,7 +206,11 @@ static void result_add_json(Json *json, const VerifyResult *result)
     json_integer(json, "wrong", (int64_t)result->wrong);
     json_integer(json, "leaks", (int64_t)result->leaks);
     json_integer(json, "unsound", (int64_t)result->unsound);
+    json_integer(json, "off", (int64_t)result->off);
+    json_integer(json, "turned", (int64_t)result->turned);
     json_integer(json, "differing", (int64_t)result->differing);
+    json_number(json, "surface_part", result->surface_part);
+    json_number(json, "normal_part", result->normal_part);
     json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
     json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
     if (result->bound > 0) json_text(json, "unit", result->unit);

@@ -2,7 +2,7 @@
 
 #include "host/base/array.h"
 #include "host/base/text.h"
-#include "host/measure/verify_run.h"
+#include "host/measure/verify_exact.h"
 #include "host/measure/verify_tables.h"
 #include <float.h>
 #include <math.h>
@@ -52,7 +52,9 @@ static const struct {
 
 bool verify_holds(const VerifyResult *result)
 {
-    return result->wrong + result->leaks + result->unsound + result->differing == 0;
+    return result->wrong + result->leaks + result->unsound + result->off + result->turned +
+               result->differing ==
+           0;
 }
 
 double verify_roundoff(const VerifyRun *run)
@@ -274,6 +276,12 @@ static void judge(VerifyRun *run, const ProbeHit *hit, const Expected *expected)
     verify_note_error(run, fabs(hit->t - expected->t - expected->rest) / ulp, expected->bounds[place] / ulp);
 }
 
+static void judge_surface(VerifyRun *run, const Scene *scene, const ProbeRay *ray, const ProbeHit *hit)
+{
+    // in these scenes an object's id is its place in the list
+    if (verify_is_hit(hit)) exact_judge_surface(run, &scene->objects.items[hit->object], ray, hit);
+}
+
 static double nudged(const VerifyRun *run, double value, double toward)
 {
     return verify_is_wide(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
@@ -320,6 +328,7 @@ static void run_rays(VerifyRun *run, const ProbeTable *table, const Scene *scene
     verify_trace(run, scene, true, turned, count, hits + count);
     for (size_t i = 0; i < count; i++) {
         judge(run, &hits[i], &table->expected[width][i]);
+        judge_surface(run, scene, &rays.items[i], &hits[i]);
         run->result->differing += !verify_same_bits(&hits[i], &hits[2 * count - 1 - i]);
     }
     free(rays.items);
@@ -344,6 +353,7 @@ static void run_family(VerifyRun *run, const ProbeTable *table, const Scene *sce
             run->result->leaks += table->closed && !verify_is_hit(&hits[i]);
             if (first + i < table->expected_count[width])
                 judge(run, &hits[i], &table->expected[width][first + i]);
+            judge_surface(run, scene, &rays[i], &hits[i]);
         }
     }
     run->renderer->close(opened);
