@@ -39,12 +39,16 @@ static inline real real_inverse_or_zero(real a)
     return lanes_select(zero, (real)(0), real_divide((real)(1), lanes_select(zero, (real)(1), a)));
 }
 
-// 1 / a, huge for 0: the product with a distance then tells its sign.
+// 1 / a, huge for 0: the product with a distance then tells its sign. One Newton step makes what a device
+// divides inexactly nearly exact, and exact for powers of two: a box's face is where it is for rays along an
+// axis.
 static inline real real_inverse_or_huge(real a)
 {
-    mask zero = a == (real)(0);
-    return lanes_select(zero, (real)(1 / SMALLEST_RATIO),
-                        real_divide((real)(1), lanes_select(zero, (real)(1), a)));
+    mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
+    real inverse = real_divide((real)(1), lanes_select(zero, (real)(1), a));
+    if (!IS_COMPENSATED)
+        inverse = lanes_select(steps, fma(fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
+    return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
 
 // A frame across a unit vector without a branch (Duff et al., Building an orthonormal basis, revisited, JCGT
