@@ -138,16 +138,20 @@ typedef struct {
     uint signs;           // bit i: the direction's component i is negative
 } BoxRays;
 
-// How far a hit may lie outside its primitive's box, for any shape: each test is off by a few u times the
-// distance between the ray's start and the shape, across the ray and along it. Boxes count as larger by that.
+// A hit may lie outside its primitive's box, for any shape: each test is off by a few u times the distance
+// between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
+// here adds a few u of the coordinates. Boxes count as larger by all of that.
 //
-// Products are bounded: 1 / direction is held below 2^120 (2^1000) by the scene's size, where the ray does
+// Products are bounded: 1 / direction is held below 2^120 (2^1000) over the coordinates, where the ray does
 // not move along that axis by as much as the slack, however far it goes.
-static inline BoxRays box_rays(const Ray *ray, scalar extent, uint signs)
+static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, uint signs)
 {
-    real size = vector_magnitude(ray->origin) + (real)(extent);
-    real slack = (real)(64 * UNIT_ROUNDOFF) * size;
-    real largest = (real)(1 / SMALLEST_RATIO) * real_inverse_power(size);
+    Vector center = vector_of(bounds);
+    real reach = vector_magnitude(vector_subtract(ray->origin, center)) + (real)(bounds.w);
+    real coordinates = fma((real)(2), vector_magnitude(center), reach);
+    real slack = fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
+    const real huge = (real)(1 / SMALLEST_RATIO);
+    real largest = real_min(huge * real_inverse_power(coordinates), huge);
     BoxRays rays;
     rays.inverse = (Vector){real_min(real_max(ray->inverse.x, -largest), largest),
                             real_min(real_max(ray->inverse.y, -largest), largest),
@@ -199,18 +203,21 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
             global const scalar *box_1 = (global const scalar *)&node->low_1;
             real near_0 = box_rays_enter(rays, box_0, ray->near);
             real near_1 = box_rays_enter(rays, box_1, ray->near);
-            bool meets_0 = lanes_any(near_0 <= box_rays_leave(rays, box_0, limit));
-            bool meets_1 = lanes_any(near_1 <= box_rays_leave(rays, box_1, limit));
+            mask meets_0 = near_0 <= box_rays_leave(rays, box_0, limit);
+            mask meets_1 = near_1 <= box_rays_leave(rays, box_1, limit);
+            bool any_0 = lanes_any(meets_0), any_1 = lanes_any(meets_1);
             uint4 children = node->children;
-            if (meets_0 & meets_1) {
+            if (any_0 & any_1) {
                 bool second_nearer = rays->signs >> (children.y >> BVH_AXIS_SHIFT) & 1;
-                waiting[waiting_count] = second_nearer ? children.xy : children.zw;
-                waiting_nears[waiting_count++] = second_nearer ? near_0 : near_1;
                 child = second_nearer ? children.zw : children.xy;
+                waiting[waiting_count] = second_nearer ? children.xy : children.zw;
+                waiting_nears[waiting_count++] = second_nearer
+                                                     ? lanes_select(meets_0, near_0, (real)(LARGEST))
+                                                     : lanes_select(meets_1, near_1, (real)(LARGEST));
                 continue;
             }
-            if (meets_0 | meets_1) {
-                child = meets_0 ? children.xy : children.zw;
+            if (any_0 | any_1) {
+                child = any_0 ? children.xy : children.zw;
                 continue;
             }
         } else {
@@ -239,7 +246,7 @@ static inline void search_hierarchy(Search *search, const Scene *scene, const Ra
         if (first == 8) break;
         mask members = pending == (integer)(first);
         pending = lanes_select(members, none, pending);
-        BoxRays rays = box_rays(ray, scene->header->extent.x, (uint)first);
+        BoxRays rays = box_rays(ray, scene->header->bounds, (uint)first);
         search_bvh(search, scene, ray, &rays, members);
     }
 }

@@ -138,7 +138,7 @@ static inline Vector picture_color(const Scene *scene, uint kind, uint index, co
 {
     PicturePoint point = picture_point(scene, kind, index, material, patch, ray);
     real cosine = real_max(fabs(vector_dot(patch->normal, ray->direction)), (real)(0x1p-10f));
-    real width = distance_ * (real)(scene->header->extent.y);
+    real width = distance_ * (real)(scene->header->sample.x);
     RealLanes u = {point.u}, v = {point.v}, footprint = {real_divide(width * point.density, cosine)};
     RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
     IntegerLanes lanes = {wanted};

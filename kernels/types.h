@@ -175,11 +175,12 @@ typedef struct {
     scalar4 background, ambient;
     // A picture's ray: forward + x right + y up, x and y in half pixels from the picture's center.
     scalar4 forward, right, up;
-    scalar4 extent;  // x: no coordinate of a bounded primitive is larger; y: width of a sample's share of a
-                     // pixel, at distance 1
-    uint4 picture;   // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;   // x: of a ray, at most
-    uint4 counts[2]; // of each KIND_…, in its order
+    scalar4 bounds; // of what hangs in the hierarchy: xyz: center, w: no point lies farther from it, summed
+                    // over the axes
+    scalar4 sample;          // x: width of a sample's share of a pixel, at distance 1
+    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;           // x: of a ray, at most
+    uint4 counts[2];         // of each KIND_…, in its order
     uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
 } SceneHeader;
 

@@ -22,7 +22,8 @@
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, extent)                         \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds)                         \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \

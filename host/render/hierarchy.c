@@ -236,11 +236,15 @@ static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *boun
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)bounded->kind_counts[kind];
     memcpy(header->bounded_counts, counts, sizeof counts);
-    for (int side = 0; side < 2; side++) {
-        const BvhBox *box = &bvh->nodes[0].children[side].box;
-        for (int axis = 0; axis < 3 && box->low[0] <= box->high[0]; axis++)
-            header->extent.x = fmax(header->extent.x, fmax(fabs(box->low[axis]), fabs(box->high[axis])));
+    const BvhBox *left = &bvh->nodes[0].children[0].box, *right = &bvh->nodes[0].children[1].box;
+    double center[3], reach = 0;
+    for (int axis = 0; axis < 3; axis++) { // an empty child's box is inside out, and adds nothing
+        double low = fmin(left->low[axis], right->low[axis]),
+               high = fmax(left->high[axis], right->high[axis]);
+        center[axis] = 0.5 * low + 0.5 * high;
+        reach += 0.5 * high - 0.5 * low;
     }
+    header->bounds = (scalar4){center[0], center[1], center[2], reach};
 }
 
 void hierarchy_hang(FlatScene *flat)

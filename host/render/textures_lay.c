@@ -124,6 +124,6 @@ void textures_lay(FlatScene *flat, const Scene *scene, const TextureSize *sizes,
 
     SceneHeader *header = flat->arrays[FLAT_HEADER].items;
     const scalar4 right = header->right; // half a pixel
-    header->extent.y =
+    header->sample.x =
         2 * sqrt((right.x * right.x + right.y * right.y + right.z * right.z) / settings->sample_count);
 }
