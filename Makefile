@@ -26,7 +26,10 @@ LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp OpenCL
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
 
-kernels := $(sort $(wildcard kernels/*.h kernels/*.cl))
+# KERNELS=folder: its files stand in for those of the same name in kernels/: the textbook's formulas, to measure beside
+# (tools/numerics/textbook), never to ship.
+kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl)),$(or \
+           $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
 sources := $(sort $(wildcard host/*.c host/*/*.c))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
@@ -42,7 +45,7 @@ all: $(BUILD)/glint
 $(BUILD)/glint: $(objects)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
-$(BUILD)/kernel_files.c: $(kernels) kernels tools/embed
+$(BUILD)/kernel_files.c: $(kernels) kernels tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)
 	tools/embed $(kernels) > $@
 
@@ -60,7 +63,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ -lcmocka $(LIBS) -o $@
 
 # These two change only when what they hold does, and what depends on it is then built anew.
-$(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS)
+$(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
 $(BUILD)/version: text := $(GLINT_VERSION)
 $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
@@ -104,7 +107,8 @@ LINT_JOBS    ?= $(shell nproc)
 linted := $(sources) $(test_programs) $(test_helpers) \
           $(if $(has_embree),$(embree_sources))
 
-formatted := $(linted) $(kernels) $(wildcard host/*/*.h tests/*.h tests/oracle/*.h) $(embree_sources) $(embree_headers)
+formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl tools/numerics/textbook/*.h host/*/*.h tests/*.h \
+             tests/oracle/*.h) $(embree_sources) $(embree_headers)
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)
