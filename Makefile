@@ -31,7 +31,8 @@ GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe
 kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl)),$(or \
            $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
 sources := $(sort $(wildcard host/*.c host/*/*.c))
-objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o
+pages   := $(sort $(wildcard host/cli/page/*))
+objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
 
 # Each tests/test_*.c and fuzz_*.c is a program; the other files are linked with all of them.
@@ -47,9 +48,13 @@ $(BUILD)/glint: $(objects)
 
 $(BUILD)/kernel_files.c: $(kernels) kernels tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)
-	tools/embed $(kernels) > $@
+	tools/embed kernel_files $(kernels) > $@
 
-$(BUILD)/kernel_files.o: $(BUILD)/kernel_files.c $(BUILD)/flags
+$(BUILD)/page_files.c: $(pages) host/cli/page tools/embed
+	@mkdir -p $(@D)
+	tools/embed page_files $(pages) > $@
+
+$(BUILD)/%_files.o: $(BUILD)/%_files.c $(BUILD)/flags
 	$(CC) $(OURS) -Wno-overlength-strings $(CFLAGS) -c $< -o $@
 
 $(BUILD)/host/cli/version.o: OURS += -DGLINT_VERSION='"$(GLINT_VERSION)"'

@@ -162,11 +162,11 @@ static cl_program program_make(bool wide)
     size_t file_count = 0;
     while (kernel_files[file_count].name)
         file_count++;
-    KernelFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
+    EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
     memcpy(files, kernel_files, file_count * sizeof *files);
     Text text = {0};
     kernels_write(&text);
-    files[file_count] = (KernelFile){"layout.cl", text_c(&text)};
+    files[file_count] = (EmbeddedFile){"layout.cl", text_c(&text)};
     const char *prelude =
         wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
     char *composed = kernel_compose(files, "layout.cl", prelude, NULL);

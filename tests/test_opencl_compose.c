@@ -6,7 +6,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static const KernelFile files[] = {
+static const EmbeddedFile files[] = {
     {"root.cl", "// root\n#include \"a.h\"\n  #  include \"kernels/b.h\" // again\n#include \"a.h\"\nlast"},
     {"a.h", "first of a\n#include \"b.h\"\nlast of a\n"},
     {"b.h", "#include <stdint.h>\n#include \"a.h\"\n// #include \"none.h\"\n#included \"x\"\nb\n"},
@@ -47,7 +47,7 @@ static void test_missing_files(void **state)
 static void test_every_embedded_file_composes(void **state)
 {
     (void)state;
-    for (const KernelFile *file = kernel_files; file->name; file++) {
+    for (const EmbeddedFile *file = kernel_files; file->name; file++) {
         char *text = program_text(file->name, "");
         if (!text) fail_msg("%s", file->name);
         assert_null(strstr(text ? text : "", "\n#include \""));

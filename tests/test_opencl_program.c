@@ -306,7 +306,7 @@ static void test_missing_root(void **state)
     assert_non_null(strstr(end.errors, "absent.cl"));
 }
 
-static const KernelFile broken_files[] = {
+static const EmbeddedFile broken_files[] = {
     {"root.cl", "// one\n#include \"good.h\"\n#include \"broken.h\"\n"},
     {"good.h", "// a\n// b\n// c\n"},
     {"broken.h", "// one\n#include \"good.h\"\n#include \"inner.h\"\nint broken = missing_name;\n"},

@@ -1,5 +1,7 @@
 // glint accuracy: speed against error, for each way of rendering.
 #include "host/base/fault.h"
+#include "host/base/output.h"
+#include "host/cli/accuracy_page.h"
 #include "host/cli/accuracy_report.h"
 #include "host/cli/commands.h"
 #include "host/cli/layers.h"
@@ -12,7 +14,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_SAVE, OPTION_JSON };
+enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_SAVE, OPTION_JSON, OPTION_HTML };
 
 static const struct option long_options[] = {
     {"reference", required_argument, NULL, OPTION_REFERENCE},
@@ -20,6 +22,7 @@ static const struct option long_options[] = {
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"save", required_argument, NULL, OPTION_SAVE},
     {"json", no_argument, NULL, OPTION_JSON},
+    {"html", required_argument, NULL, OPTION_HTML},
     VARIANT_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
@@ -36,11 +39,12 @@ static const char help_text[] =
     "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
     "      --save FOLDER     write all that is compared there, as .npy\n"
     "      --json            for programs\n"
+    "      --html FILE       a page with plots and pictures, that needs nothing but itself\n"
     "      --precision LIST  of fast, single, strict, double (default: all of them)\n";
 
 typedef struct {
     VariantOptions variants;
-    const char *reference_path, *folder;
+    const char *reference_path, *folder, *page_path;
     bool as_json;
 } AccuracyOptions;
 
@@ -50,6 +54,7 @@ typedef struct {
     VariantSet set;
     AccuracyLayers reference; // of the scene at work; read from a file: of the only one
     AccuracyScene *scenes;
+    OutputFile page; // opened before anything is measured
     MessageList messages;
 } Accuracy;
 
@@ -66,6 +71,9 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
         return true;
     case OPTION_JSON:
         options->as_json = true;
+        return true;
+    case OPTION_HTML:
+        options->page_path = value;
         return true;
     default:
         return false;
@@ -86,6 +94,8 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
     if (optind == argument_count) return option_usage_fault("accuracy", "which scenes?");
+    if (options->page_path && strcmp(options->page_path, "-") == 0)
+        return option_usage_fault("accuracy", "--html takes a file's name");
     if (options->reference_path && optind + 1 != argument_count)
         return option_usage_fault("accuracy", "a reference is for one scene");
     return EXIT_DONE;
@@ -263,10 +273,24 @@ static bool has_reference(Accuracy *accuracy)
     return false;
 }
 
+static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)
+{
+    if (!accuracy->options.page_path) return true;
+    Text page = {0};
+    accuracy_page(&page, report);
+    bool written = output_write(&accuracy->page, page.items, page.count, &accuracy->messages) &&
+                   output_commit(&accuracy->page, &accuracy->messages);
+    text_free(&page);
+    return written;
+}
+
 static int accuracy_run(Accuracy *accuracy)
 {
     VariantSet *set = &accuracy->set;
-    if (!has_reference(accuracy) || !folder_make(accuracy)) return EXIT_USER;
+    const char *page_path = accuracy->options.page_path;
+    if (!has_reference(accuracy) || !folder_make(accuracy) ||
+        (page_path && !output_open(&accuracy->page, page_path, &accuracy->messages)))
+        return EXIT_USER;
     Progress progress;
     progress_open(&progress, accuracy->options.as_json);
     bool whole =
@@ -285,6 +309,7 @@ static int accuracy_run(Accuracy *accuracy)
         json_print(accuracy_json(&report), stdout);
     else
         accuracy_print_text(&report, stdout);
+    if (!page_commit(accuracy, &report)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     fputs("glint accuracy: no variant could be rendered\n", stderr);
     return EXIT_USER;
@@ -296,6 +321,7 @@ static void accuracy_close(Accuracy *accuracy)
         accuracy_scene_free(&accuracy->scenes[i]);
     free(accuracy->scenes);
     accuracy_layers_free(&accuracy->reference);
+    output_abandon(&accuracy->page);
     variant_set_close(&accuracy->set);
     messages_tell(&accuracy->messages, NULL);
 }

@@ -7,7 +7,7 @@
 #include <string.h>
 
 typedef struct {
-    const KernelFile *files;
+    const EmbeddedFile *files;
     bool *included; // one for each file
     Text text;
     char *missing;
@@ -41,7 +41,7 @@ static bool include_name(const char *line, size_t length, const char **name, siz
 static bool compose_file(Composer *composer, const char *name, size_t name_length)
 {
     size_t index = 0;
-    const KernelFile *file = composer->files;
+    const EmbeddedFile *file = composer->files;
     while (file->name && !(strlen(file->name) == name_length && memcmp(file->name, name, name_length) == 0))
         file++, index++;
     if (!file->name) {
@@ -71,7 +71,7 @@ static bool compose_file(Composer *composer, const char *name, size_t name_lengt
     return true;
 }
 
-char *kernel_compose(const KernelFile *files, const char *root, const char *prelude, char **missing)
+char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude, char **missing)
 {
     size_t file_count = 0;
     while (files[file_count].name)

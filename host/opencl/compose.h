@@ -8,7 +8,7 @@
 // after that, in any branch of the preprocessor; #line before and after, so that the compiler names the file
 // and line as they are in kernels/. Files are found by the last part of their path; <…> includes stay. NULL
 // if `root` or an include is not in `files`, with *missing (may be NULL) its name, to be freed by the caller.
-char *kernel_compose(const KernelFile *files, const char *root, const char *prelude, char **missing);
+char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude, char **missing);
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo; draft-eastlake-fnv). Start with HASH_START, chain by passing the last
 // hash.

@@ -2,6 +2,7 @@
 // Every OpenCL status that is not success is a fault (exit 2) that names the call and the symbolic status.
 #pragma once
 
+#include "host/base/embedded.h"
 #include "host/opencl/device.h"
 
 // `cl_must(clFinish(queue))`: faults with the call's text and the status' name.
@@ -17,13 +18,6 @@ typedef struct {
 
 void compute_open(Compute *compute, const Device *device);
 void compute_close(Compute *compute); // and zeroes; accepts a zeroed one
-
-// The kernel texts embedded in the program, by name ("render.cl", "sphere.h", …); ended by a NULL name.
-typedef struct {
-    const char *name;
-    const char *text;
-} KernelFile;
-extern const KernelFile kernel_files[];
 
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"

@@ -10,8 +10,8 @@ _glint_options() {
     diff) echo "--heatmap --json -h --help" ;;
     bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --tolerance --device" \
         "--lenient -h --help" ;;
-    accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --json --perturb" \
-        "--device --lenient -h --help" ;;
+    accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
+        "--perturb --device --lenient -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --json -h --help" ;;
     *) echo "--version --help" ;;
     esac
