@@ -323,12 +323,14 @@ static void light_add(const Renderer *renderer, const Light *light, Surfaces *su
     const Vectors *normal = &surfaces->normal, *to_eye = &surfaces->to_eye;
     alignas(64) int lit[LANES];
     alignas(64) float facing[LANES];
+    alignas(64) float distance[LANES];
     Vectors to_light;
     FOR_LANES
     {
         float x = place.x - surfaces->position.x[i], y = place.y - surfaces->position.y[i],
               z = place.z - surfaces->position.z[i];
-        float shorten = 1 / sqrtf(x * x + y * y + z * z);
+        float squared = x * x + y * y + z * z, shorten = 1 / sqrtf(squared);
+        distance[i] = squared * shorten;
         to_light.x[i] = shorten * x;
         to_light.y[i] = shorten * y;
         to_light.z[i] = shorten * z;
@@ -345,11 +347,11 @@ static void light_add(const Renderer *renderer, const Light *light, Surfaces *su
         shadow.org_x[i] = surfaces->start.x[i];
         shadow.org_y[i] = surfaces->start.y[i];
         shadow.org_z[i] = surfaces->start.z[i];
-        shadow.dir_x[i] = place.x - surfaces->start.x[i];
-        shadow.dir_y[i] = place.y - surfaces->start.y[i];
-        shadow.dir_z[i] = place.z - surfaces->start.z[i];
+        shadow.dir_x[i] = to_light.x[i];
+        shadow.dir_y[i] = to_light.y[i];
+        shadow.dir_z[i] = to_light.z[i];
         shadow.tnear[i] = 0;
-        shadow.tfar[i] = 1;
+        shadow.tfar[i] = distance[i];
         shadow.time[i] = 0;
         shadow.mask[i] = ~0U;
         shadow.flags[i] = 0;

@@ -26,9 +26,9 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *arguments)
     bounds->upper_z = sphere->center.z + sphere->radius;
 }
 
-// Where the rays meet the sphere first; `hit` tells which of the valid rays do. From the ray's point that is
-// nearest to the center, so that squares of large numbers do not cancel (Haines and others, Precision
-// improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
+// Where the rays, whose directions are unit, meet the sphere first; `hit` tells which of the valid rays do.
+// From the ray's point that is nearest to the center, so that squares of large numbers do not cancel (Haines
+// and others, Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
 static inline void sphere_meet(Sphere sphere, const struct RTCRay16 *ray, const int *valid, int *hit,
                                float *distance)
 {
@@ -37,11 +37,10 @@ static inline void sphere_meet(Sphere sphere, const struct RTCRay16 *ray, const 
         float x = sphere.center.x - ray->org_x[i], y = sphere.center.y - ray->org_y[i],
               z = sphere.center.z - ray->org_z[i];
         float dx = ray->dir_x[i], dy = ray->dir_y[i], dz = ray->dir_z[i];
-        float inverse_squared = 1 / (dx * dx + dy * dy + dz * dz);
-        float along = (x * dx + y * dy + z * dz) * inverse_squared;
+        float along = x * dx + y * dy + z * dz;
         float px = x - along * dx, py = y - along * dy, pz = z - along * dz;
         float inside = sphere.radius * sphere.radius - (px * px + py * py + pz * pz);
-        float half = sqrtf(fmaxf(inside, 0) * inverse_squared);
+        float half = sqrtf(fmaxf(inside, 0));
         float near = along - half, far = along + half;
         float t = near > ray->tnear[i] ? near : far;
         bool met = (inside >= 0) & (t > ray->tnear[i]) & (t < ray->tfar[i]);

@@ -7,5 +7,5 @@
 
 RTCGeometry spheres_embree(RTCDevice device, Sphere *spheres, size_t count);
 
-// For packets of 16 alone. `spheres` must outlive the geometry.
+// For packets of 16 whose directions are unit alone. `spheres` must outlive the geometry.
 RTCGeometry spheres_user(RTCDevice device, Sphere *spheres, size_t count);
