@@ -2,6 +2,8 @@
 #include "host/opencl/compute.h"
 
 #include "host/base/fault.h"
+#include <stdlib.h>
+#include <sys/mman.h>
 
 void compute_open(Compute *compute, const Device *device)
 {
@@ -22,15 +24,12 @@ void compute_close(Compute *compute)
     *compute = (Compute){0};
 }
 
-cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags)
+static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags)
 {
-    static const char nothing[1];
-    if (bytes) flags |= CL_MEM_COPY_HOST_PTR;
-    const void *source = size == 0 && bytes ? nothing : bytes;
     cl_int status;
-    // OpenCL 1.2 takes the source as a pointer to non-const, and only reads it here (section 5.2.1).
+    // OpenCL 1.2 takes the bytes as a pointer to non-const, and only reads them here (section 5.2.1).
     cl_mem buffer =
-        clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)source, &status);
+        clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);
     if (status != CL_SUCCESS) {
         const Device *device = compute->device;
         const double mebi = 1024.0 * 1024.0;
@@ -38,6 +37,45 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
               cl_status_name(status), (double)size / mebi, device->name, (double)device->memory_bytes / mebi,
               (double)device->largest_buffer_bytes / mebi);
     }
+    return buffer;
+}
+
+cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags)
+{
+    static const char nothing[1];
+    if (!bytes) return buffer_make(compute, size, NULL, flags);
+    return buffer_make(compute, size, size > 0 ? bytes : nothing, flags | CL_MEM_COPY_HOST_PTR);
+}
+
+enum { CACHE_LINE = 128, LARGE_PAGE = 1 << 21 };
+
+void *buffer_bytes_allocate(size_t size)
+{
+    size_t alignment = size < 2 * (size_t)LARGE_PAGE ? CACHE_LINE : LARGE_PAGE;
+    size_t rounded = (size / alignment + 1) * alignment;
+    void *bytes = aligned_alloc(alignment, rounded);
+    if (!bytes) fault("out of memory for a buffer of %zu bytes", size);
+#ifdef MADV_HUGEPAGE
+    if (alignment == LARGE_PAGE) madvise(bytes, rounded, MADV_HUGEPAGE); // a wish: no harm if not granted
+#endif
+    return bytes;
+}
+
+static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
+{
+    (void)buffer;
+    free(bytes);
+}
+
+cl_mem buffer_take(Compute *compute, size_t size, void *bytes)
+{
+    bool in_place = compute->device->type & CL_DEVICE_TYPE_CPU;
+    cl_mem buffer = buffer_make(compute, size, bytes,
+                                CL_MEM_READ_ONLY | (in_place ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR));
+    if (in_place)
+        cl_must(clSetMemObjectDestructorCallback(buffer, bytes_free, bytes));
+    else
+        free(bytes);
     return buffer;
 }
 

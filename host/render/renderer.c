@@ -111,13 +111,11 @@ static void upload(Renderer *renderer, FlatScene *flat)
     bool wide = renderer->report.wide;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         size_t size = flat_array_size(&flat->arrays[kind], wide);
-        void *bytes = memory_allocate(size + 1, 1);
+        void *bytes = buffer_bytes_allocate(size);
         flat_array_write(&flat->arrays[kind], wide, bytes);
         free(flat->arrays[kind].items);
         flat->arrays[kind].items = NULL;
-        renderer->arrays[kind] =
-            buffer_create(renderer->compute, size, size > 0 ? bytes : NULL, CL_MEM_READ_ONLY);
-        free(bytes);
+        renderer->arrays[kind] = buffer_take(renderer->compute, size, bytes);
     }
 }
 
