@@ -162,14 +162,14 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, uint signs)
     rays.to_near = vector_subtract(to_origin, around);
     rays.to_far = vector_add(to_origin, around);
     for (uint axis = 0; axis < 3; axis++) {
-        rays.near[axis] = signs >> axis & 1 ? axis + 4 : axis;
-        rays.far[axis] = signs >> axis & 1 ? axis : axis + 4;
+        rays.near[axis] = axis + (signs >> axis & 1 ? BVH_HIGH : BVH_LOW);
+        rays.far[axis] = axis + (signs >> axis & 1 ? BVH_LOW : BVH_HIGH);
     }
     rays.signs = signs;
     return rays;
 }
 
-// Where the rays enter a box, given by its low corner's numbers, one unused, and its high one's.
+// Where the rays enter a child's box.
 static inline real box_rays_enter(const BoxRays *rays, global const scalar *box, real near)
 {
     real x = fma((real)(box[rays->near[0]]), rays->inverse.x, rays->to_near.x);
@@ -199,8 +199,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
     for (;;) {
         if ((child.y & 0xff) == BVH_NODE) {
             global const BvhNode *node = &scene->nodes[child.x];
-            global const scalar *box_0 = (global const scalar *)&node->low_0;
-            global const scalar *box_1 = (global const scalar *)&node->low_1;
+            global const scalar *box_0 = (global const scalar *)node->planes, *box_1 = box_0 + BVH_CHILD;
             real near_0 = box_rays_enter(rays, box_0, ray->near);
             real near_1 = box_rays_enter(rays, box_1, ray->near);
             mask meets_0 = near_0 <= box_rays_leave(rays, box_0, limit);

@@ -104,14 +104,18 @@ typedef struct {
 #define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
 enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
 
-// A node of the bounding volume hierarchy holds its two children's boxes. A child is another node, or the
-// primitives first .. first + count of one kind.
+// A node of the bounding volume hierarchy holds its two children's boxes: twelve numbers, in `float` with the
+// rest one line of a cache. A child is another node, or the primitives first .. first + count of one kind.
 typedef struct {
-    scalar4 low_0, high_0, low_1, high_1;
+    scalar4 planes[3]; // BVH_LOW, BVH_HIGH, BVH_CHILD: where each begins
     // x: first child's node or first primitive, y: BVH_NODE or count << 8 | kind, with the axis along which
     // the second child lies behind the first in the bits from BVH_AXIS_SHIFT; z, w: the second's
     uint4 children;
 } BvhNode;
+
+// Where a child's low corner begins among a node's numbers, and its high one; the second child's are
+// BVH_CHILD further.
+enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_CHILD = 6 };
 
 enum { BVH_NODE = 0xff, BVH_AXIS_SHIFT = 16, BVH_DEPTH_LARGEST = 80 };
 
@@ -175,12 +179,12 @@ typedef struct {
     scalar4 background, ambient;
     // A picture's ray: forward + x right + y up, x and y in half pixels from the picture's center.
     scalar4 forward, right, up;
-    scalar4 bounds; // of what hangs in the hierarchy: xyz: center, w: no point lies farther from it, summed
-                    // over the axes
-    scalar4 sample;          // x: width of a sample's share of a pixel, at distance 1
-    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;           // x: of a ray, at most
-    uint4 counts[2];         // of each KIND_…, in its order
+    scalar4 bounds;  // of what hangs in the hierarchy: xyz: center, w: no point lies farther from it, summed
+                     // over the axes
+    scalar4 sample;  // x: width of a sample's share of a pixel, at distance 1
+    uint4 picture;   // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;   // x: of a ray, at most
+    uint4 counts[2]; // of each KIND_…, in its order
     uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
 } SceneHeader;
 

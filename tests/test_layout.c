@@ -65,10 +65,9 @@
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
     REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, a_b)                      \
     REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, c_density)                \
-    REALS(FLAT_NODES, BvhNode, BvhNode, low_0)                                   \
-    REALS(FLAT_NODES, BvhNode, BvhNode, high_0)                                  \
-    REALS(FLAT_NODES, BvhNode, BvhNode, low_1)                                   \
-    REALS(FLAT_NODES, BvhNode, BvhNode, high_1)                                  \
+    REALS(FLAT_NODES, BvhNode, BvhNode, planes[0])                                  \
+    REALS(FLAT_NODES, BvhNode, BvhNode, planes[1])                                 \
+    REALS(FLAT_NODES, BvhNode, BvhNode, planes[2])                                  \
     INTEGERS(FLAT_NODES, BvhNode, BvhNode, children)                             \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \

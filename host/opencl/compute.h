@@ -56,8 +56,9 @@ char *program_text(const char *root, const char *prelude);
 // that says what was asked for and what the device has.
 cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags);
 
-// Memory for a buffer's contents, at least `size` bytes; large contents lie on large pages where the system has
-// them, which spares a CPU that reads them at random most of its address translations. Given to buffer_take.
+// Memory for a buffer's contents, at least `size` bytes; large contents lie on large pages where the system
+// has them, which spares a CPU that reads them at random most of its address translations. Given to
+// buffer_take.
 void *buffer_bytes_allocate(size_t size);
 // A read-only buffer of those bytes, which belong to it from then on: a CPU reads them where they are, other
 // devices get a copy. Fails as buffer_create does.

@@ -184,11 +184,12 @@ static void child_write(const BvhChild *child, const Bvh *bvh, const Bounded *bo
     *what = empty ? 0 : child->count << 8 | bounded->kinds[bvh->order[child->first]];
 }
 
-static scalar4 corner_of(const BvhBox *box, const double corner[3])
+static void box_write(const BvhBox *box, double *planes)
 {
     // an empty child has no primitives: any box will do
-    if (box->low[0] > box->high[0]) return (scalar4){0, 0, 0, 0};
-    return (scalar4){corner[0], corner[1], corner[2], 0};
+    if (box->low[0] > box->high[0]) return;
+    memcpy(planes + BVH_LOW, box->low, sizeof box->low);
+    memcpy(planes + BVH_HIGH, box->high, sizeof box->high);
 }
 
 // The axis along which a node's children lie farthest apart, and whether the second lies before the first.
@@ -217,12 +218,8 @@ static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded)
         bool swapped;
         unsigned axis = children_axis(&bvh->nodes[i], &swapped);
         const BvhChild *first = &bvh->nodes[i].children[swapped], *second = &bvh->nodes[i].children[!swapped];
-        nodes[i] = (BvhNode){
-            .low_0 = corner_of(&first->box, first->box.low),
-            .high_0 = corner_of(&first->box, first->box.high),
-            .low_1 = corner_of(&second->box, second->box.low),
-            .high_1 = corner_of(&second->box, second->box.high),
-        };
+        box_write(&first->box, (double *)nodes[i].planes);
+        box_write(&second->box, (double *)nodes[i].planes + BVH_CHILD);
         child_write(first, bvh, bounded, order, &nodes[i].children.x, &nodes[i].children.y);
         child_write(second, bvh, bounded, order, &nodes[i].children.z, &nodes[i].children.w);
         nodes[i].children.y |= axis << BVH_AXIS_SHIFT;
