@@ -1,6 +1,7 @@
 #include "host/cli/accuracy_page_parts.h"
 
 #include "host/cli/html.h"
+#include <math.h>
 
 // One table: a caption, the headings after that of the variants, and what fills a variant's row.
 typedef struct {
@@ -23,10 +24,15 @@ void page_variant_name(Text *page, const AccuracyScene *scene, size_t variant)
     text_free(&name);
 }
 
-// The number itself goes with its cell, for sorting.
+// The number itself goes with its cell, for sorting, as JavaScript reads it.
 static void cell_number(Text *page, double value)
 {
-    text_appendf(page, "<td><data value=\"%.17g\">", value);
+    text_appendf(page, "<td><data value=\"");
+    if (isfinite(value))
+        text_appendf(page, "%.17g", value);
+    else
+        text_appendf(page, "%s", isnan(value) ? "NaN" : value > 0 ? "Infinity" : "-Infinity");
+    text_appendf(page, "\">");
     html_number(page, value);
     text_appendf(page, "</data></td>");
 }

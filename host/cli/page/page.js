@@ -263,9 +263,9 @@ const cellValue = (row, column) => {
 
 // Cells without a number come last whichever the order.
 function compareCells(a, b, sign) {
-  const isNumber = [typeof a === "number", typeof b === "number"];
+  const isNumber = [a, b].map((value) => typeof value === "number" && !Number.isNaN(value));
   if (isNumber[0] !== isNumber[1]) return isNumber[0] ? -1 : 1;
-  return sign * (isNumber[0] ? (a === b ? 0 : a - b) : a.localeCompare(b));
+  return sign * (isNumber[0] ? (a === b ? 0 : a - b) : String(a).localeCompare(String(b)));
 }
 
 function makeSortable(table) {
