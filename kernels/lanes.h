@@ -83,6 +83,13 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) natural; // wraps around
 #define LANE_Y      ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
 #endif
 
+// Marks a branch that few rays take: what it alone needs then stays out of registers.
+#ifdef __clang__
+#define RARELY(condition) __builtin_expect(condition, false)
+#else
+#define RARELY(condition) (condition)
+#endif
+
 #define lanes_select(condition, yes, no) ((condition) ? (yes) : (no))
 
 static inline mask mask_all(void)

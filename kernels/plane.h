@@ -4,10 +4,14 @@
 
 #include "ray.h"
 
-// t = height / along where that is a number, tested without dividing.
+// t = height / along where that is a number, tested without dividing; their signs tell a plane behind the
+// ray.
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
-    mask hit = ray->active & (fabs(height) * (real)(SMALLEST_RATIO) < fabs(along));
+    mask ahead = (height > (real)(0)) == (along > (real)(0));
+    mask hit = ray->active & (ahead | (ray->near < (real)(0))) &
+               (fabs(height) * (real)(SMALLEST_RATIO) < fabs(along));
+    if (!lanes_any(hit)) return hit;
     *t = real_divide(height, lanes_select(hit, along, (real)(1)));
     return hit & (*t > ray->near);
 }
@@ -19,8 +23,8 @@ static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, r
     real along;
     real height;
     if (IS_COMPENSATED) {
-        along = pair_vector_dot_vector(pair_vector_of(normal), ray->direction).high;
-        height = pair_vector_dot_vector(pair_vector_difference(point, ray->origin), normal).high;
+        along = vector_dot_exactly(normal, ray->direction);
+        height = pair_vector_dot_once(pair_vector_difference(point, ray->origin), normal);
     } else {
         along = vector_dot(normal, ray->direction);
         height = vector_dot(normal, vector_subtract(point, ray->origin));

@@ -95,14 +95,21 @@ static inline Vector ray_point(const Ray *ray, real t)
     return vector_fma(ray->direction, t, ray->origin);
 }
 
+// start + direction t, rounded about once.
+static inline real ray_coordinate(Pair start, real direction, real t)
+{
+    Pair way = pair_product(direction, t), sum = pair_sum(start.high, way.high);
+    return sum.high + (sum.low + (start.low + way.low));
+}
+
 // The same point as seen from another; compensated, it is as exact as t is, however far the ray has come.
 static inline Vector ray_point_from(const Ray *ray, Vector from, real t)
 {
     if (!IS_COMPENSATED) return vector_fma(ray->direction, t, vector_subtract(ray->origin, from));
     PairVector start = pair_vector_difference(ray->origin, from);
-    return (Vector){pair_add(start.x, pair_product(ray->direction.x, t)).high,
-                    pair_add(start.y, pair_product(ray->direction.y, t)).high,
-                    pair_add(start.z, pair_product(ray->direction.z, t)).high};
+    return (Vector){ray_coordinate(start.x, ray->direction.x, t),
+                    ray_coordinate(start.y, ray->direction.y, t),
+                    ray_coordinate(start.z, ray->direction.z, t)};
 }
 
 static inline Patch patch_make(Vector position, Vector normal, real size)

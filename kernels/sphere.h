@@ -1,68 +1,97 @@
-// Sphere.
+// Sphere: with f from the center to the ray's start, b = f . d, c = f . f - r^2, discriminant b^2 - a c.
 #ifndef SPHERE_H
 #define SPHERE_H
 
 #include "quadratic.h"
 
-// a r^2 - |E|^2 for the line's moment E = f x d and a = d . d.
-static inline Pair sphere_discriminant(real radius, Pair a, PairVector moment)
+typedef struct {
+    real b, c;
+} SphereCoefficients;
+
+// Each rounded about once. `to_center` is -f.
+static inline SphereCoefficients sphere_coefficients(PairVector to_center, real radius, const Ray *ray)
 {
-    return pair_subtract(pair_multiply(a, pair_product(radius, radius)), pair_vector_dot(moment, moment));
+    real x = to_center.x.high, y = to_center.y.high, z = to_center.z.high;
+    Pair rr = pair_product(radius, radius);
+    Pair xx = pair_product(x, x), yy = pair_product(y, y), zz = pair_product(z, z);
+    Pair one = pair_sum(xx.high, -rr.high), two = pair_sum(one.high, yy.high),
+         three = pair_sum(two.high, zz.high);
+    real twice_low = fma(x, to_center.x.low, fma(y, to_center.y.low, z * to_center.z.low));
+    real low = ((one.low + two.low) + three.low) + ((xx.low + yy.low) + (zz.low - rr.low));
+    return (SphereCoefficients){-pair_vector_dot_once(to_center, ray->direction),
+                                three.high + fma((real)(2), twice_low, low)};
 }
 
+// From rounded b and c, off by 2 u (b^2 + |a c|): right where the line's closest approach is within the
+// sphere's reach.
+static inline real sphere_discriminant_beside(SphereCoefficients exact, const Ray *ray)
+{
+    return product_difference(exact.b, exact.b, ray->squared, exact.c);
+}
+
+// a r^2 - |E|^2 for the line's moment E = f x d, by Lagrange's identity: off by some 10 u a r^2 at any
+// distance.
+static inline real sphere_discriminant_afar(Vector moment, real radius, const Ray *ray)
+{
+    return fma(ray->squared * radius, radius, -vector_dot(moment, moment));
+}
+
+// Takes the better of the two.
+static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, real radius, const Ray *ray)
+{
+    real discriminant = sphere_discriminant_afar(moment, radius, ray);
+    mask beside = exact.b * exact.b < ray->squared * radius * radius;
+    if (lanes_any(beside))
+        discriminant = lanes_select(beside, sphere_discriminant_beside(exact, ray), discriminant);
+    return discriminant;
+}
+
+// First the textbook's b^2 - a c, with f . f lowered by more than all roundings come to: what it rejects is a
+// miss, at no more cost than the textbook's. Then a ray that leaves outward.
+//
 // The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4
 // u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
-// intersection, Ray Tracing Gems, 2019, chapter 7). The compensated form takes the discriminant from the
-// line's moment E = f x d, a r^2 - |E|^2 by Lagrange's identity, in pairs: its error does not grow with the
-// distance. It first asks the cheap form, whose bound rejects most rays.
+// intersection, Ray Tracing Gems, 2019, chapter 7). Within a 32nd of the radius of the surface c cancels, and
+// both roots with it. The compensated form rounds each number once.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
-    real radius = (real)(sphere->center_radius.w);
+    real radius = (real)(sphere->center_radius.w), squared_radius = radius * radius;
     Vector f = vector_subtract(ray->origin, center);
-    real b = vector_dot(f, ray->direction);
-    Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
-    real half_chord_squared = fma(radius, radius, -vector_dot(l, l));
+    real b = vector_dot(f, ray->direction), squared_distance = vector_dot(f, f);
+    real lowered_c = fma(squared_distance, (real)(1 - 32 * UNIT_ROUNDOFF), -squared_radius);
+    mask hit = ray->active & (fma(b, b, -(ray->squared * lowered_c)) >= (real)(0));
+    if (!lanes_any(hit)) return hit;
 
-    real doubt = (real)(0);
-    if (IS_COMPENSATED) {
-        // both l and f are off by a few u |f|; |l| is about the radius where it matters
-        real reach =
-            vector_magnitude(f) + fabs(radius) + vector_magnitude(ray->origin) + vector_magnitude(center);
-        doubt = (real)(16 * UNIT_ROUNDOFF) * reach * (radius + (real)(16 * UNIT_ROUNDOFF) * reach);
-    }
-    mask hit = ray->active & (half_chord_squared >= -doubt);
-    if (!lanes_any(hit)) return mask_none();
+    real c = squared_distance - squared_radius;
+    mask outside = c > (real)(32 * UNIT_ROUNDOFF) * squared_radius;
+    hit = hit & !(outside & (b > (real)(0)) & (ray->near >= (real)(0)));
+    if (!lanes_any(hit)) return hit;
 
-    Roots roots;
+    real discriminant;
     if (IS_COMPENSATED) {
-        PairVector exact_f = pair_vector_difference(ray->origin, center);
-        PairVector moment = pair_vector_cross(exact_f, ray->direction);
-        Pair a = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
-        Pair discriminant = sphere_discriminant(radius, a, moment);
-        Pair c = pair_subtract(pair_vector_dot(exact_f, exact_f), pair_product(radius, radius));
-        real exact_b = pair_vector_dot_vector(exact_f, ray->direction).high;
-        hit = hit & (discriminant.high >= (real)(0));
-        roots = quadratic_roots(a.high, exact_b, c.high, discriminant.high);
+        PairVector to_center = pair_vector_difference(center, ray->origin);
+        SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
+        Vector moment = pair_vector_cross_once(to_center, ray->direction);
+        discriminant = sphere_discriminant(exact, moment, radius, ray);
+        b = exact.b;
+        c = exact.c;
+        hit = hit & (discriminant >= (real)(0));
     } else {
-        real c = fma(-radius, radius, vector_dot(f, f));
-        real discriminant = ray->squared * half_chord_squared;
-        // Within a 32nd of the radius of the surface c cancels, and both roots with it: pairs instead. A ray
-        // that leaves outward needs none.
-        real squared_radius = radius * radius;
-        mask leaves = (b > (real)(0)) & (c > (real)(8 * UNIT_ROUNDOFF) * squared_radius);
-        mask beside = hit & !leaves & (fabs(c) < (real)(0x1p-4f) * squared_radius);
-        if (lanes_any(beside)) {
-            PairVector exact_f = pair_vector_difference(ray->origin, center);
-            Pair exact_c = pair_subtract(pair_vector_dot(exact_f, exact_f), pair_product(radius, radius));
-            real exact_b = pair_vector_dot_vector(exact_f, ray->direction).high;
-            b = lanes_select(beside, exact_b, b);
-            c = lanes_select(beside, exact_c.high, c);
-            discriminant = lanes_select(beside, product_difference(b, b, ray->squared, c), discriminant);
+        Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
+        real half_chord_squared = fma(radius, radius, -vector_dot(l, l));
+        discriminant = ray->squared * half_chord_squared;
+        hit = hit & (half_chord_squared >= (real)(0));
+        mask beside = hit & (fabs(c) < (real)(0x1p-4f) * squared_radius);
+        if (RARELY(lanes_any(beside))) {
+            PairVector to_center = pair_vector_difference(center, ray->origin);
+            SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
+            b = lanes_select(beside, exact.b, b);
+            c = lanes_select(beside, exact.c, c);
+            discriminant = lanes_select(beside, sphere_discriminant_beside(exact, ray), discriminant);
         }
-        roots = quadratic_roots(ray->squared, b, c, discriminant);
     }
-    *t = sphere->id.y & ONLY_INSIDE ? roots.far : ray_first(ray, roots.near, roots.far);
+    *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & ONLY_INSIDE);
     return hit & (*t > ray->near);
 }
 
@@ -75,15 +104,14 @@ static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
     real radius = (real)(sphere->center_radius.w);
     Vector outward;
     if (IS_COMPENSATED) {
-        PairVector f = pair_vector_difference(ray->origin, center);
-        PairVector moment = pair_vector_cross(f, ray->direction);
-        Pair a = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
-        real discriminant = real_max(sphere_discriminant(radius, a, moment).high, (real)(0));
-        Vector l = vector_scale(vector_cross(ray->direction, pair_vector_high(moment)),
-                                real_divide((real)(1), ray->squared));
-        real h = real_divide(real_sqrt(discriminant), ray->squared);
-        real b = pair_vector_dot_vector(f, ray->direction).high;
-        mask far_side = fma(ray->squared, t, b) > (real)(0);
+        PairVector to_center = pair_vector_difference(center, ray->origin);
+        SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
+        Vector moment = pair_vector_cross_once(to_center, ray->direction);
+        real discriminant = real_max(sphere_discriminant(exact, moment, radius, ray), (real)(0));
+        real inverse = real_divide((real)(1), ray->squared);
+        Vector l = vector_scale(vector_cross(moment, ray->direction), inverse);
+        real h = real_sqrt(discriminant) * inverse;
+        mask far_side = fma(ray->squared, t, exact.b) > (real)(0);
         outward = vector_fma(ray->direction, lanes_select(far_side, h, -h), l);
     } else {
         outward = vector_fma(ray->direction, t, vector_subtract(ray->origin, center));
