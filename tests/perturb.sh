@@ -1,0 +1,67 @@
+#!/bin/bash
+# A device whose divisions, roots and powers are as wrong as the OpenCL C specification allows: the hard cases hold their
+# hygiene at `fast` and `single`, `strict` gives the bits it always gives, `double` has nothing to err in but powers. Two
+# seeds without the two large meshes; all of 1 to 20 with everything under GLINT_LONG_TESTS=1.
+. "$(dirname "$0")/support.bash"
+
+cases='S1 S3 S4 S5 S6 P1 P3 P4 P5 P6 P7 C1 C2 C3 C4 C5 C6 C7 T1 T2 T3 T4 T5 T6 M3 M4 M5 M6 R4 R8'
+seeds='1 2'
+if [ "${GLINT_LONG_TESTS-}" = 1 ]; then
+    cases=
+    seeds=$(seq 1 20)
+fi
+is_sanitized && seeds=1
+
+verify() { "$GLINT" verify $cases "$@" >"$scratch/lines" 2>&1; }
+holds() { verify "$@" || { grep -E 'FAIL|error' "$scratch/lines"; return 1; }; }
+
+for seed in $seeds; do
+    for precision in fast single; do
+        check "seed $seed at $precision" holds --precision $precision --perturb "$seed"
+        grep -q "^  tier A: " "$scratch/lines" || fail "seed $seed at $precision is not held to tier A"
+    done
+done
+
+# Errors a thousand times as large are not forgiven.
+status=0
+"$GLINT" verify S6 --precision single --perturb 1:1000 >"$scratch/lines" || status=$?
+check "a thousand times the errors: exit status $status, not 3" test $status = 3
+check "a thousand times the errors: rays hit the sphere they leave" grep -q '^  S6 .*FAIL' "$scratch/lines"
+
+# At `strict` what a device does wrong is repaired, and at `double` rays meet nothing that may be wrong: same bits.
+hashes() { "$GLINT" verify S1 S6 P4 C5 C7 T1 M4 R4 --json --lanes 4 "$@" | grep '"hash"'; }
+wide=
+"$GLINT" devices | grep -q '^0\*.* yes ' && wide=double
+for precision in strict $wide; do
+    hashes --precision $precision >"$scratch/plain"
+    check "$precision has 8 hashes" test "$(wc -l <"$scratch/plain")" = 8
+    hashes --precision $precision --perturb 7 >"$scratch/perturbed"
+    check "$precision keeps its bits" diff "$scratch/plain" "$scratch/perturbed"
+done
+hashes --precision single >"$scratch/plain"
+hashes --precision single --perturb 7 >"$scratch/perturbed"
+check 'single does not keep its bits' test "$(diff "$scratch/plain" "$scratch/perturbed" | grep -c '^>')" = 8
+
+# Pictures: no seed is another, each is the same twice and at every width, and none has a pixel that is no number.
+scene=tests/scenes/every_shape.yaml
+render() { "$GLINT" render $scene --size 64x36 --quiet -o "$scratch/$1" "${@:2}"; }
+render strict.npy --precision strict
+render strict_7.npy --precision strict --perturb 7
+check 'the picture at strict keeps its bits' npy_same "$scratch/strict.npy" "$scratch/strict_7.npy" 64
+render single_7.npy --perturb 7
+render single_8.npy --perturb 8
+render single_7_again.npy --perturb 7 --lanes 1
+check 'one seed, one picture' npy_same "$scratch/single_7.npy" "$scratch/single_7_again.npy" 64
+check 'another seed, another picture' test "$(npy_same "$scratch/single_7.npy" "$scratch/single_8.npy" 64 | wc -l)" = 1
+printf '0 1 -9 0 0.01 1\n-5 1 0 1 0 0.02\n1 9 -2 0.01 -1 0\n' >"$scratch/rays"
+"$GLINT" trace $scene --rays "$scratch/rays" -o "$scratch/plain.csv"
+"$GLINT" trace $scene --rays "$scratch/rays" -o "$scratch/perturbed.csv" --perturb 7
+check 'traced rays err, too' test "$(diff "$scratch/plain.csv" "$scratch/perturbed.csv" | wc -l)" -gt 0
+
+# Only perturb.h calls what devices may do their own way; quotients of constants are the compiler's.
+device_functions='sqrt|rsqrt|pow|powr|pown|exp|exp2|log|log2|native_[a-z0-9]*|half_[a-z]+|normalize|length|distance|sin|cos|tan'
+device_functions+='|acos|atan2?|hypot|mad|mix|smoothstep|dot|cross|fmod'
+strays=$(sed 's,//.*,,; s/(real)([^()]*)//g' $(ls kernels/*.h kernels/*.cl | grep -v -e /perturb.h -e /peak.cl) |
+    grep -E "[^_a-z.]($device_functions)\(| / " || true)
+check "kernels do what is perturb.h's: $strays" test -z "$strays"
+finish
