@@ -149,12 +149,28 @@ static Long circle_crossing(const CircleLine *line, Long outside, Long inside, L
     return (outside + inside) / 2;
 }
 
+// Whether the line keeps clear of the tube by a quarter of its radius: from each place as far as it is from
+// there nothing can be.
+static bool circle_is_clear(const CircleLine *line, double span, double minor)
+{
+    const LongVector *from = &line->nearest, *along = &line->direction;
+    const double x = (double)from->x, y = (double)from->y, z = (double)from->z, major = (double)line->major;
+    const double dx = (double)along->x, dy = (double)along->y, dz = (double)along->z;
+    for (double s = -span; s < span;) {
+        double px = x + s * dx, py = y + s * dy, pz = z + s * dz;
+        double off = sqrt(px * px + py * py) - major, clear = sqrt(off * off + pz * pz) - minor;
+        if (clear < minor / 4) return false;
+        s += clear - minor / 8;
+    }
+    return true;
+}
+
 // The distance to the circle is looked at along the line; it changes no faster than the place, so that what
 // is far from the tube at one place is outside it as far around.
 ExactHit exact_torus(LongVector center, Long major, Long minor, LongVector direction)
 {
     enum { STEPS = 48 };
-    Long length = long_length(direction), reach = (major + minor) * 1.001L;
+    Long length = long_length(direction), reach = (major + minor) * 1.25L;
     LongVector unit = long_scale(direction, 1 / length);
     Long middle = long_dot(center, unit);
     CircleLine line = {long_subtract(long_scale(unit, middle), center), unit, major};
@@ -165,6 +181,7 @@ ExactHit exact_torus(LongVector center, Long major, Long minor, LongVector direc
     Long squared = reach * reach - long_dot(line.nearest, line.nearest);
     if (squared <= 0 || middle <= 0) return exact;
     Long span = sqrtl(squared), step = 2 * span / STEPS, deepest = INFINITY;
+    if (circle_is_clear(&line, (double)span, (double)minor)) return exact;
     Long distances[STEPS + 1];
     for (int i = 0; i <= STEPS; i++)
         distances[i] = circle_distance(&line, i * step - span);

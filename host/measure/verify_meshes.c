@@ -16,11 +16,12 @@ static ProbeRay ray_of(const VerifyRun *run, Vector3 origin, Vector3 direction)
 // From inside a mesh where neighboring floats are 1/64 apart no ray gets out.
 void verify_far_mesh(VerifyRun *run)
 {
-    enum { COUNT = 1 << 16, BATCHES = 8 };
+    enum { COUNT = 1 << 16, BATCHES = 16 };
     ProbeRay *rays = memory_allocate(COUNT, sizeof *rays);
     ProbeHit *hits = memory_allocate(COUNT, sizeof *hits);
     Scene scene = scene_empty();
     scene_far_sphere(&scene);
+    void *opened = run->renderer->open(run->renderer->context, &scene, true);
     for (uint64_t batch = 0; batch < BATCHES; batch++) {
         for (uint64_t i = 0; i < COUNT; i++) {
             uint64_t index = batch * COUNT + i;
@@ -28,10 +29,11 @@ void verify_far_mesh(VerifyRun *run)
                            random_symmetric(65, index, 2)};
             rays[i] = ray_of(run, vector_add(far_sphere_center, off), random_unit(65, index, 3));
         }
-        verify_trace(run, &scene, true, rays, COUNT, hits);
+        verify_trace_opened(run, opened, rays, COUNT, hits);
         for (size_t i = 0; i < COUNT; i++)
             run->result->leaks += !verify_is_hit(&hits[i]);
     }
+    run->renderer->close(opened);
     scene_free(&scene);
     free(rays);
     free(hits);
@@ -175,7 +177,7 @@ void verify_degenerate_meshes(VerifyRun *run)
     free(clean);
 }
 
-enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 50, CROWD_RAYS = 1 << 14 };
+enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 50, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 4 };
 
 static void add_other(Scene *scene, ShapeKind kind, uint64_t index)
 {
@@ -236,9 +238,10 @@ static Scene crowd_make(void)
 
 // A quarter of them at random, a quarter along an axis in the plane of a triangle's corner, a half at
 // corners, half of which start where another ray was reflected.
-static void crowd_rays(const VerifyRun *run, const Scene *scene, const ProbeHit *reflected, ProbeRay *rays)
+static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first, const ProbeHit *reflected,
+                       ProbeRay *rays)
 {
-    for (uint64_t i = 0; i < CROWD_RAYS; i++) {
+    for (uint64_t i = first; i < first + CROWD_RAYS; i++) {
         uint64_t triangle = (uint64_t)(random_at(69, i, 0) * CROWD_TRIANGLES);
         Vector3 corner = scene->objects.items[triangle].as.triangle.vertices[i % 3];
         Vector3 origin = vector_scale(random_unit(69, i, 1), 3), direction = random_point(69, i, 4);
@@ -250,13 +253,13 @@ static void crowd_rays(const VerifyRun *run, const Scene *scene, const ProbeHit 
             origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
         }
         if (i % 4 == 2) direction = vector_subtract(corner, origin);
-        if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - 3])) {
-            const ProbeHit *hit = &reflected[i - 3];
+        if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
+            const ProbeHit *hit = &reflected[i - first - 3];
             origin = (Vector3){hit->mirrored_origin[0], hit->mirrored_origin[1], hit->mirrored_origin[2]};
             direction =
                 (Vector3){hit->mirrored_direction[0], hit->mirrored_direction[1], hit->mirrored_direction[2]};
         }
-        rays[i] = ray_of(run, origin, direction);
+        rays[i - first] = ray_of(run, origin, direction);
     }
 }
 
@@ -268,23 +271,29 @@ void verify_hierarchy(VerifyRun *run)
     ProbeHit *hits = memory_allocate(CROWD_RAYS, sizeof *hits),
              *plain = memory_allocate(CROWD_RAYS, sizeof *plain);
     Scene scene = crowd_make();
-    crowd_rays(run, &scene, NULL, rays);
-    verify_trace(run, &scene, true, rays, CROWD_RAYS, hits);
-    crowd_rays(run, &scene, hits, rays);
-    verify_trace(run, &scene, false, rays, CROWD_RAYS, plain);
-    double endless = rays[0].tmax;
+    void *tree = run->renderer->open(run->renderer->context, &scene, true);
+    void *list = run->renderer->open(run->renderer->context, &scene, false);
     const double parts[] = {INFINITY, 1 - 2 * verify_roundoff(run), 1 + 2 * verify_roundoff(run)};
-    for (size_t cut = 0; cut < sizeof parts / sizeof *parts; cut++) {
-        for (size_t i = 0; i < CROWD_RAYS; i++)
-            if (verify_is_hit(&plain[i]))
-                rays[i].tmax = fmin(endless, verify_rounded(run, plain[i].t * parts[cut]));
-        verify_trace(run, &scene, true, rays, CROWD_RAYS, hits);
-        for (size_t i = 0; i < CROWD_RAYS; i++) {
-            bool hit = verify_is_hit(&plain[i]) && plain[i].t < rays[i].tmax;
-            bool same = verify_is_hit(&hits[i]) == hit && hits[i].light == (hit ? 0 : 1);
-            run->result->differing += !same || (hit && !verify_same_bits(&hits[i], &plain[i]));
+    for (uint64_t batch = 0; batch < CROWD_BATCHES; batch++) {
+        crowd_rays(run, &scene, batch * CROWD_RAYS, NULL, rays);
+        verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
+        crowd_rays(run, &scene, batch * CROWD_RAYS, hits, rays);
+        verify_trace_opened(run, list, rays, CROWD_RAYS, plain);
+        double endless = rays[0].tmax;
+        for (size_t cut = 0; cut < sizeof parts / sizeof *parts; cut++) {
+            for (size_t i = 0; i < CROWD_RAYS; i++)
+                if (verify_is_hit(&plain[i]))
+                    rays[i].tmax = fmin(endless, verify_rounded(run, plain[i].t * parts[cut]));
+            verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
+            for (size_t i = 0; i < CROWD_RAYS; i++) {
+                bool hit = verify_is_hit(&plain[i]) && plain[i].t < rays[i].tmax;
+                bool same = verify_is_hit(&hits[i]) == hit && hits[i].light == (hit ? 0 : 1);
+                run->result->differing += !same || (hit && !verify_same_bits(&hits[i], &plain[i]));
+            }
         }
     }
+    run->renderer->close(tree);
+    run->renderer->close(list);
     scene_free(&scene);
     free(rays);
     free(hits);

@@ -1,0 +1,77 @@
+#include "host/measure/scene_change.h"
+
+// Every vector that is a place or reaches from one to another; scenes with meshes are not for this.
+static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
+{
+    change(&scene->camera.position, factor);
+    change(&scene->camera.look_at, factor);
+    change(&scene->camera.up, factor);
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        change(&scene->lights.items[i].position, factor);
+        change(&scene->lights.items[i].direction, factor);
+    }
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        // all shapes but the sphere and the triangle have two vectors, in this order
+        Vector3 *vectors = &object->as.plane.point;
+        size_t count = object->kind == SHAPE_SPHERE ? 1 : object->kind == SHAPE_TRIANGLE ? 6 : 2;
+        for (size_t k = 0; k < count; k++)
+            change(&vectors[k], factor);
+    }
+}
+
+static void vector_grow(Vector3 *vector, double factor)
+{
+    *vector = vector_scale(*vector, factor);
+}
+
+void scene_scale(Scene *scene, double factor)
+{
+    scene_for_each_vector(scene, vector_grow, factor);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        if (object->kind == SHAPE_SPHERE) object->as.sphere.radius *= factor;
+        if (object->kind == SHAPE_DISC) object->as.disc.radius *= factor;
+        if (object->kind == SHAPE_CYLINDER) object->as.cylinder.radius *= factor;
+        if (object->kind == SHAPE_TORUS) object->as.torus.major *= factor;
+        if (object->kind == SHAPE_TORUS) object->as.torus.minor *= factor;
+        if (object->kind == SHAPE_CONE) object->as.cone.radius[0] *= factor;
+        if (object->kind == SHAPE_CONE) object->as.cone.radius[1] *= factor;
+    }
+    for (size_t i = 0; i < scene->materials.count; i++)
+        scene->materials.items[i].checker_size *= factor;
+}
+
+static void vector_mirror(Vector3 *vector, double factor)
+{
+    vector->x *= factor;
+}
+
+// A checker's squares lie at floor(x / size), which mirrors an even one to an odd one.
+void scene_mirror(Scene *scene)
+{
+    scene_for_each_vector(scene, vector_mirror, -1);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        if (object->kind != SHAPE_BOX) continue;
+        double low = object->as.box.max.x;
+        object->as.box.max.x = object->as.box.min.x;
+        object->as.box.min.x = low;
+    }
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        Color *colors = scene->materials.items[i].checker_colors, first = colors[0];
+        colors[0] = colors[1];
+        colors[1] = first;
+    }
+}
+
+static void vector_turn(Vector3 *vector, double unused)
+{
+    (void)unused;
+    *vector = (Vector3){vector->z, vector->x, vector->y};
+}
+
+void scene_turn_axes(Scene *scene)
+{
+    scene_for_each_vector(scene, vector_turn, 1);
+}

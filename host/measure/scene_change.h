@@ -1,0 +1,11 @@
+// Scenes changed in ways that change their pictures in a known way only.
+#pragma once
+
+#include "host/scene/scene.h"
+
+// Every length times a factor; with a power of two the picture is the same bit for bit.
+void scene_scale(Scene *scene, double factor);
+// x becomes -x, and the picture its mirror image.
+void scene_mirror(Scene *scene);
+// x becomes y, y becomes z, z becomes x; the picture stays, but for rounding.
+void scene_turn_axes(Scene *scene);
