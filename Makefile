@@ -67,6 +67,11 @@ $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ -lcmocka $(LIBS) -o $@
 
+ladder: $(BUILD)/tools/numerics/ladder
+
+$(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/reference.o tests/specimen.o) $(library)
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+
 # These two change only when what they hold does, and what depends on it is then built anew.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
 $(BUILD)/version: text := $(GLINT_VERSION)
@@ -109,7 +114,7 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers) \
+linted := $(sources) $(test_programs) $(test_helpers) tools/numerics/ladder.c \
           $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl tools/numerics/textbook/*.h host/*/*.h tests/*.h \
@@ -134,6 +139,16 @@ lint-cppcheck:
 lint-man:
 	@! groff -man -ww -z -Tutf8 docs/glint.1 2>&1 | grep .
 
+# The measured parts of the documents; the machine should have nothing else to do.
+measured_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
+
+docs-measurements: $(BUILD)/glint
+	$(BUILD)/glint accuracy $(measured_scenes) --json > $(BUILD)/accuracy.json
+	$(BUILD)/glint bench scenes/spheres16.yaml --size 1920x1080 --lanes 1,16 --precision single,strict,double --json \
+	    > $(BUILD)/bench.json
+	cp $(BUILD)/accuracy.json $(BUILD)/bench.json docs/measurements
+	tools/report docs/accuracy.md docs/performance.md
+
 data := $(DESTDIR)$(PREFIX)/share
 
 install: all
@@ -155,7 +170,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man install uninstall clean FORCE
+.PHONY: all tests test ladder bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(BUILD)/tools/numerics/ladder.d $(tests:=.d) $(test_objects:.o=.d)
