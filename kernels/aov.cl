@@ -28,7 +28,7 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *directions, g
     film_store_integer(objects_hit, &tile, 1, 0, hit.object);
     for (uint i = 0; i < shadow_count; i++) {
         mask shadowed;
-        phong_light(&scene, &surface, &ray, i, &shadowed);
+        phong_light(&scene, &surface, i, &shadowed);
         film_store_integer(shadows, &tile, shadow_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }

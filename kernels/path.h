@@ -7,13 +7,13 @@
 #include "phong.h"
 
 // What a surface shows by itself: ambient light and each light that reaches it.
-static inline Color3 surface_color(const Scene *scene, const Surface *surface, const Ray *ray)
+static inline Color3 surface_color(const Scene *scene, const Surface *surface)
 {
     Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
     Color3 color = color_multiply(ambient, surface->color);
     for (uint i = 0; i < scene->header->picture.w; i++) {
         mask shadowed;
-        color = vector_add(color, phong_light(scene, surface, ray, i, &shadowed));
+        color = vector_add(color, phong_light(scene, surface, i, &shadowed));
     }
     return color;
 }
@@ -51,7 +51,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
         bool any_found = lanes_any(surface.found);
         if (any_found) {
             surface = surface_at(scene, &ray, &hit);
-            seen = vector_select(surface.found, surface_color(scene, &surface, &ray), background);
+            seen = vector_select(surface.found, surface_color(scene, &surface), background);
         }
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (SIGNS_PATHS) *path = path_sign(*path, &ray, &hit, mask_none(), mask_none(), mask_none());

@@ -57,8 +57,7 @@ static inline real phong_highlight(Vector reflected, Vector to_eye, real shinine
 
 // The light that reaches the eye from one light, black where the surface turns away from it or lies in its
 // shadow; *shadowed tells which lanes do.
-static inline Color3 phong_light(const Scene *scene, const Surface *surface, const Ray *eye_ray, uint index,
-                                 mask *shadowed)
+static inline Color3 phong_light(const Scene *scene, const Surface *surface, uint index, mask *shadowed)
 {
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
     Light light = scene->lights[index];
@@ -80,8 +79,7 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, con
     if (lanes_any(lit & (surface->specular > (real)(0)))) {
         Vector reflected =
             vector_fma(surface->shading_normal, facing + facing, vector_negate(to_light.direction));
-        Vector to_eye = vector_negate(vector_scale(eye_ray->direction, real_sqrt(eye_ray->inverse_squared)));
-        real highlight = surface->specular * phong_highlight(reflected, to_eye, surface->shininess);
+        real highlight = surface->specular * phong_highlight(reflected, surface->to_eye, surface->shininess);
         color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
     }
     return vector_select(lit, color_multiply(color, reached), black);

@@ -15,7 +15,8 @@ typedef struct {
     real travelled; // from the eye to the origin, for pictures on surfaces
     // for boxes: 1 / direction; huge where the component is 0
     Vector inverse;
-    // for triangles: unit vectors across the direction, and along it
+    // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
+    // along it, whose product with a point seen from the origin is the point's t
     Vector across_u, across_v, along;
 } Ray;
 
@@ -51,15 +52,17 @@ static inline real real_inverse_or_huge(real a)
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
 
-// A frame across a unit vector without a branch (Duff et al., Building an orthonormal basis, revisited, JCGT
-// 6(1), 2017, listing 3).
-static inline void frame_across(Vector unit, Vector *u, Vector *v)
+// Two vectors across another, as long as each other and at right angles, without a branch (Duff et al.,
+// Building an orthonormal basis, revisited, JCGT 6(1), 2017, listing 3; here multiplied by length (length +
+// |z|), which spares the divisions).
+static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
-    real side = lanes_select(unit.z >= (real)(0), (real)(1), (real)(-1));
-    real a = -real_divide((real)(1), side + unit.z);
-    real b = unit.x * unit.y * a;
-    *u = (Vector){fma(side * unit.x * unit.x, a, (real)(1)), side * b, -side * unit.x};
-    *v = (Vector){b, fma(unit.y * unit.y, a, side), -unit.y};
+    real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
+    real length_ = vector_length(d);
+    real w = fma(side, length_, d.z);
+    real length_w = length_ * w;
+    *u = (Vector){fma(-side * d.x, d.x, length_w), -side * d.x * d.y, -side * d.x * w};
+    *v = (Vector){-d.x * d.y, fma(-d.y, d.y, side * length_w), -d.y * w};
 }
 
 static inline Ray ray_make(Vector origin, Vector direction, real near, real far, mask active)
@@ -77,8 +80,9 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
         ray.inverse = (Vector){real_inverse_or_huge(direction.x), real_inverse_or_huge(direction.y),
                                real_inverse_or_huge(direction.z)};
     if (HAS_TRIANGLES) {
-        ray.along = vector_normalize(direction);
-        frame_across(ray.along, &ray.across_u, &ray.across_v);
+        real largest = real_max(real_max(fabs(direction.x), fabs(direction.y)), fabs(direction.z));
+        frame_across(vector_scale(direction, real_inverse_power(largest)), &ray.across_u, &ray.across_v);
+        ray.along = vector_scale(direction, ray.inverse_squared);
     }
     return ray;
 }

@@ -22,6 +22,7 @@ typedef struct {
     Vector position;
     Vector normal;         // unit, of the geometry, facing the ray
     Vector shading_normal; // unit, on the same side
+    Vector to_eye;         // unit, back along the ray
     real error;            // the position is at most this far from the true surface
     Color3 color, diffuse;
     real ambient, specular, shininess;
@@ -88,6 +89,7 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
     surface.ior = (real)(1);
 
     surface.travelled = ray->travelled + hit->t;
+    surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
     const integer settled = (integer)(INT_MAX);
     integer pending = lanes_select(surface.found, hit->object, settled);

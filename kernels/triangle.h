@@ -11,9 +11,9 @@
 #include "plane.h"
 
 typedef struct {
-    real u, v, w;                   // edge functions opposite a, b, c; all of one sign inside, edges included
-    real determinant;               // their sum
-    real a_depth, b_depth, c_depth; // of the vertices, along the ray
+    real u, v, w;       // edge functions opposite a, b, c; all of one sign inside, edges included
+    real determinant;   // their sum
+    real a_t, b_t, c_t; // where along the ray the vertices lie
 } TriangleEdges;
 
 static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *ray)
@@ -29,9 +29,9 @@ static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *
     edges.v = product_difference(ax, cy, ay, cx);
     edges.w = product_difference(bx, ay, by, ax);
     edges.determinant = edges.u + edges.v + edges.w;
-    edges.a_depth = vector_dot(a, ray->along);
-    edges.b_depth = vector_dot(b, ray->along);
-    edges.c_depth = vector_dot(c, ray->along);
+    edges.a_t = vector_dot(a, ray->along);
+    edges.b_t = vector_dot(b, ray->along);
+    edges.c_t = vector_dot(c, ray->along);
     return edges;
 }
 
@@ -84,9 +84,8 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     mask hit = ray->active & (all_positive | all_negative) & (edges.determinant != zero);
     if (!lanes_any(hit)) return mask_none();
 
-    real per_depth = real_sqrt(ray->inverse_squared);
-    real nearest = real_min(real_min(edges.a_depth, edges.b_depth), edges.c_depth) * per_depth;
-    real farthest = real_max(real_max(edges.a_depth, edges.b_depth), edges.c_depth) * per_depth;
+    real nearest = real_min(real_min(edges.a_t, edges.b_t), edges.c_t);
+    real farthest = real_max(real_max(edges.a_t, edges.b_t), edges.c_t);
     real distance_ = triangle_plane_distance(triangle, ray, (real)(0.5f) * (nearest + farthest));
     // the vertices' own depths are off by up to 4 u, which the compensated distance is not
     real slack =
