@@ -1,11 +1,8 @@
 #include "host/base/base64.h"
 
-#include "host/base/array.h"
-
 void base64_append(Text *text, const uint8_t *bytes, size_t count)
 {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    array_reserve(*text, (count + 2) / 3 * 4 + 1);
     for (size_t i = 0; i < count; i += 3) {
         size_t left = count - i;
         unsigned group = (unsigned)bytes[i] << 16 | (left > 1 ? (unsigned)bytes[i + 1] << 8 : 0u) |

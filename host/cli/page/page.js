@@ -133,19 +133,21 @@ function drawPanel(scene, kind, names, width, height) {
   }
   panel.append(svg("text", { class: "unit", x: right, y: bottom + 26, "text-anchor": "end" }, "ms a frame"));
   const step = Math.ceil((highest - lowest) / 6);
+  const digits = highest - lowest <= 2 ? [1, 2, 5] : [1];
   for (let exponent = lowest; errors.length && exponent <= highest; exponent++) {
-    const group = svg("g", { class: "tick y", "data-value": `1e${exponent}`, transform: `translate(0 ${logY(10 ** exponent)})` },
-                      svg("path", { class: "grid", d: `M${left} 0H${right}` }));
-    if ((exponent - lowest) % step === 0) {
-      const label = exponent >= 0 && exponent <= 3 ? String(10 ** exponent) : powerOfTen(exponent);
-      group.append(svg("text", { x: left - 5, y: 3.5, "text-anchor": "end" }, label));
+    for (const digit of exponent < highest ? digits : [1]) {
+      const tick = Number(`${digit}e${exponent}`);
+      const group = svg("g", { class: "tick y", "data-value": tick, transform: `translate(0 ${logY(tick)})` },
+                        svg("path", { class: "grid", d: `M${left} 0H${right}` }));
+      if (digit === 1 && (exponent - lowest) % step === 0) {
+        const label = exponent >= 0 && exponent <= 3 ? String(tick) : powerOfTen(exponent);
+        group.append(svg("text", { x: left - 5, y: 3.5, "text-anchor": "end" }, label));
+      }
+      panel.append(group);
     }
-    panel.append(group);
   }
   if (errors.length) {
     panel.append(svg("path", { class: "axis", d: `M${left} ${top}V${end}` + (hasFloor ? "" : `H${right}`) }));
-  } else {
-    panel.append(svg("text", { class: "note", x: left + 6, y: (top + bottom) / 2 }, "0 in every variant"));
   }
   if (hasFloor) {
     panel.append(svg("g", { class: "tick y", "data-value": 0, transform: `translate(0 ${bottom})` },
@@ -160,6 +162,10 @@ function drawPanel(scene, kind, names, width, height) {
   }
   for (const variant of timed.filter(({ status }) => status === "reference")) {
     panel.append(svg("path", { class: "reference", d: `M${x(variant.frame_ms.median)} ${top}V${bottom}` }));
+  }
+
+  if (!errors.length) {
+    panel.append(svg("text", { class: "note", x: left + 6, y: (top + bottom) / 2 }, "0 in every variant"));
   }
 
   const isFront = ({ variant }) => variant.pareto[kind.name] === true;
@@ -211,7 +217,7 @@ function drawLegend(scene) {
   if (measured.some((variant) => variant.crossed_out)) {
     items.push(item([mark(any, "hollow"), svg("path", { class: "cross", d: "M-8 -7L8 7M-8 7L8 -7" })], "crossed out"));
   }
-  items.push(item([svg("path", { class: "front", d: "M-10 -5H0V5H10" })], "the best of its time"),
+  items.push(item([svg("path", { class: "front", d: "M-10 -5H0V5H10" })], "the Pareto front: nothing is better and faster"),
              item([svg("path", { class: `spread ${any}`, d: "M-9 0H9M-9 -3V3M9 -3V3" })], "shortest to longest run"));
   if (scene.variants.some((variant) => variant.status === "reference")) {
     items.push(item([svg("path", { class: "reference", d: "M0 -7V7" })], "the reference’s time"));
