@@ -1,0 +1,12 @@
+#!/bin/bash
+# Rays at every shape from 1.0001 to a million radii away: t, hits and misses within the tiers of the hard cases at every
+# precision (tools/numerics/ladder.c).
+. "$(dirname "$0")/support.bash"
+is_sanitized && skip_all "the plain build measures the same kernels"
+build=${BUILD:-build}
+make=${MAKE:-make}
+check "the ladder builds" $make -s BUILD="$build" ladder
+for shape in sphere plane disc box cylinder cone triangle torus; do
+    check "$shape" "$build/tools/numerics/ladder" --rays 1500 --hold --shape $shape
+done
+finish

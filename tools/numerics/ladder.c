@@ -1,0 +1,447 @@
+// How far t is off, by shape, precision and distance: random rays through the kernels that this program was
+// built with, each beside the quadruple-precision reference of tests/reference.c on the very bits that the
+// kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --hold it prints what
+// breaks the hard cases' bounds instead.
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/json.h"
+#include "host/render/renderer.h"
+#include "tests/reference.h"
+#include "tests/specimen.h"
+#include <getopt.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+// Distance of a ray's start from the shape's center, in radii of the ball that holds the shape.
+static const double rungs[] = {1.0001, 1.01, 1.1, 2, 10, 100, 1e3, 1e4, 1e5, 1e6};
+
+enum {
+    RUNG_COUNT = sizeof rungs / sizeof *rungs,
+    SHAPES = 8,
+    SPECIMENS = 6,  // of each shape, of which each rung's rays are shared out
+    COPIES = 64,    // of a shape in the scene whose time tells a test's
+    TIMED_RUNS = 5, // of which the shortest counts
+    TIMED_RAYS = 1 << 17
+};
+
+static const SpecimenKind ladder_kinds[SHAPES] = {
+    SPECIMEN_SPHERE,          SPECIMEN_PLANE,       SPECIMEN_DISC,     SPECIMEN_BOX,
+    SPECIMEN_CYLINDER_CAPPED, SPECIMEN_CONE_CAPPED, SPECIMEN_TRIANGLE, SPECIMEN_TORUS,
+};
+
+typedef struct {
+    size_t ray_count; // of each shape, over all rungs
+    size_t
+        sample_count; // not 0: print so many rays of each rung and specimen with what they meet, and no more
+    bool hold, time;
+    unsigned precisions; // set
+    const char *shape;   // NULL: all
+} LadderOptions;
+
+// Rays of one rung at one specimen, and what they should meet.
+typedef struct {
+    ProbeRay *rays;
+    ReferenceHit *hits;
+    ProbeHit *answers;
+    size_t count;
+} Rays;
+
+// The errors of t that one precision made on one rung, in units of the last place.
+typedef struct {
+    double *ulps;
+    size_t count;
+} Errors;
+
+typedef struct {
+    Errors steep, grazing;        // at a cosine of 0.1 or more, and below
+    size_t compared, wrong, open; // hits and misses; wrong beyond the band in which both are right; within it
+    double owed;                  // the largest error as a part of the tier's bound
+} Tally;
+
+// What a tier owes: so many ulps of t, so much of size or distance over the cosine, and the band in which hit
+// or miss is open; in u. tests/test_shapes.c says why the slack is owed at every angle. The textbook owes
+// nothing.
+typedef struct {
+    double ulps, slack, band;
+    bool of_size; // else of the distance
+} Tier;
+
+static const Tier tiers[PRECISION_COUNT] = {
+    [PRECISION_FAST] = {16, 32, 8, false},
+    [PRECISION_SINGLE] = {8, 16, 4, false},
+    [PRECISION_STRICT] = {4, 4, 16, true},
+    [PRECISION_DOUBLE] = {4, 4, 16, true},
+};
+
+static Vector3 vector_from(const double parts[3])
+{
+    return (Vector3){parts[0], parts[1], parts[2]};
+}
+
+// From so many radii away towards a random point of the ball, a fiftieth larger, that holds the shape.
+static SpecimenRay ladder_ray(const Specimen *specimen, double rung, Random *random)
+{
+    Vector3 out = vector_normalize(random_in_ball(random));
+    Vector3 eye = vector_add(specimen->center, vector_scale(out, rung * specimen->reach));
+    Vector3 target =
+        vector_add(specimen->center, vector_scale(random_in_ball(random), 1.02 * specimen->reach));
+    return (SpecimenRay){eye, vector_normalize(vector_subtract(target, eye))};
+}
+
+static void rays_free(Rays *rays)
+{
+    free(rays->rays);
+    free(rays->hits);
+    free(rays->answers);
+}
+
+static Rays rays_make(const Object *object, const Specimen *specimen, double rung, size_t count, bool wide,
+                      Random *random)
+{
+    Rays rays = {memory_allocate(count + 1, sizeof(ProbeRay)),
+                 memory_allocate(count + 1, sizeof(ReferenceHit)),
+                 memory_allocate(count + 1, sizeof(ProbeHit)), count};
+    for (size_t i = 0; i < count; i++) {
+        SpecimenRay given = ladder_ray(specimen, rung, random);
+        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
+                                : reference_ray_rounded(given.origin, given.direction);
+        rays.rays[i] = (ProbeRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
+                                  {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
+                                  (double)ray.tmin,
+                                  (double)ray.tmax};
+        rays.hits[i] = reference_hit_object(object, &ray);
+    }
+    return rays;
+}
+
+static Scene scene_of(Object *objects, size_t count, Material *material)
+{
+    *material = (Material){.color = {1, 1, 1}, .diffuse = {1, 1, 1}};
+    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
+    scene.objects.items = objects;
+    scene.objects.count = count;
+    scene.materials.items = material;
+    scene.materials.count = 1;
+    return scene;
+}
+
+static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision precision)
+{
+    const RenderSettings settings = {.width = 1,
+                                     .height = 1,
+                                     .region_width = 1,
+                                     .region_height = 1,
+                                     .sample_count = 1,
+                                     .bvh = BVH_OFF,
+                                     .precision = precision};
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!renderer) exit(EXIT_FAILURE);
+    return renderer;
+}
+
+static void tally_add(Tally *tally, const Specimen *specimen, const Rays *rays, size_t i, Precision precision)
+{
+    const ReferenceHit *expected = &rays->hits[i];
+    const ProbeHit *hit = &rays->answers[i];
+    const Tier *tier = &tiers[precision];
+    const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
+    const double u = ldexp(1, -bits);
+    Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
+    double distance = vector_length(vector_subtract(origin, specimen->center)) + specimen->reach;
+    // an endless plane may be met far beyond the reach
+    if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
+    double scale = u * (tier->of_size ? specimen->reach : distance);
+    // flat shapes have no compensated edges; a triangle's are open below 16 u of edge and distance
+    double flat = specimen->kind == SPECIMEN_TRIANGLE ? 32 : 4;
+    bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
+
+    tally->compared++;
+    if ((hit->object != UINT32_MAX) != expected->found) {
+        (*(undecided ? &tally->open : &tally->wrong))++;
+        return;
+    }
+    if (!expected->found) return;
+    double cosine = (double)expected->cosine, ulp = reference_ulp(expected->t, bits);
+    double off = fabs((double)(hit->t - expected->t));
+    Errors *errors = cosine >= 0.1 ? &tally->steep : &tally->grazing;
+    // no number is as wrong as can be
+    errors->ulps[errors->count++] = isfinite(off) ? off / ulp : HUGE_VAL;
+    if (undecided) return;
+    double owed = tier->ulps * ulp + tier->slack * scale / (cosine * vector_length(direction));
+    tally->owed = fmax(tally->owed, isfinite(off) ? off / owed : HUGE_VAL);
+}
+
+static void numbers_write(Json *json, const char *key, const double *numbers, size_t count)
+{
+    json_begin_array(json, key);
+    for (size_t i = 0; i < count; i++)
+        json_number(json, NULL, numbers[i]);
+    json_end(json);
+}
+
+// For tools/numerics/certify: a ray, the shape by numbers, and the reference's t as the sum of two doubles.
+static void sample_write(Json *json, const char *shape, const Object *object, const Rays *rays, size_t i)
+{
+    const ProbeRay *ray = &rays->rays[i];
+    const ReferenceHit *hit = &rays->hits[i];
+    json_begin_object(json, NULL);
+    json_text(json, "shape", shape);
+    numbers_write(json, "origin", ray->origin, 3);
+    numbers_write(json, "direction", ray->direction, 3);
+    // the members of each shape are doubles in a row; those of finite round ones end after the radii
+    numbers_write(json, "numbers", (const double *)(const void *)&object->as, 9);
+    json_boolean(json, "found", hit->found);
+    double high = hit->found ? (double)hit->t : 0;
+    json_number(json, "t", high);
+    json_number(json, "t_rest", hit->found ? (double)(hit->t - high) : 0);
+    json_number(json, "margin", (double)hit->margin);
+    json_end(json);
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void errors_write(Json *json, const char *key, Errors *errors)
+{
+    json_begin_object(json, key);
+    json_integer(json, "hits", (int64_t)errors->count);
+    if (errors->count > 0) {
+        qsort(errors->ulps, errors->count, sizeof *errors->ulps, compare_doubles);
+        json_number(json, "p999", errors->ulps[(size_t)(0.999 * (double)(errors->count - 1))]);
+        json_number(json, "max", errors->ulps[errors->count - 1]);
+    }
+    json_end(json);
+}
+
+static double cpu_seconds(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+// The shortest of several runs of the trace kernel, in CPU time of all threads.
+static double trace_seconds(Renderer *renderer, const Rays *rays)
+{
+    double least = HUGE_VAL;
+    for (int run = 0; run <= TIMED_RUNS; run++) {
+        double start = cpu_seconds();
+        renderer_trace(renderer, rays->rays, rays->count, rays->answers);
+        double seconds = cpu_seconds() - start;
+        if (run > 0) least = fmin(least, seconds); // the first builds
+    }
+    return least;
+}
+
+// A shape's test costs what a scene with 64 more copies of it takes longer, for rays of all rungs.
+static double test_seconds(Compute *compute, const Specimen *specimen, Precision precision)
+{
+    bool wide = precision == PRECISION_DOUBLE;
+    Object object = wide ? specimen->object : reference_round_object(&specimen->object);
+    Rays all = {memory_allocate(TIMED_RAYS, sizeof(ProbeRay)), NULL,
+                memory_allocate(TIMED_RAYS, sizeof(ProbeHit)), 0};
+    Random random = {2};
+    for (int rung = 0; rung < RUNG_COUNT; rung++)
+        for (int i = 0; i < TIMED_RAYS / RUNG_COUNT; i++) {
+            SpecimenRay ray = ladder_ray(specimen, rungs[rung], &random);
+            all.rays[all.count++] = (ProbeRay){{ray.origin.x, ray.origin.y, ray.origin.z},
+                                               {ray.direction.x, ray.direction.y, ray.direction.z},
+                                               0,
+                                               (double)FLT_MAX};
+        }
+    double seconds[2];
+    for (int many = 0; many < 2; many++) {
+        Object copies[1 + COPIES];
+        for (int i = 0; i <= COPIES; i++)
+            copies[i] = object;
+        Material material;
+        Scene scene = scene_of(copies, many ? 1 + COPIES : 1, &material);
+        Renderer *renderer = renderer_of(compute, &scene, precision);
+        seconds[many] = trace_seconds(renderer, &all);
+        renderer_close(renderer);
+    }
+    double test = (seconds[1] - seconds[0]) / (COPIES * (double)all.count);
+    rays_free(&all);
+    return test;
+}
+
+typedef struct {
+    Specimen specimens[SPECIMENS];
+    const char *name;
+} LadderShape;
+
+static LadderShape shape_make(SpecimenKind kind)
+{
+    LadderShape shape;
+    Random random = {1};
+    for (int i = 0; i < SPECIMENS; i++)
+        shape.specimens[i] = specimen_make(kind, &random);
+    shape.name = shape_names[shape.specimens[0].object.kind];
+    return shape;
+}
+
+// One shape on one rung: each precision of the same width on the same rays. True if all kept to their tiers.
+static bool rung_run(Compute *compute, const LadderShape *shape, int rung, bool wide,
+                     const LadderOptions *options, Json *json)
+{
+    size_t count = options->ray_count / (RUNG_COUNT * SPECIMENS) + 1;
+    Tally tallies[PRECISION_COUNT] = {0};
+    Random random = {3 + (uint64_t)rung};
+    for (int precision = 0; precision < PRECISION_COUNT; precision++) {
+        tallies[precision].steep.ulps = memory_allocate(count * SPECIMENS, sizeof(double));
+        tallies[precision].grazing.ulps = memory_allocate(count * SPECIMENS, sizeof(double));
+    }
+    for (int which = 0; which < SPECIMENS; which++) {
+        const Specimen *specimen = &shape->specimens[which];
+        Object object = wide ? specimen->object : reference_round_object(&specimen->object);
+        Material material;
+        Scene scene = scene_of(&object, 1, &material);
+        Rays rays = rays_make(&object, specimen, rungs[rung], count, wide, &random);
+        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+            if (!(options->precisions >> precision & 1) || wide != (precision == PRECISION_DOUBLE)) continue;
+            Renderer *renderer = renderer_of(compute, &scene, precision);
+            renderer_trace(renderer, rays.rays, count, rays.answers);
+            renderer_close(renderer);
+            for (size_t i = 0; i < count; i++)
+                tally_add(&tallies[precision], specimen, &rays, i, precision);
+        }
+        rays_free(&rays);
+    }
+    bool held = true;
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        Tally *tally = &tallies[precision];
+        if (tally->compared > 0) {
+            json_begin_object(json, NULL);
+            json_text(json, "shape", shape->name);
+            json_text(json, "precision", precision_names[precision]);
+            json_number(json, "distance", rungs[rung]);
+            json_integer(json, "rays", (int64_t)tally->compared);
+            errors_write(json, "steep", &tally->steep);
+            errors_write(json, "grazing", &tally->grazing);
+            json_integer(json, "wrong", (int64_t)tally->wrong);
+            json_integer(json, "open", (int64_t)tally->open);
+            json_number(json, "owed", tally->owed);
+            json_end(json);
+            bool kept = tally->wrong == 0 && tally->owed <= 1;
+            if (options->hold && !kept)
+                printf("%s at %g, %s: %zu of %zu wrong, error of t %.3g of the bound\n", shape->name,
+                       rungs[rung], precision_names[precision], tally->wrong, tally->compared, tally->owed);
+            held &= kept;
+        }
+        free(tally->steep.ulps);
+        free(tally->grazing.ulps);
+    }
+    return held;
+}
+
+static void shape_samples(const LadderShape *shape, size_t count, Json *json)
+{
+    Random random = {3};
+    for (int rung = 0; rung < RUNG_COUNT; rung++)
+        for (int which = 0; which < SPECIMENS; which++) {
+            const Object *object = &shape->specimens[which].object;
+            Rays rays = rays_make(object, &shape->specimens[which], rungs[rung], count, true, &random);
+            for (size_t i = 0; i < count; i++)
+                sample_write(json, shape->name, object, &rays, i);
+            rays_free(&rays);
+        }
+}
+
+static bool options_read(LadderOptions *options, int argument_count, char **arguments)
+{
+    static const struct option names[] = {{"rays", required_argument, NULL, 'r'},
+                                          {"shape", required_argument, NULL, 's'},
+                                          {"precision", required_argument, NULL, 'p'},
+                                          {"hold", no_argument, NULL, 'h'},
+                                          {"time", no_argument, NULL, 't'},
+                                          {"samples", required_argument, NULL, 'c'},
+                                          {0}};
+    *options = (LadderOptions){.ray_count = 1000000};
+    int option;
+    while ((option = getopt_long(argument_count, arguments, "", names, NULL)) != -1) {
+        if (option == 'r') options->ray_count = strtoul(optarg, NULL, 10);
+        if (option == 's') options->shape = optarg;
+        if (option == 'h') options->hold = true;
+        if (option == 't') options->time = true;
+        if (option == 'c') options->sample_count = strtoul(optarg, NULL, 10);
+        for (int i = 0; option == 'p' && i < PRECISION_COUNT; i++)
+            if (strcmp(optarg, precision_names[i]) == 0) options->precisions |= 1U << i;
+        if (option == '?') return false;
+    }
+    if (options->precisions == 0) options->precisions = (1U << PRECISION_COUNT) - 1;
+    return optind == argument_count;
+}
+
+int main(int argument_count, char **arguments)
+{
+    LadderOptions options;
+    if (!options_read(&options, argument_count, arguments)) {
+        fputs("usage: ladder [--rays COUNT] [--shape NAME] [--precision P]... [--time] [--hold]\n       "
+              "ladder --samples COUNT\n",
+              stderr);
+        return EXIT_FAILURE;
+    }
+    if (options.sample_count > 0) {
+        Json *json = json_open();
+        json_begin_array(json, "samples");
+        for (int i = 0; i < SHAPES; i++) {
+            LadderShape shape = shape_make(ladder_kinds[i]);
+            shape_samples(&shape, options.sample_count, json);
+        }
+        json_end(json);
+        json_print(json, stdout);
+        return EXIT_SUCCESS;
+    }
+    DeviceList devices;
+    Compute compute;
+    MessageList messages = {0};
+    device_list_open(&devices);
+    const Device *device = device_choose(&devices, getenv("GLINT_DEVICE"), &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!device) return EXIT_FAILURE;
+    compute_open(&compute, device);
+    if (!device->fp64) options.precisions &= ~(1U << PRECISION_DOUBLE);
+
+    bool held = true;
+    Json *json = json_open();
+    json_text(json, "device", device->name);
+    json_begin_array(json, "rungs");
+    for (int i = 0; i < SHAPES; i++) {
+        LadderShape shape = shape_make(ladder_kinds[i]);
+        if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
+        for (int rung = 0; rung < RUNG_COUNT; rung++)
+            for (int wide = 0; wide < 2; wide++)
+                held &= rung_run(&compute, &shape, rung, wide, &options, json);
+    }
+    json_end(json);
+    json_begin_array(json, "tests");
+    for (int i = 0; options.time && i < SHAPES; i++) {
+        LadderShape shape = shape_make(ladder_kinds[i]);
+        if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
+        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+            if (!(options.precisions >> precision & 1)) continue;
+            json_begin_object(json, NULL);
+            json_text(json, "shape", shape.name);
+            json_text(json, "precision", precision_names[precision]);
+            // milliseconds of a million are nanoseconds of one
+            json_number(json, "ms_per_million", 1e9 * test_seconds(&compute, &shape.specimens[0], precision));
+            json_end(json);
+        }
+    }
+    json_end(json);
+    if (options.hold)
+        printf("%s\n", held ? "all within their tiers" : "beyond their tiers");
+    else
+        json_print(json, stdout);
+    compute_close(&compute);
+    device_list_close(&devices);
+    return held || !options.hold ? EXIT_SUCCESS : 3;
+}
