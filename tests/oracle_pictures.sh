@@ -1,5 +1,6 @@
 #!/bin/bash
-# Small pictures of every shape and light, of mirrors and glass, at each precision, pixel by pixel against the exact oracle.
+# Small pictures of every shape and light, of mirrors and glass, at each precision, pixel by pixel against the exact
+# oracle.
 # With GLINT_LONG_TESTS=1 also larger ones of each shape by itself (some minutes).
 # Takes the program from BUILD: the kernels are the same in every build, so that the first build's run is enough.
 . "$(dirname "$0")/support.bash"

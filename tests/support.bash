@@ -41,9 +41,9 @@ skip_all() {
     echo "skipped: $*"
     exit 77
 }
-# python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: python3 (or $PYTHON), else a virtual
-# environment that the tests of a run share, in which pip installs what is missing (by the module's own name where no
-# requirement is given). Skips the test where that cannot be done.
+# python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: python3 (or $PYTHON), else a
+# virtual environment that the tests of a run share, in which pip installs what is missing (by the module's own name
+# where no requirement is given). Skips the test where that cannot be done.
 python_with() {
     python=${PYTHON:-python3}
     local modules=("${@%%=*}") folder=$shared_cache/glint-tests/python log=$scratch/pip.log

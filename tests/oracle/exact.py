@@ -1,5 +1,5 @@
-"""Closest hits in exact rationals, certified roots and 300-bit balls; nothing here cancels, so that every formula is the
-textbook's own.
+"""Closest hits in exact rationals, certified roots and 300-bit balls; nothing here cancels, so that every formula is
+the textbook's own.
 
 A solid is a set of points with an exact membership test and, for a line, the places where it may begin or end. The
 line's places are sorted, a rational point between each two tells whether the stretch lies inside, and the crossings are
@@ -144,7 +144,8 @@ class Sphere(Shape):
 
     def places(self, ray):
         f = subtract(ray.origin, self.center)
-        return polynomial_roots([dot(f, f) - self.squared, 2 * dot(f, ray.direction), dot(ray.direction, ray.direction)])
+        d = ray.direction
+        return polynomial_roots([dot(f, f) - self.squared, 2 * dot(f, d), dot(d, d)])
 
     def contains(self, point):
         p = subtract(point, self.center)

@@ -81,6 +81,7 @@ SHAPES["shapes"] = [
 SHAPES["glass"] = [SHAPES["mirrors"][0], SHAPES["mirrors"][1], SHAPES["mirrors"][2], SHAPES["veils"][2]]
 SHORT = "shapes", "glass"
 BOUNCES = 2
+KINDS = "t", "normal", "object", "shadow", "ray", "color"
 
 # u, displacement and arithmetic of each precision: docs/verify.md has the reasons.
 ROUNDINGS = {
@@ -110,10 +111,11 @@ class Tally:
 
 def render(glint, scene, precision, size, folder):
     (folder / "scene.yaml").write_text(scene)
-    command = [glint, "render", folder / "scene.yaml", "-o", folder / "picture.npy", "--quiet", "--precision", precision]
-    command += ["--size", "{}x{}".format(*size), "--bounces", str(BOUNCES), "--aov", "t,normal,object,shadow,ray,color"]
+    command = [glint, "render", folder / "scene.yaml", "-o", folder / "picture.npy", "--quiet"]
+    command += ["--precision", precision, "--size", "{}x{}".format(*size)]
+    command += ["--bounces", str(BOUNCES), "--aov", ",".join(KINDS)]
     subprocess.run(command, check=True)
-    return {name: numpy.load(folder / f"picture.{name}.npy") for name in ("t", "normal", "object", "shadow", "ray", "color")}
+    return {kind: numpy.load(folder / f"picture.{kind}.npy") for kind in KINDS}
 
 
 def distance(a, b):
@@ -127,7 +129,8 @@ def compare(scene, picture, rounding, tallies, name):
             where = f"{name} at {column},{row}"
             ray = [float(x) for x in picture["ray"][row, column]]
             answer = trace(scene, Beam((0, 0, 0), ray), rounding, BOUNCES)
-            compare_pixel(answer, {kind: values[row, column] for kind, values in picture.items()}, rounding, tallies, where)
+            seen = {kind: values[row, column] for kind, values in picture.items()}
+            compare_pixel(answer, seen, rounding, tallies, where)
 
 
 def compare_pixel(answer, seen, rounding, tallies, where):
