@@ -30,6 +30,9 @@ check "a page of two scenes: exit status $status: $(cat "$scratch/errors")" [ $s
 check "a page of what is crossed out" "$GLINT" accuracy spheres16.yaml "${small[@]}" --precision single --lanes 1,8 \
     --perturb 3:1000 --html crossed.html
 check "something is crossed out" grep -q '"crossed_out": true' crossed.html
+check "a reference of colors" "$GLINT" render spheres16.yaml --size 120x80 --precision double -o reference.npy
+check "a page of what a file's colors tell" "$GLINT" accuracy spheres16.yaml "${small[@]}" --precision fast,double \
+    --reference reference.npy --html colors.html
 
 cd - >/dev/null || exit 1
 [ $failed = 0 ] || finish
@@ -37,4 +40,5 @@ browser=$(command -v chromium) || skip_all "there is no chromium"
 python_with playwright
 check "two scenes" "$python" tests/html_report.py "$browser" "$scratch/page.html" "$scratch/page.json"
 check "crossed out" "$python" tests/html_report.py "$browser" "$scratch/crossed.html"
+check "colors only" "$python" tests/html_report.py "$browser" "$scratch/colors.html"
 finish
