@@ -60,7 +60,7 @@ void verify_highlights(VerifyRun *run)
             double value = picture.color[3 * i];
             run->result->wrong += value < 0 || value > 1 + 0x1p-20;
             if (run->tier == TIER_A || picture.object[i] != 0 || power > owed_power) continue;
-            LongVector normal = long_vector(verify_vector(&picture.normal[3 * i]));
+            LongVector normal = long_vector(verify_vector(picture.normal + 3 * i));
             Long facing = long_dot(normal, to_light);
             // whether light that grazes reaches the surface at all is the shadow's matter
             if (fabsl(facing) < 16 * (Long)verify_roundoff(run)) continue;

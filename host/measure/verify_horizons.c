@@ -3,19 +3,14 @@
 #include <math.h>
 #include <stdlib.h>
 
-static bool pixel_found(const VerifyPicture *picture, uint32_t column, uint32_t row)
-{
-    return picture->object[(size_t)row * picture->width + column] != UINT32_MAX;
-}
-
 // The first row, from the bottom, whose pixel of the column hits nothing; counts what is hit above it.
 static uint32_t column_horizon(VerifyRun *run, const VerifyPicture *picture, uint32_t column)
 {
     uint32_t row = picture->height;
-    while (row > 0 && pixel_found(picture, column, row - 1))
+    while (row > 0 && verify_pixel_found(picture, (size_t)(row - 1) * picture->width + column))
         row--;
     for (uint32_t above = 0; above < row; above++)
-        run->result->wrong += pixel_found(picture, column, above);
+        run->result->wrong += verify_pixel_found(picture, (size_t)above * picture->width + column);
     return row;
 }
 

@@ -113,10 +113,10 @@ static bool meets_nearby(VerifyRun *run, void *opened, const double direction[3]
     ProbeRay rays[COUNT];
     ProbeHit hits[COUNT];
     for (int i = 0; i < COUNT; i++) {
-        rays[i] =
-            (ProbeRay){.direction = {direction[0] + turn * (i % 3 - 1), direction[1] + turn * (i / 3 % 3 - 1),
-                                     direction[2] + turn * (i / 9 - 1)},
-                       .tmax = INFINITY};
+        const int steps[] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+        rays[i] = (ProbeRay){.tmax = INFINITY};
+        for (size_t axis = 0; axis < 3; axis++)
+            rays[i].direction[axis] = direction[axis] + turn * steps[axis];
         verify_round_ray(run, &rays[i]);
     }
     verify_trace_opened(run, opened, rays, COUNT, hits);

@@ -9,11 +9,6 @@
 
 static const Vector3 origin;
 
-static bool pixel_found(const VerifyPicture *picture, size_t pixel)
-{
-    return picture->object[pixel] != UINT32_MAX;
-}
-
 // Of rays from the center outward no pixel that is farther out is brighter.
 static void judge_radial_brightness(VerifyRun *run, const VerifyPicture *picture)
 {
@@ -42,7 +37,7 @@ static void judge_lambert(VerifyRun *run, const VerifyPicture *picture, LongVect
     size_t count = 0;
     for (size_t i = 0; i < verify_pixel_count(picture); i++) {
         ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(picture, i));
-        if (!exact.found || !pixel_found(picture, i)) continue;
+        if (!exact.found || !verify_pixel_found(picture, i)) continue;
         Long shade = fmaxl(exact.normal.z, 0);
         errors[count++] = (float)fabsl(picture->color[3 * i] - shade);
     }
@@ -54,7 +49,9 @@ void verify_far_fringe(VerifyRun *run)
 {
     Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, -1]}\n"
                                "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
-    for (double distance = 10; distance <= 1e4; distance *= 10) {
+    static const double distances[] = {10, 100, 1e3, 1e4};
+    for (size_t k = 0; k < sizeof distances / sizeof *distances; k++) {
+        double distance = distances[k];
         const Vector3 eye = {0, 0, distance};
         scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
         VerifyPicture picture = verify_render(run, &scene, false, 512, 512);
@@ -62,7 +59,7 @@ void verify_far_fringe(VerifyRun *run)
         judge_radial_brightness(run, &picture);
         for (size_t i = 0; i < verify_pixel_count(&picture) && run->tier != TIER_A; i++) {
             ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(&picture, i));
-            exact_judge(run, &exact, pixel_found(&picture, i), picture.t[i]);
+            exact_judge(run, &exact, verify_pixel_found(&picture, i), picture.t[i]);
         }
         if (run->tier == TIER_B && distance <= 1e3) judge_lambert(run, &picture, center, 2e-3);
         if (run->tier > TIER_B) judge_lambert(run, &picture, center, 1e-5);
@@ -76,7 +73,7 @@ void verify_far_fringe(VerifyRun *run)
     for (size_t i = 0; i < verify_pixel_count(picture) && run->tier != TIER_A; i++) {                        \
         LongVector direction = exact_pixel_ray(picture, i);                                                  \
         ExactHit exact = exact_of_direction;                                                                 \
-        exact_judge(run, &exact, pixel_found(picture, i), (picture)->t[i]);                                  \
+        exact_judge(run, &exact, verify_pixel_found(picture, i), (picture)->t[i]);                           \
     }
 
 // Every column has a stretch of pixels without a gap.
@@ -95,8 +92,8 @@ void verify_wire(VerifyRun *run)
         size_t stretches = 0;
         for (uint32_t row = 0; row < picture.height; row++) {
             size_t pixel = (size_t)row * picture.width + column;
-            bool above = row > 0 && pixel_found(&picture, pixel - picture.width);
-            stretches += pixel_found(&picture, pixel) && !above;
+            bool above = row > 0 && verify_pixel_found(&picture, pixel - picture.width);
+            stretches += verify_pixel_found(&picture, pixel) && !above;
         }
         run->result->leaks += stretches != 1;
     }
@@ -124,10 +121,10 @@ void verify_apex(VerifyRun *run)
         scene.camera.half_tangent = SIDE * 1e-4 / 2 / 5;
         VerifyPicture picture = verify_render(run, &scene, false, SIDE, SIDE);
         for (size_t i = 0; i < verify_pixel_count(&picture); i++) {
-            if (k == 0) run->result->wrong += !pixel_found(&picture, i) || !(picture.color[3 * i] > 0);
-            if (!pixel_found(&picture, i)) continue;
+            if (k == 0) run->result->wrong += !verify_pixel_found(&picture, i) || !(picture.color[3 * i] > 0);
+            if (!verify_pixel_found(&picture, i)) continue;
             const double u = verify_roundoff(run);
-            double length = vector_length(verify_vector(&picture.normal[3 * i]));
+            double length = vector_length(verify_vector(picture.normal + 3 * i));
             verify_note(run, fabs(length - 1) / u, 4, "u");
         }
         verify_picture_free(&picture);
@@ -182,31 +179,51 @@ void verify_tangent_circle(VerifyRun *run)
     scene_free(&scene);
 }
 
+// Pixels still to be looked at, and those that were.
+typedef struct {
+    const VerifyPicture *picture;
+    uint32_t (*pending)[2]; // column, row
+    size_t pending_count;
+    bool *seen;
+} Flood;
+
+static bool flood_take(Flood *flood, uint32_t column, uint32_t row)
+{
+    size_t pixel = (size_t)row * flood->picture->width + column;
+    if (flood->seen[pixel] || !verify_pixel_found(flood->picture, pixel)) return false;
+    flood->seen[pixel] = true;
+    uint32_t *place = flood->pending[flood->pending_count++];
+    place[0] = column;
+    place[1] = row;
+    return true;
+}
+
+static void flood_run(Flood *flood)
+{
+    const VerifyPicture *picture = flood->picture;
+    while (flood->pending_count > 0) {
+        const uint32_t *place = flood->pending[--flood->pending_count];
+        uint32_t column = place[0], row = place[1];
+        for (uint32_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < picture->height; y++)
+            for (uint32_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < picture->width; x++)
+                flood_take(flood, x, y);
+    }
+}
+
 // How many parts the hit pixels fall into, where those that touch at a corner belong together.
 static size_t count_parts(const VerifyPicture *picture)
 {
-    size_t parts = 0, pending_count = 0, pixels = verify_pixel_count(picture);
-    size_t *pending = memory_allocate(pixels, sizeof *pending);
-    bool *seen = memory_allocate_zeroed(pixels, sizeof *seen);
-    for (size_t first = 0; first < pixels; first++) {
-        if (seen[first] || !pixel_found(picture, first)) continue;
-        parts++;
-        seen[first] = true;
-        pending[pending_count++] = first;
-        while (pending_count > 0) {
-            size_t pixel = pending[--pending_count], column = pixel % picture->width,
-                   row = pixel / picture->width;
-            for (size_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < picture->height; y++)
-                for (size_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < picture->width; x++) {
-                    size_t other = y * picture->width + x;
-                    if (seen[other] || !pixel_found(picture, other)) continue;
-                    seen[other] = true;
-                    pending[pending_count++] = other;
-                }
+    size_t parts = 0, pixels = verify_pixel_count(picture);
+    Flood flood = {picture, memory_allocate(pixels, sizeof *flood.pending), 0,
+                   memory_allocate_zeroed(pixels, sizeof *flood.seen)};
+    for (uint32_t row = 0; row < picture->height; row++)
+        for (uint32_t column = 0; column < picture->width; column++) {
+            if (!flood_take(&flood, column, row)) continue;
+            parts++;
+            flood_run(&flood);
         }
-    }
-    free(pending);
-    free(seen);
+    free(flood.pending);
+    free(flood.seen);
     return parts;
 }
 

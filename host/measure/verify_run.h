@@ -84,6 +84,11 @@ static inline size_t verify_pixel_count(const VerifyPicture *picture)
     return (size_t)picture->width * picture->height;
 }
 
+static inline bool verify_pixel_found(const VerifyPicture *picture, size_t pixel)
+{
+    return picture->object[pixel] != UINT32_MAX;
+}
+
 static inline Vector3 verify_vector(const double *parts)
 {
     return (Vector3){parts[0], parts[1], parts[2]};

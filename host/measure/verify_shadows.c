@@ -65,7 +65,7 @@ void verify_thin_plate(VerifyRun *run)
         for (size_t i = 0; i < verify_pixel_count(&picture); i++) {
             if (picture.object[i] == UINT32_MAX) continue;
             seen++;
-            const double *color = &picture.color[3 * i];
+            const double *color = picture.color + 3 * i;
             if (above == light_above)
                 run->result->wrong += !(color[0] > 0) || picture.shadow[2 * i] || picture.shadow[2 * i + 1];
             else

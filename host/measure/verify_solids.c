@@ -6,11 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static Vector3 vector_from(const double parts[3])
-{
-    return (Vector3){parts[0], parts[1], parts[2]};
-}
-
 static ProbeRay ray_of(const VerifyRun *run, Vector3 origin, Vector3 direction)
 {
     ProbeRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
@@ -60,7 +55,7 @@ static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
             center[k] = verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
         }
         Object object = {.kind = SHAPE_SPHERE};
-        object.as.sphere.center = vector_from(center);
+        object.as.sphere.center = verify_vector(center);
         object.as.sphere.radius = verify_rounded(run, pow(10, 4 * random_symmetric(62, index, 6)));
         array_push(scene.objects, object);
     }
@@ -108,9 +103,9 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, void *opened, size_
     static ProbeHit hits[2 * DIRECTIONS];
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         Vector3 direction = random_unit(64, sphere * DIRECTIONS + i, 0);
-        if (vector_dot(direction, vector_from(first->normal)) < 0) direction = vector_scale(direction, -1);
-        rays[i] = ray_of(run, vector_from(first->mirrored_origin), direction);
-        rays[DIRECTIONS + i] = ray_of(run, vector_from(first->passed_origin), vector_scale(direction, -1));
+        if (vector_dot(direction, verify_vector(first->normal)) < 0) direction = vector_scale(direction, -1);
+        rays[i] = ray_of(run, verify_vector(first->mirrored_origin), direction);
+        rays[DIRECTIONS + i] = ray_of(run, verify_vector(first->passed_origin), vector_scale(direction, -1));
     }
     verify_trace_opened(run, opened, rays, 2 * (size_t)DIRECTIONS, hits);
     for (size_t i = 0; i < DIRECTIONS; i++) {

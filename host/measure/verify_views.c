@@ -73,7 +73,7 @@ static void judge_tiles(VerifyRun *run)
     size_t counts[2] = {0};
     for (size_t i = 0; i < verify_pixel_count(&picture); i++) {
         if (picture.object[i] != 0) continue;
-        const double *d = &picture.ray[3 * i];
+        const double *d = picture.ray + 3 * i;
         double x = eye.x - eye.y * d[0] / d[1], z = eye.z - eye.y * d[2] / d[1];
         if (fmin(fabs(x - round(x)), fabs(z - round(z))) < 1e-5) continue;
         bool even = fmod(floor(x) + floor(z), 2) == 0, white = picture.color[3 * i] > 0.75;
