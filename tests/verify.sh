@@ -23,8 +23,24 @@ for tier in A B C; do
     grep -q "^  tier $tier: 40 of 40 cases held" "$scratch/lines" || fails "tier $tier did not hold"
 done
 
-# At another width, as JSON.
-"$GLINT" verify --precision single --lanes 1 --json >"$scratch/json" || fails "verify --lanes 1: exit status $?"
-grep -q '"schema": *1' "$scratch/json" || fails "the JSON has no schema"
-! grep -q '"held": *false' "$scratch/json" || fails "$(grep -B 3 '"held": *false' "$scratch/json")"
+# At other widths, as JSON: the same bits.
+for lanes in 1 8; do
+    "$GLINT" verify S2 S5 P2 C6 C7 T1 R2 R6 --precision strict --lanes $lanes --json >"$scratch/$lanes.json" ||
+        fails "verify --lanes $lanes: exit status $?"
+    grep -q '"schema": *1' "$scratch/$lanes.json" || fails "the JSON has no schema"
+    ! grep -q '"held": *false' "$scratch/$lanes.json" || fails "$(grep -B 3 '"held": *false' "$scratch/$lanes.json")"
+    grep '"hash"' "$scratch/$lanes.json" >"$scratch/$lanes.hashes"
+done
+[ "$(wc -l <"$scratch/1.hashes")" = 8 ] || fails "not every case has a hash"
+cmp -s "$scratch/1.hashes" "$scratch/8.hashes" || fails "strict: other bits at 8 lanes than at 1"
+
+# A renderer that errs a thousand times as much as a device may is found out, whatever case one asks.
+status=0
+"$GLINT" verify P2 R3 --precision single --perturb 1:1000 >"$scratch/erring" || status=$?
+[ $status = 3 ] || fails "a renderer that errs: exit status $status"
+[ "$(grep -c 'FAIL.* wrong' "$scratch/erring")" = 2 ] || fails "a renderer that errs: $(cat "$scratch/erring")"
+
+status=0
+"$GLINT" verify S99 2>"$scratch/refused" || status=$?
+[ $status = 1 ] && grep -q 'no case "S99"' "$scratch/refused" || fails "an unknown case: exit status $status"
 exit $failed
