@@ -26,7 +26,7 @@ import json, sys
 report = json.load(open(sys.argv[1]))
 scene = report["scenes"][0]
 variants = scene["variants"]
-assert eval(sys.argv[2]), json.dumps(report, indent=1)' "$scratch/out" "$2"
+assert eval(f"({sys.argv[2]})"), json.dumps(report, indent=1)' "$scratch/out" "$2"
 }
 
 cp "$scratch/report" "$scratch/out"
@@ -55,14 +55,27 @@ import json, sys
 one, other = (json.load(open(path))["scenes"][0]["variants"][0]["errors"]["image"] for path in sys.argv[1:])
 assert one == other, (one, other)' "$scratch/report" "$scratch/out"
 
-# Fewer samples are an error like any other; lanes other than the device's own change nothing.
-run 0 "samples" scenes/article.yaml "${small[@]}" --precision double --lanes 1,4 --samples 1,8 --json
+# Fewer samples are an error like any other.
+run 0 "samples" scenes/article.yaml "${small[@]}" --precision double --lanes 1 --samples 1,8 --json
 holds "samples" 'scene["reference"]["samples"] == 8 and all(
     (v["errors"]["image"]["rmse"] > 1e-3) == (v["samples"] == 1) for v in variants if v["status"] == "measured")'
 
 run 0 "the table" scenes/article.yaml "${small[@]}" --precision double
 check "the table names the reference" grep -q 'double .* the reference' "$scratch/out"
 check "the fastest within a budget" grep -q '^  for an error of at most 1e-06: double, .* ms, the reference itself$' "$scratch/out"
+
+# A float counts in half meters on this planet: what stands on it sinks in or floats where the eye is 1.7 m above it.
+sed 's/2000002, 2999995/2000001.7, 2999995/' scenes/far-planet.yaml >"$scratch/planet.yaml"
+run 0 "a scene beyond single precision" "$scratch/planet.yaml" "${small[@]}" --precision single --json
+holds "single is crossed out, and not picked" 'variants[0]["crossed_out"] and
+    variants[0]["errors"]["shadow"]["away"] > 0 and variants[0]["pareto"] == dict.fromkeys(variants[0]["pareto"], False) and
+    [pick["variant"] for pick in scene["picks"]] == [None, None, None]'
+
+# What errs is the variants; the reference, its arrays to the last bit, is as it was.
+run 0 "errors injected" "$scene" "${small[@]}" --precision double --perturb 1:1000 --save "$scratch/perturbed" --json
+holds "what errs is no reference" 'report["perturb"] == {"seed": 1, "scale": 1000} and
+    variants[0]["status"] == "measured" and variants[0]["kernel_hash"] != scene["reference"]["kernel_hash"]'
+check "the reference does not err" cmp "$scratch"/{saved,perturbed}/0-mirror-glass-reference.color.npy
 
 refuse() {
     run 1 "$*" "$@"

@@ -211,6 +211,7 @@ for scene in report["scenes"]:
     expect(f"{scene['scene']}, silhouettes", scene["edges"]["silhouette"], int(edges["object"].sum()))
     expect(f"{scene['scene']}, paths' edges", scene["edges"]["path"], int(edges["path"].sum()))
     expect(f"{scene['scene']}, shadows' edges", scene["edges"]["shadow"], [int(light.sum()) for light in lights])
+    edges["shadow"] |= edges["object"][:, :, None]
     for index, variant in enumerate(scene["variants"]):
         if variant["status"] == "measured":
             check_variant(f"{scene['scene']}, variant {index}", scene, variant, reference, edges)

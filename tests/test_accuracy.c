@@ -166,10 +166,11 @@ static void test_wrong_shadows(void **state)
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 1);
     assert_true(errors.shading.largest == 0);
 
+    variant.shadow[LIGHTS * at(5, 0) + 1] = 1; // where two objects meet
     variant.shadow[LIGHTS * at(0, 3) + 1] = 1; // no edge of light 1
     variant.shadow[LIGHTS * at(2, 7)] = 0;     // acne, or light behind a wall
     errors = compare(&reference, &variant);
-    assert_int_equal(errors.shadow.edge, 1);
+    assert_int_equal(errors.shadow.edge, 2);
     assert_int_equal(errors.shadow.away, 2);
     assert_int_equal(accuracy_faults(&errors), CROSSED_SHADOW);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];

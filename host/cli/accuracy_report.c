@@ -51,7 +51,7 @@ const char *accuracy_crossed_words(const AccuracyVariant *variant, size_t index)
         {CROSSED_NONFINITE, "pixels that are not finite"},
         {CROSSED_NEGATIVE, "negative pixels"},
         {CROSSED_OBJECT, "another object away from the silhouettes"},
-        {CROSSED_SHADOW, "wrong shadows away from the shadows' edges"},
+        {CROSSED_SHADOW, "wrong shadows away from edges"},
     };
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
         if ((variant->crossed_out & faults[i].fault) && index-- == 0) return faults[i].words;

@@ -168,7 +168,8 @@ static void count_wrong(const Comparison *comparison, AccuracyKind kind, EdgeCou
                                  .variant = values[1]});
 }
 
-// Returns whether every light's bit is the reference's.
+// Returns whether every light's bit is the reference's. Where two surfaces meet, a point of the one is a
+// rounding away from lying in the other's shadow: silhouettes are edges of every shadow.
 static bool shadows_compare(const Comparison *comparison, size_t pixel)
 {
     const uint32_t lights = comparison->reference->light_count;
@@ -179,7 +180,7 @@ static bool shadows_compare(const Comparison *comparison, size_t pixel)
         if (values[0] == values[1]) continue;
         equal = false;
         count_wrong(comparison, ACCURACY_SHADOW, &comparison->errors->shadow, pixel,
-                    comparison->edges->shadow[bit], values, light);
+                    comparison->edges->shadow[bit] || comparison->edges->silhouette[pixel], values, light);
     }
     return equal;
 }
