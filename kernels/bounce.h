@@ -36,17 +36,20 @@ static inline Vector reflected_direction(Vector direction, Vector normal)
     return vector_normalize(vector_fma(normal, (real)(-2) * away, direction));
 }
 
-// Snell's law for a unit direction against a unit normal that faces it, with the ratio of indices eta; the
-// mask tells where there is total reflection instead. The squared cosine behind the surface is (eta c)^2 -
-// (eta - 1)(eta + 1), a difference of products: written as 1 - eta^2 (1 - c^2) it would lose grazing rays
-// where eta is near 1.
-static inline mask refracted_direction(Vector direction, Vector normal, real eta, Vector *refracted)
+// Snell's law for a unit direction against a unit normal that faces it; the mask tells where there is total
+// reflection instead. With k = (n - 1)(n + 1) and the cosine c the ray into a body of index n runs along
+// d + N (c - sqrt(c^2 + k)), the one out of it along n d + N (n c - sqrt((n c)^2 - k)): so written grazing
+// rays are not lost where n is near 1, and n = 1 bends nothing however inexact a device's quotients are.
+static inline mask refracted_direction(Vector direction, Vector normal, mask entering, real ior,
+                                       Vector *refracted)
 {
-    real scaled = eta * -vector_dot(direction, normal);
-    real squared = product_difference(scaled, scaled, eta - (real)(1), eta + (real)(1));
+    real scale = lanes_select(entering, (real)(1), ior);
+    real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
+    real scaled = scale * -vector_dot(direction, normal);
+    real squared = product_difference(scaled, scaled, above_one, ior + (real)(1));
     mask total = squared < (real)(0);
     real cosine = real_sqrt(real_max(squared, (real)(0)));
-    *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, eta)));
+    *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, scale)));
     return total;
 }
 
@@ -59,13 +62,14 @@ static inline mask surface_bounce(const Surface *surface, const Ray *ray, Color3
     real reflection = surface->reflection;
     mask total = mask_none();
     if (HAS_TRANSMISSION) {
-        real eta = lanes_select(surface->entering, real_divide((real)(1), surface->ior), surface->ior);
-        total = refracted_direction(direction, surface->shading_normal, eta, &passed->direction);
+        total = refracted_direction(direction, surface->shading_normal, surface->entering, surface->ior,
+                                    &passed->direction);
         // a smooth surface's normal may send the ray back out where its geometry would not
         mask outward = !total & (vector_dot(passed->direction, surface->normal) >= (real)(0));
         if (lanes_any(outward)) {
             Vector plain_direction;
-            mask plain_total = refracted_direction(direction, surface->normal, eta, &plain_direction);
+            mask plain_total = refracted_direction(direction, surface->normal, surface->entering,
+                                                   surface->ior, &plain_direction);
             passed->direction = vector_select(outward, plain_direction, passed->direction);
             total = lanes_select(outward, plain_total, total);
         }

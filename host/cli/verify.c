@@ -236,10 +236,10 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
                                Json *json)
 {
     Prober prober = {.compute = compute, .options = options, .precision = precision};
-    const VerifyRenderer renderer = {&prober,      prober_open,   prober_trace,
-                                     prober_close, prober_render, prober_camera_axes};
     // perturbed, a device is inexact: `single` cannot be held to its bounds, `strict` repairs what it does
-    bool inexact = options->common.perturb_seed > 0 && precision == PRECISION_SINGLE;
+    bool inexact = options->common.perturb_seed > 0 && precision < PRECISION_STRICT;
+    const VerifyRenderer renderer = {&prober,       prober_open,        prober_trace, prober_close,
+                                     prober_render, prober_camera_axes, inexact};
     VerifyTier tier = inexact ? TIER_A : tier_of[precision];
     Report report = {.json = json, .tier = (char)('A' + tier)};
     const char *name = precision_names[precision];

@@ -35,6 +35,8 @@ typedef struct {
     void (*render)(void *context, const Scene *scene, bool hierarchy, VerifyPicture *picture);
     // The forward axis, and those along the picture's width and height, of a camera.
     void (*camera_axes)(const Camera *camera, Vector3 axes[3]);
+    // Whether quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp.
+    bool inexact;
 } VerifyRenderer;
 
 // How one case went.
