@@ -274,12 +274,13 @@ static double test_seconds(Compute *compute, const Specimen *specimen, Precision
 
 typedef struct {
     Specimen specimens[SPECIMENS];
+    Renderer *renderers[SPECIMENS][PRECISION_COUNT]; // opened when first needed
     const char *name;
 } LadderShape;
 
 static LadderShape shape_make(SpecimenKind kind)
 {
-    LadderShape shape;
+    LadderShape shape = {0};
     Random random = {1};
     for (int i = 0; i < SPECIMENS; i++)
         shape.specimens[i] = specimen_make(kind, &random);
@@ -287,9 +288,28 @@ static LadderShape shape_make(SpecimenKind kind)
     return shape;
 }
 
+static void shape_close(LadderShape *shape)
+{
+    for (int i = 0; i < SPECIMENS; i++)
+        for (int precision = 0; precision < PRECISION_COUNT; precision++)
+            renderer_close(shape->renderers[i][precision]);
+}
+
+static void shape_trace(LadderShape *shape, int which, Precision precision, Compute *compute, Object *object,
+                        Rays *rays)
+{
+    Renderer **renderer = &shape->renderers[which][precision];
+    if (!*renderer) {
+        Material material;
+        Scene scene = scene_of(object, 1, &material);
+        *renderer = renderer_of(compute, &scene, precision);
+    }
+    renderer_trace(*renderer, rays->rays, rays->count, rays->answers);
+}
+
 // One shape on one rung: each precision of the same width on the same rays. True if all kept to their tiers.
-static bool rung_run(Compute *compute, const LadderShape *shape, int rung, bool wide,
-                     const LadderOptions *options, Json *json)
+static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, const LadderOptions *options,
+                     Json *json)
 {
     size_t count = options->ray_count / (RUNG_COUNT * SPECIMENS) + 1;
     Tally tallies[PRECISION_COUNT] = {0};
@@ -301,14 +321,10 @@ static bool rung_run(Compute *compute, const LadderShape *shape, int rung, bool 
     for (int which = 0; which < SPECIMENS; which++) {
         const Specimen *specimen = &shape->specimens[which];
         Object object = wide ? specimen->object : reference_round_object(&specimen->object);
-        Material material;
-        Scene scene = scene_of(&object, 1, &material);
         Rays rays = rays_make(&object, specimen, rungs[rung], count, wide, &random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
             if (!(options->precisions >> precision & 1) || wide != (precision == PRECISION_DOUBLE)) continue;
-            Renderer *renderer = renderer_of(compute, &scene, precision);
-            renderer_trace(renderer, rays.rays, count, rays.answers);
-            renderer_close(renderer);
+            shape_trace(shape, which, precision, compute, &object, &rays);
             for (size_t i = 0; i < count; i++)
                 tally_add(&tallies[precision], specimen, &rays, i, precision);
         }
@@ -420,6 +436,7 @@ int main(int argument_count, char **arguments)
         for (int rung = 0; rung < RUNG_COUNT; rung++)
             for (int wide = 0; wide < 2; wide++)
                 held &= rung_run(&compute, &shape, rung, wide, &options, json);
+        shape_close(&shape);
     }
     json_end(json);
     json_begin_array(json, "tests");
