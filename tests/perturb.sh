@@ -1,13 +1,14 @@
 #!/bin/bash
 # A device whose divisions, roots and powers are as wrong as the OpenCL C specification allows: the hard cases hold their
 # hygiene at `fast` and `single`, `strict` gives the bits it always gives, `double` has nothing to err in but powers. Two
-# seeds without the two large meshes; all of 1 to 20 with everything under GLINT_LONG_TESTS=1.
+# seeds and the cases of rays alone, without the two large meshes; with GLINT_LONG_TESTS=1 seeds 1 to 20 and pictures.
 . "$(dirname "$0")/support.bash"
 
-cases='S1 S3 S4 S5 S6 P1 P3 P4 P5 P6 P7 C1 C2 C3 C4 C5 C6 C7 T1 T2 T3 T4 T5 T6 M3 M4 M5 M6 R4 R8'
+cases='S1 S3 S5 S6 P3 P4 P5 P7 C1 C2 C4 C5 C7 T2 T3 T6 M3 M4 M5 M6 R4'
 seeds='1 2'
 if [ "${GLINT_LONG_TESTS-}" = 1 ]; then
-    cases=
+    # without R7 and R6, which at fast ask for more than powers and quotients wrong by 8192 ulp give (docs/verify.md)
+    cases+=' S2 S4 P1 P2 P6 C3 C6 T1 T4 T5 M1 M2 R1 R2 R3 R5 R8'
     seeds=$(seq 1 20)
 fi
 is_sanitized && seeds=1
@@ -29,7 +30,7 @@ check "a thousand times the errors: exit status $status, not 3" test $status = 3
 check "a thousand times the errors: rays hit the sphere they leave" grep -q '^  S6 .*FAIL' "$scratch/lines"
 
 # At `strict` what a device does wrong is repaired, and at `double` rays meet nothing that may be wrong: same bits.
-hashes() { "$GLINT" verify S1 S6 P4 C5 C7 T1 M4 R4 --json --lanes 4 "$@" | grep '"hash"'; }
+hashes() { "$GLINT" verify S1 S6 P4 C5 C7 T2 M4 R4 --json --lanes 4 "$@" | grep '"hash"'; }
 wide=
 "$GLINT" devices | grep -q '^0\*.* yes ' && wide=double
 for precision in strict $wide; do
