@@ -82,7 +82,7 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
     mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
     mask hit = ray->active & (all_positive | all_negative) & (edges.determinant != zero);
-    if (!lanes_any(hit)) return mask_none();
+    if (!lanes_any(hit)) return hit;
 
     real nearest = real_min(real_min(edges.a_t, edges.b_t), edges.c_t);
     real farthest = real_max(real_max(edges.a_t, edges.b_t), edges.c_t);
