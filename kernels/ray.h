@@ -42,12 +42,12 @@ static inline real real_inverse_or_zero(real a)
 
 // 1 / a, huge for 0: the product with a distance then tells its sign. One Newton step makes what a device
 // divides inexactly nearly exact, and exact for powers of two: a box's face is where it is for rays along an
-// axis.
+// axis. The hierarchy can do without.
 static inline real real_inverse_or_huge(real a)
 {
     mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
     real inverse = real_divide((real)(1), lanes_select(zero, (real)(1), a));
-    if (!IS_COMPENSATED)
+    if (HAS_BOXES && !IS_COMPENSATED)
         inverse = lanes_select(steps, fma(fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
