@@ -128,7 +128,7 @@ static inline scalar_integer lanes_smallest(integer value)
 #elif REDUCES_LANES
 static inline bool lanes_any(mask condition)
 {
-    return __builtin_reduce_or(condition) != 0;
+    return __builtin_reduce_or(condition != (mask)(0)) != 0;
 }
 
 static inline scalar_integer lanes_smallest(integer value)
