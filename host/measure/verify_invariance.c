@@ -53,6 +53,17 @@ static Scene every_shape_scene(void)
     return scene;
 }
 
+// Counts the objects of a scene that no pixel shows: two empty pictures would be alike.
+static void demand_every_object(VerifyRun *run, const Scene *scene, const VerifyPicture *picture)
+{
+    for (size_t object = 0; object < scene->objects.count; object++) {
+        size_t pixel = 0;
+        while (pixel < verify_pixel_count(picture) && picture->object[pixel] != object)
+            pixel++;
+        run->result->wrong += pixel == verify_pixel_count(picture);
+    }
+}
+
 typedef struct {
     const VerifyPicture *picture;
     double scale; // of lengths
@@ -91,6 +102,7 @@ void verify_scaled_scenes(VerifyRun *run)
     static const int exponents[] = {-20, -10, -3, 3, 10, 20};
     Scene scene = every_shape_scene();
     VerifyPicture picture = verify_render(run, &scene, false, 160, 120);
+    demand_every_object(run, &scene, &picture);
     scene_free(&scene);
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         double scale = ldexp(1, exponents[i]);
@@ -184,6 +196,7 @@ void verify_mirrored_scenes(VerifyRun *run)
         Scene scene = unchecked_scene(), mirrored = unchecked_scene();
         scene_mirror(&mirrored);
         VerifyPicture picture = verify_render(run, &scene, false, width, 128);
+        demand_every_object(run, &scene, &picture);
         VerifyPicture other = verify_render(run, &mirrored, false, width, 128);
         compare(run, &picture, &(View){&other, 1, true});
         verify_picture_free(&picture);
@@ -193,6 +206,7 @@ void verify_mirrored_scenes(VerifyRun *run)
     }
     Scene scene = plain_scene(), turned = plain_scene();
     VerifyPicture picture = verify_render(run, &scene, false, 256, 192);
+    demand_every_object(run, &scene, &picture);
     void *opened = run->renderer->open(run->renderer->context, &scene, false);
     for (unsigned turns = 1; turns < 3; turns++) {
         scene_turn_axes(&turned);

@@ -77,6 +77,19 @@ void verify_thin_plate(VerifyRun *run)
     scene_free(&scene);
 }
 
+// Counts a pixel that does not show the nearest of plane 0 and sphere 1. The sphere's rim, and where the two
+// are equally far, are open.
+static void judge_nearest(VerifyRun *run, uint32_t object, const ExactHit *plane, const ExactHit *sphere)
+{
+    const Long open = 1e-5L;
+    if (fabsl(sphere->margin) < open) return;
+    if (sphere->found && plane->found && fabsl(sphere->t - plane->t) < open * plane->t) return;
+    bool sphere_first = sphere->found && (!plane->found || sphere->t < plane->t);
+    uint32_t nearest = sphere_first ? 1 : plane->found ? 0 : UINT32_MAX;
+    run->result->leaks += object == UINT32_MAX && nearest != UINT32_MAX;
+    run->result->wrong += object != UINT32_MAX && object != nearest;
+}
+
 // A sphere on a plane, lit from above: its shadow is a disc with a radius known exactly, up to the point
 // where they touch.
 void verify_contact_shadow(VerifyRun *run)
@@ -99,17 +112,17 @@ void verify_contact_shadow(VerifyRun *run)
         for (size_t i = 0; i < verify_pixel_count(&picture); i++) {
             LongVector direction = exact_pixel_ray(&picture, i);
             bool dark = picture.shadow[i];
-            if (picture.object[i] == 0) {
-                ExactHit exact = exact_plane(ground, long_vector(up), direction);
-                LongVector p = long_subtract(long_scale(direction, exact.t), ground);
+            ExactHit plane = exact_plane(ground, long_vector(up), direction);
+            ExactHit sphere = exact_sphere(center, 1, direction);
+            judge_nearest(run, picture.object[i], &plane, &sphere);
+            if (picture.object[i] == 0 && plane.found) {
+                LongVector p = long_subtract(long_scale(direction, plane.t), ground);
                 Long radius = hypotl(p.x, p.z);
                 run->result->leaks += !dark && radius < edge * (1 - 1e-5L);
                 run->result->wrong += dark && radius > edge * (1 + 1e-5L);
-            } else if (picture.object[i] == 1) {
-                ExactHit exact = exact_sphere(center, 1, direction);
-                if (!exact.found) continue;
-                LongVector p = long_scale(direction, exact.t);
-                Long facing = long_dot(exact.normal, long_unit(long_subtract(to_light, p)));
+            } else if (picture.object[i] == 1 && sphere.found) {
+                LongVector p = long_scale(direction, sphere.t);
+                Long facing = long_dot(sphere.normal, long_unit(long_subtract(to_light, p)));
                 run->result->wrong += fabsl(facing) > 1e-5L && dark != (facing < 0);
             }
         }
