@@ -94,20 +94,27 @@ $(BUILD)/peers/embree: $(embree_sources) $(embree_headers) Makefile
 	    -lembree3 -lm -lpthread -o $@
 
 # make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are
-# installed (docs/performance.md), half an hour of a machine that does nothing else.
+# installed (docs/performance.md), five minutes of a machine that does nothing else.
 ROUNDS        ?= 3
-RUNGS         ?=
+RUNGS         ?= spheres-16 spheres-10000 bunny-20000 bunny-1000000
 SPD           ?=
 PEERS_SCENES  ?= $(BUILD)/peers/scenes
-PEERS_OPTIONS ?= --whole
+PEERS_OPTIONS ?= --whole --seconds 1
 PEERS_JSON    ?= docs/measurements/bench-peers.json
 has_embree := $(wildcard /usr/include/embree3/rtcore.h)
+peers_python := $(BUILD)/peers/python/bin/python
 
-bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree)
-	tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
+bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
+	$(peers_python) tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
 	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS)
-	$(if $(SPD),tools/peers/compare --glint $(BUILD)/glint --runs $(ROUNDS) --size 1024x1024 \
+	$(if $(SPD),$(peers_python) tools/peers/compare --glint $(BUILD)/glint --runs $(ROUNDS) --size 1024x1024 \
 	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
+	tools/report docs/performance.md
+
+# With PyYAML: Debian's, if it is there.
+$(peers_python):
+	python3 -m venv --system-site-packages $(BUILD)/peers/python
+	$@ -c 'import yaml' 2>/dev/null || $@ -m pip install -q PyYAML==6.0.3
 
 # Pinned to one release of clang's tools: what they ask for changes with each.
 CLANG_FORMAT ?= clang-format-14
@@ -140,13 +147,18 @@ lint-man:
 	@! groff -man -ww -z -Tutf8 docs/glint.1 2>&1 | grep .
 
 # The measured parts of the documents; the machine should have nothing else to do.
-measured_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
+accuracy_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
+bench_scenes    := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass bunny demo)
+measured        := accuracy bench bench-lanes
 
 docs-measurements: $(BUILD)/glint
-	$(BUILD)/glint accuracy $(measured_scenes) --json > $(BUILD)/accuracy.json
-	$(BUILD)/glint bench scenes/spheres16.yaml --size 1920x1080 --lanes 1,16 --precision single,strict,double --json \
-	    > $(BUILD)/bench.json
-	cp $(BUILD)/accuracy.json $(BUILD)/bench.json docs/measurements
+	$(BUILD)/glint accuracy $(accuracy_scenes) --size 960x540 --seconds 40 --json > $(BUILD)/accuracy.json
+	$(BUILD)/glint bench $(bench_scenes) --size 1920x1080 --seconds 40 --precision fast,single,strict,double \
+	    --json > $(BUILD)/bench.json
+	$(BUILD)/glint bench scenes/spheres16.yaml --size 1920x1080 --seconds 10 --lanes 1,16 \
+	    --precision single,strict,double --json > $(BUILD)/bench-lanes.json
+	mkdir -p docs/measurements
+	cp $(measured:%=$(BUILD)/%.json) docs/measurements
 	tools/report docs/accuracy.md docs/performance.md
 
 data := $(DESTDIR)$(PREFIX)/share

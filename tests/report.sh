@@ -1,0 +1,32 @@
+#!/bin/bash
+# The measured parts of the documents are what tools/report makes of docs/measurements; a report that is not there is
+# told, and its part stays.
+. "$(dirname "$0")/support.bash"
+
+command -v python3 >/dev/null || skip_all "there is no python3"
+
+documents=(docs/accuracy.md docs/performance.md)
+cp -r docs/measurements "${documents[@]}" "$scratch"
+for document in "${documents[@]}"; do
+    copy=$scratch/$(basename "$document")
+    tools/report "$copy" 2>"$scratch/told"
+    check "$document: exit status" [ $? = 0 ]
+    check "$document says what was measured" diff "$document" "$copy"
+    for measured in $(sed -n 's/^<!-- measured: [a-z]* \(.*\) -->$/\1/p' "$document"); do
+        [ -f "docs/$measured" ] || check "$measured is not there, which is told" grep -q "no .*$measured" "$scratch/told"
+    done
+done
+
+# Changed figures are written, as they would be by a new measurement.
+sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/measurements/accuracy.json"
+check "a new measurement" tools/report "$scratch/accuracy.md"
+check "its times are in the document" grep -q '| 12346 (' "$scratch/accuracy.md"
+
+printf '%s\n' before '<!-- measured: bench none.json -->' within '<!-- end of measured -->' after >"$scratch/absent.md"
+cp "$scratch/absent.md" "$scratch/before.md"
+check "a report that is not there" tools/report "$scratch/absent.md"
+check "the part of a report that is not there" cmp "$scratch/absent.md" "$scratch/before.md"
+printf 'nothing\n' >"$scratch/unmarked.md"
+tools/report "$scratch/unmarked.md" 2>/dev/null
+check "a document without a measured part" [ $? = 1 ]
+finish
