@@ -3,8 +3,10 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/cli/bench_json.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/cli/version.h"
 #include "host/render/camera_basis.h"
 #include <getopt.h>
 #include <inttypes.h>
@@ -50,10 +52,11 @@ typedef struct {
     const VerifyOptions *options;
     Precision precision;
     uint64_t trace_kernel, render_kernel; // the last ones' hashes
+    uint32_t lanes;                       // the last one's
 } Prober;
 
 // With every feature built in, so that one program serves all scenes.
-static Renderer *scene_open_renderer(const Prober *prober, const Scene *scene, bool hierarchy, uint32_t width,
+static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hierarchy, uint32_t width,
                                      uint32_t height)
 {
     bool picture = width > 0;
@@ -77,6 +80,7 @@ static Renderer *scene_open_renderer(const Prober *prober, const Scene *scene, b
     Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
     messages_tell(&messages, NULL);
     if (!renderer) fault("a hard case does not fit the device");
+    prober->lanes = renderer_report(renderer)->lanes;
     return renderer;
 }
 
@@ -256,6 +260,7 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     double seconds = clock_seconds() - start;
     if (json) {
         json_end(json);
+        json_integer(json, "lanes", prober.lanes);
         hash_add_json(json, "trace_kernel", prober.trace_kernel);
         hash_add_json(json, "render_kernel", prober.render_kernel);
         json_integer(json, "held", (int64_t)report.held);
@@ -269,6 +274,22 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
                prober.render_kernel);
     }
     return report.failed;
+}
+
+// What the results are of.
+static void origin_add_json(Json *json, const Device *device, const CommonOptions *common)
+{
+    json_integer(json, "schema", 2);
+    json_text(json, "glint", glint_version());
+    json_begin_object(json, "device");
+    device_json(json, device);
+    json_end(json);
+    if (common->perturb_seed > 0) {
+        json_begin_object(json, "perturb");
+        json_integer(json, "seed", common->perturb_seed);
+        json_integer(json, "scale", common->perturb_scale);
+        json_end(json);
+    }
 }
 
 static int device_verify(Compute *compute, const VerifyOptions *options)
@@ -285,8 +306,7 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
     }
     Json *json = options->json ? json_open() : NULL;
     if (json) {
-        json_integer(json, "schema", 1);
-        json_text(json, "device", compute->device->name);
+        origin_add_json(json, compute->device, &options->common);
         json_begin_array(json, "precisions");
     } else {
         printf("%s\n", compute->device->name);
