@@ -120,8 +120,10 @@ void verify_scaled_scenes(VerifyRun *run)
 static bool meets_nearby(VerifyRun *run, void *opened, const double direction[3], uint32_t object)
 {
     enum { COUNT = 27 };
-    // what a hit of something so many times as far away as wide may be off
-    const double turn = 16 * 64 * verify_roundoff(run);
+    // A tier leaves open 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 (exact_is_open): as
+    // an angle 2 u whatever the distance, or up to 8 u. Either scene may be off by that, and each by as much
+    // for the rounding of its pixels' rays.
+    const double turn = 4 * 8 * verify_roundoff(run);
     ProbeRay rays[COUNT];
     ProbeHit hits[COUNT];
     for (int i = 0; i < COUNT; i++) {
