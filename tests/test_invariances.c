@@ -1,0 +1,323 @@
+// Random scenes of every shape, light and kind of material: what must not change a picture nor what lies
+// behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
+#include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/measure/scene_change.h"
+#include "tests/frame.h"
+#include "tests/probe.h"
+#include "tests/specimen.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+enum {
+    SEEDS = 5,
+    OBJECTS = 40,
+    WIDTH = 53, // neither is a whole number of tiles of any width
+    HEIGHT = 37,
+    AOVS = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY
+};
+
+typedef struct {
+    const Scene *scene;
+    RenderSettings settings;
+    Frame frame;
+    const char *name;
+} Case;
+
+static Vector3 random_place(Random *random, double least, double most)
+{
+    Vector3 way = vector_normalize(random_in_ball(random));
+    return vector_scale(way, random_between(random, least, most));
+}
+
+static Color random_color(Random *random)
+{
+    double red = random_between(random, 0.1, 1), green = random_between(random, 0.1, 1);
+    return (Color){red, green, random_between(random, 0.1, 1)};
+}
+
+static Material random_material(Random *random, size_t index)
+{
+    Material material = material_default();
+    material.color = random_color(random);
+    material.diffuse = random_color(random);
+    material.specular = random_between(random, 0, 1);
+    material.shininess = random_between(random, 0, 100);
+    if (index == 1) material.reflection = random_between(random, 0.2, 0.8);
+    if (index == 2) {
+        material.transmission = random_between(random, 0.5, 0.9);
+        material.full_shadow = true;
+    }
+    if (index == 3) {
+        material.checker = true;
+        material.checker_size = random_between(random, 0.3, 1);
+        material.checker_colors[0] = random_color(random);
+        material.checker_colors[1] = random_color(random);
+    }
+    return material;
+}
+
+// One of each kind, then bounded ones; none so large that it hides the rest.
+static Object random_object(Random *random, size_t index)
+{
+    for (;;) {
+        SpecimenKind kind = index < SPECIMEN_COUNT ? (SpecimenKind)index
+                                                   : (SpecimenKind)random_between(random, 0, SPECIMEN_COUNT);
+        bool endless =
+            kind == SPECIMEN_PLANE || kind == SPECIMEN_CYLINDER_INFINITE || kind == SPECIMEN_CONE_INFINITE;
+        Specimen specimen = specimen_make(kind, random);
+        if (specimen.reach > 3 || (endless && index >= SPECIMEN_COUNT)) continue;
+        // a plane behind the objects and a narrow cone beside them, not across the view
+        if (kind == SPECIMEN_PLANE)
+            specimen.object.as.plane.point = vector_scale(specimen.object.as.plane.normal, 0x1p5);
+        if (kind == SPECIMEN_CONE_INFINITE) specimen.object.as.cone.slope *= 0x1p-4;
+        // the order of a triangle's vertices tells glass from air, and the mirror turns it round
+        bool triangle = specimen.object.kind == SHAPE_TRIANGLE;
+        specimen.object.material = triangle ? (uint32_t)index % 2 : (uint32_t)index % 4;
+        return specimen.object;
+    }
+}
+
+// The same for the same seed.
+static Scene random_scene(uint64_t seed)
+{
+    Random random = {seed};
+    Scene scene = {.background = random_color(&random), .ambient = {0.1, 0.1, 0.1}};
+    for (size_t i = 0; i < 4; i++)
+        array_push(scene.materials, random_material(&random, i));
+    for (size_t i = 0; i < OBJECTS; i++)
+        array_push(scene.objects, random_object(&random, i));
+    // from where the plane is not in the way
+    Vector3 up = vector_normalize(scene.objects.items[SPECIMEN_PLANE].as.plane.normal);
+    Vector3 position = vector_subtract(random_place(&random, 10, 13), vector_scale(up, 6));
+    scene.camera = (Camera){.position = position,
+                            .look_at = random_place(&random, 0, 2),
+                            .up = random_place(&random, 1, 1),
+                            .half_tangent = random_between(&random, 0.4, 0.8)};
+    for (int i = 0; i < 4; i++) {
+        static const LightKind kinds[] = {LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT, LIGHT_POINT};
+        Light light = {.kind = kinds[i], .color = random_color(&random)};
+        light.position = vector_subtract(random_place(&random, 5, 15), vector_scale(up, 8));
+        light.direction = vector_subtract(random_place(&random, 0, 3), light.position);
+        light.angle = random_between(&random, 15, 40);
+        light.penumbra = random_between(&random, 0, 10);
+        array_push(scene.lights, light);
+    }
+    return scene;
+}
+
+static Frame picture(const Scene *scene, const RenderSettings *settings)
+{
+    return frame_render(&probe_compute, scene, settings, AOVS);
+}
+
+// Of kernels for which those of what lies behind the picture are not worth their building.
+static Frame picture_alone(const Scene *scene, const RenderSettings *settings)
+{
+    return frame_render(&probe_compute, scene, settings, 0);
+}
+
+static void same_and_freed(const Case *c, Frame *frame, const char *what)
+{
+    char name[96];
+    snprintf(name, sizeof name, "%s, %s", c->name, what);
+    frame_assert_same(frame, &c->frame, name);
+    frame_free(frame);
+}
+
+static size_t objects_seen(const Frame *frame)
+{
+    bool seen[OBJECTS] = {false};
+    size_t count = 0;
+    for (size_t i = 0; i < (size_t)frame->width * frame->height; i++) {
+        if (frame->object[i] == UINT32_MAX) continue;
+        assert_true(frame->object[i] < OBJECTS);
+        count += !seen[frame->object[i]];
+        seen[frame->object[i]] = true;
+    }
+    return count;
+}
+
+static void runs_bands_and_hierarchy_change_nothing(const Case *c)
+{
+    RenderSettings settings = c->settings;
+    Frame again = picture(c->scene, &settings);
+    same_and_freed(c, &again, "again");
+    settings.band_rows = 5;
+    Frame bands = picture(c->scene, &settings);
+    same_and_freed(c, &bands, "bands of 5 rows");
+    settings = c->settings;
+    settings.bvh = BVH_OFF;
+    Frame listed = picture_alone(c->scene, &settings);
+    same_and_freed(c, &listed, "without a hierarchy");
+}
+
+// All widths at single; test_variants has them at strict.
+static void lanes_change_nothing(const Case *c)
+{
+    static const uint32_t lane_counts[] = {1, 4, 8, 16};
+    for (size_t i = 0; i < sizeof lane_counts / sizeof *lane_counts; i++) {
+        RenderSettings settings = c->settings;
+        settings.lanes = lane_counts[i];
+        if (settings.precision != PRECISION_SINGLE && settings.lanes > 1) break;
+        char what[32];
+        snprintf(what, sizeof what, "%u lanes", settings.lanes);
+        Frame frame = picture_alone(c->scene, &settings);
+        same_and_freed(c, &frame, what);
+    }
+}
+
+static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
+{
+    static const int exponents[] = {-10, 3, 10};
+    for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
+        Scene scene = random_scene(seed);
+        scene_scale(&scene, ldexp(1, exponents[i]));
+        Frame frame = picture(&scene, &c->settings);
+        for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++) {
+            frame.t[k] = ldexp(frame.t[k], -exponents[i]);
+            for (size_t axis = 0; axis < 3; axis++)
+                frame.position[3 * k + axis] = ldexp(frame.position[3 * k + axis], -exponents[i]);
+        }
+        char what[32];
+        snprintf(what, sizeof what, "scaled by 2^%d", exponents[i]);
+        same_and_freed(c, &frame, what);
+        scene_free(&scene);
+    }
+}
+
+// Columns of so many bytes a pixel, from right to left.
+static void columns_flip(void *values, size_t size)
+{
+    unsigned char *bytes = values, kept[4 * sizeof(double)];
+    assert_true(size <= sizeof kept);
+    for (size_t row = 0; row < HEIGHT; row++)
+        for (size_t left = 0; left < WIDTH / 2; left++) {
+            unsigned char *a = bytes + (row * WIDTH + left) * size;
+            unsigned char *b = bytes + (row * WIDTH + WIDTH - 1 - left) * size;
+            memcpy(kept, a, size);
+            memcpy(a, b, size);
+            memcpy(b, kept, size);
+        }
+}
+
+// Without checkers: in a plane they lie along axes made from its normal, which mirror to others.
+static Scene unchecked_scene(uint64_t seed)
+{
+    Scene scene = random_scene(seed);
+    for (size_t i = 0; i < scene.materials.count; i++)
+        scene.materials.items[i].checker = false;
+    return scene;
+}
+
+static void mirror_flips_the_picture(const Case *checkered, uint64_t seed)
+{
+    Scene given = unchecked_scene(seed), scene = unchecked_scene(seed);
+    scene_mirror(&scene);
+    Case c = *checkered;
+    c.frame = picture(&given, &c.settings);
+    Frame frame = picture(&scene, &c.settings);
+    double *vectors[] = {frame.colors, frame.normal, frame.position, frame.ray};
+    for (size_t i = 0; i < 4; i++) {
+        columns_flip(vectors[i], 3 * sizeof(double));
+        for (size_t k = 0; k < (size_t)WIDTH * HEIGHT && i > 0; k++)
+            vectors[i][3 * k] = -vectors[i][3 * k];
+    }
+    columns_flip(frame.t, sizeof *frame.t);
+    columns_flip(frame.object, sizeof *frame.object);
+    columns_flip(frame.shadow, frame.light_count * sizeof *frame.shadow);
+    same_and_freed(&c, &frame, "mirrored");
+    frame_free(&c.frame);
+    scene_free(&scene);
+    scene_free(&given);
+}
+
+// Ids are places in the list, and are taken back to the first list's.
+static void order_changes_ids_alone(const Case *c, uint64_t seed)
+{
+    Random random = {seed};
+    for (int permutation = 0; permutation < 2; permutation++) {
+        Scene given = random_scene(seed), scene = random_scene(seed);
+        uint32_t from[OBJECTS];
+        for (uint32_t i = 0; i < OBJECTS; i++)
+            from[i] = OBJECTS - 1 - i;
+        for (uint32_t i = OBJECTS; permutation == 1 && i-- > 1;) {
+            uint32_t k = (uint32_t)random_between(&random, 0, i + 1), kept = from[i];
+            from[i] = from[k];
+            from[k] = kept;
+        }
+        for (size_t i = 0; i < OBJECTS; i++)
+            scene.objects.items[i] = given.objects.items[from[i]];
+        Frame frame = picture(&scene, &c->settings);
+        for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++)
+            if (frame.object[i] != UINT32_MAX) frame.object[i] = from[frame.object[i]];
+        same_and_freed(c, &frame, permutation == 0 ? "objects in reverse" : "objects shuffled");
+        scene_free(&scene);
+        scene_free(&given);
+    }
+}
+
+static void precision_holds(Precision precision)
+{
+    if (!probe_has(precision)) skip();
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        Scene scene = random_scene(seed);
+        char name[48];
+        snprintf(name, sizeof name, "%s, seed %u", precision_names[precision], (unsigned)seed);
+        Case c = {.scene = &scene, .settings = frame_settings(WIDTH, HEIGHT, precision), .name = name};
+        c.settings.bvh = BVH_ON;
+        c.settings.extra_features = features_of(&scene); // also where a changed scene needs fewer
+        assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_IMAGES, FEATURE_ALL);
+        c.frame = picture(&scene, &c.settings);
+        assert_int_equal(frame_count_faulty(&c.frame), 0);
+        assert_true(objects_seen(&c.frame) >= OBJECTS / 3);
+
+        runs_bands_and_hierarchy_change_nothing(&c);
+        // the compiler rearranges relaxed arithmetic for each width anew
+        if (precision != PRECISION_FAST) lanes_change_nothing(&c);
+        scale_changes_lengths_alone(&c, seed);
+        mirror_flips_the_picture(&c, seed);
+        order_changes_ids_alone(&c, seed);
+        frame_free(&c.frame);
+        scene_free(&scene);
+    }
+}
+
+static void fast_holds(void **state)
+{
+    (void)state;
+    precision_holds(PRECISION_FAST);
+}
+
+static void single_holds(void **state)
+{
+    (void)state;
+    precision_holds(PRECISION_SINGLE);
+}
+
+static void strict_holds(void **state)
+{
+    (void)state;
+    precision_holds(PRECISION_STRICT);
+}
+
+static void double_holds(void **state)
+{
+    (void)state;
+    precision_holds(PRECISION_DOUBLE);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fast_holds),
+        cmocka_unit_test(single_holds),
+        cmocka_unit_test(strict_holds),
+        cmocka_unit_test(double_holds),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
