@@ -50,6 +50,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
         }
     }
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
+    if (!lanes_any(hit)) return hit;
     real radius = (real)(disc->center_radius.w);
     // nearly in the disc's plane n . d says little about t, but it lies no farther from the center than the
     // rim

@@ -254,7 +254,7 @@ static inline real real_complement_power(real s, real n)
 #if IS_FAST
     real power = device_exp2(n * device_log2((real)(1) - s));
 #else
-    real power = device_power(real_exp_negative(n * real_log_complement(s)), s, n);
+    real power = perturbed_power(real_exp_negative(n * real_log_complement(s)), s, n);
 #endif
     return real_min(power, (real)(1));
 }

@@ -32,8 +32,8 @@ static inline natural path_sign(natural path, const Ray *ray, const Hit *hit, ma
 }
 
 // Follows a ray and all that it becomes: at each surface the mirrored ray first, with all that comes of it,
-// then the one that passes. Where SIGNS_PATHS, *path is the signature (types.h) of the way taken; a lane's
-// does not depend on the others.
+// then the one that passes. Where SIGNS_PATHS, *path is the signature (types.h) of the way taken, which in a
+// lane does not depend on the others, and the color is without meaning.
 static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
 {
     *path = (natural)(PATH_START);
@@ -51,7 +51,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
         bool any_found = lanes_any(surface.found);
         if (any_found) {
             surface = surface_at(scene, &ray, &hit);
-            seen = vector_select(surface.found, surface_color(scene, &surface), background);
+            if (!SIGNS_PATHS) seen = vector_select(surface.found, surface_color(scene, &surface), background);
         }
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (SIGNS_PATHS) *path = path_sign(*path, &ray, &hit, mask_none(), mask_none(), mask_none());

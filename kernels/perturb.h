@@ -10,22 +10,14 @@
 
 #include "lanes.h"
 
-#if LANES == 1
-typedef JOIN(u, INTEGER_BASE) word;
-#else
-typedef JOIN(JOIN(u, INTEGER_BASE), LANES) word;
-#endif
-#define word_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
-#define integer_from_word LANES_AS(INTEGER_BASE)
-
 #if IS_DOUBLE
 #define MANTISSA        ((integer)(0xfffffffffffffL))
 #define HALF_WORD       32
-#define HASH_MULTIPLIER ((word)(0x9e3779b97f4a7c15UL))
+#define HASH_MULTIPLIER ((natural)(0x9e3779b97f4a7c15UL))
 #else
 #define MANTISSA        ((integer)(0x7fffff))
 #define HALF_WORD       16
-#define HASH_MULTIPLIER ((word)(0x9e3779b1U))
+#define HASH_MULTIPLIER ((natural)(0x9e3779b1U))
 #endif
 
 enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTURBED_LOG2, PERTURBED_COUNT };
@@ -33,22 +25,23 @@ enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTUR
 // In ulp. The device's own rounding comes on top.
 enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16, NATIVE_ERROR = 8192 };
 
-static inline word perturb_hash(uint operation, integer a, integer b)
+static inline natural perturb_hash(uint operation, integer a, integer b)
 {
-    word hash = (word)(PERTURB_SEED * PERTURBED_COUNT + operation) * HASH_MULTIPLIER;
-    hash = (hash ^ (hash >> HALF_WORD) ^ word_from_integer(a)) * HASH_MULTIPLIER;
-    hash = (hash ^ (hash >> HALF_WORD) ^ word_from_integer(b)) * HASH_MULTIPLIER;
+    natural hash = (natural)(PERTURB_SEED * PERTURBED_COUNT + operation) * HASH_MULTIPLIER;
+    hash = (hash ^ (hash >> HALF_WORD) ^ natural_from_integer(a)) * HASH_MULTIPLIER;
+    hash = (hash ^ (hash >> HALF_WORD) ^ natural_from_integer(b)) * HASH_MULTIPLIER;
     return (hash ^ (hash >> HALF_WORD)) * HASH_MULTIPLIER;
 }
 
 // From -largest to largest.
-static inline integer perturb_steps(word hash, uint largest)
+static inline integer perturb_steps(natural hash, uint largest)
 {
-    return integer_from_word(mul_hi(hash, (word)(2 * largest + 1))) - (integer)((scalar_integer)largest);
+    return integer_from_natural(mul_hi(hash, (natural)(2 * largest + 1))) -
+           (integer)((scalar_integer)largest);
 }
 
 // The real so many ulp away. 0, and what is nearly too small or too large for a real, stays.
-static inline real perturb(real value, word hash, uint largest)
+static inline real perturb(real value, natural hash, uint largest)
 {
     integer steps = perturb_steps(hash, largest * PERTURB_SCALE);
     mask ordinary = (fabs(value) > (real)(SMALLEST_RATIO)) & (fabs(value) < (real)(1 / SMALLEST_RATIO));
@@ -60,7 +53,7 @@ static inline real device_divide(real a, real b)
 {
     real quotient = a / b;
     if (!PERTURB || IS_DOUBLE) return quotient;
-    word hash = perturb_hash(PERTURBED_DIVIDE, bits_from_real(a) & MANTISSA, bits_from_real(b) & MANTISSA);
+    natural hash = perturb_hash(PERTURBED_DIVIDE, bits_from_real(a) & MANTISSA, bits_from_real(b) & MANTISSA);
     real moved = perturb(quotient, hash, DIVIDE_ERROR);
     if (!IS_FAST) return moved;
     mask promised = (fabs(a) > (real)(0x1p-62f)) & (fabs(a) < (real)(0x1p62f)) &
@@ -77,9 +70,10 @@ static inline real device_sqrt(real a)
     return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
 }
 
-// What became of base^exponent, however it was computed. `strict` calls nothing that a device may do its own
-// way, so that no device errs there.
-static inline real device_power(real power, real base, real exponent)
+// base^exponent, which the kernels work out themselves where they are not `fast`, moved as a device's own
+// power could be: what a picture may differ by where a device's functions stood in. Not at `strict`, whose
+// bits are promised.
+static inline real perturbed_power(real power, real base, real exponent)
 {
     if (!PERTURB || IS_STRICT) return power;
     return perturb(power, perturb_hash(PERTURBED_POWER, bits_from_real(base), bits_from_real(exponent)),
@@ -99,7 +93,7 @@ static inline real device_log2(real a)
 {
     real logarithm = native_log2(a);
     if (!PERTURB) return logarithm;
-    word hash = perturb_hash(PERTURBED_LOG2, bits_from_real(a), (integer)(0));
+    natural hash = perturb_hash(PERTURBED_LOG2, bits_from_real(a), (integer)(0));
     real steps = real_from_integer(perturb_steps(hash, NATIVE_ERROR * PERTURB_SCALE));
     return fma(steps, (real)(0x1p-21f / NATIVE_ERROR), perturb(logarithm, hash, NATIVE_ERROR));
 }

@@ -47,7 +47,7 @@ static inline real real_inverse_or_huge(real a)
 {
     mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
     real inverse = real_divide((real)(1), lanes_select(zero, (real)(1), a));
-    if (HAS_BOXES && !IS_COMPENSATED)
+    if (HAS_BOXES & !IS_COMPENSATED)
         inverse = lanes_select(steps, fma(fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }

@@ -55,7 +55,7 @@ static inline void rays_count(const Scene *scene, uint what, mask rays)
 // A ray's way through the scene: to its closest hit, or only to whether anything blocks it.
 typedef struct {
     Hit hit;
-    mask open;       // the lanes that are still looking
+    mask open;       // the lanes that are looking: not those that found enough, nor those whose turn is later
     bool any;        // a hit takes light from a lane, all of it unless the object is transparent
     integer opacity; // that the lanes met, in steps of -log2
 } Search;
@@ -100,7 +100,7 @@ static inline void search_darken(Search *search, const Scene *scene, mask found,
 static inline void search_take(Search *search, const Scene *scene, mask found, real t, uint id)
 {
     if (search->any) {
-        search_darken(search, scene, found & (t < search->hit.t), id);
+        search_darken(search, scene, found & search->open & (t < search->hit.t), id);
         return;
     }
     Hit *hit = &search->hit;
@@ -115,6 +115,7 @@ static inline void search_take(Search *search, const Scene *scene, mask found, r
 static inline void search_shapes(Search *search, const Scene *scene, const Ray *ray, uint kind, uint first,
                                  uint last)
 {
+    if (search->any && !lanes_any(search->open)) return;
 #define SEARCH_SHAPES(feature, Type, name, names)                                                            \
     if (HAS_##feature && kind == KIND_##feature) {                                                           \
         for (uint i = first; i < last; i++) {                                                                \
@@ -169,6 +170,8 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, uint signs)
     return rays;
 }
 
+enum { BOX_RAYS_SIGNS = 8 }; // numbers of signs
+
 // Where the rays enter a child's box.
 static inline real box_rays_enter(const BoxRays *rays, global const scalar *box, real near)
 {
@@ -186,16 +189,21 @@ static inline real box_rays_leave(const BoxRays *rays, global const scalar *box,
     return real_min(real_min(x, y), real_min(z, limit));
 }
 
+// No further than this is a lane interested; not at all where it has found what it looked for. Always below
+// LARGEST, the place of a box that a lane does not meet.
+static inline real search_limit(const Search *search)
+{
+    return lanes_select(search->open, real_min(search->hit.t, (real)(LARGEST / 2)), (real)(-LARGEST));
+}
+
 // Down the tree, the nearer child first; a packet visits what any of its lanes meets.
-static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays,
-                              mask members)
+static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays)
 {
     uint2 waiting[BVH_DEPTH_LARGEST];
     real waiting_nears[BVH_DEPTH_LARGEST];
     uint waiting_count = 0;
     uint2 child = (uint2)(0, BVH_NODE);
-    // no further than this is any lane interested; not at all where it has found what it looked for
-    real limit = lanes_select(members & search->open, search->hit.t, (real)(-LARGEST));
+    real limit = search_limit(search);
     for (;;) {
         if ((child.y & 0xff) == BVH_NODE) {
             global const BvhNode *node = &scene->nodes[child.x];
@@ -221,7 +229,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
             }
         } else {
             search_shapes(search, scene, ray, child.y & 0xff, child.x, child.x + (child.y >> 8 & 0xff));
-            limit = lanes_select(members & search->open, search->hit.t, (real)(-LARGEST));
+            limit = search_limit(search);
         }
         do {
             if (waiting_count == 0) return;
@@ -234,7 +242,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 // Rays of one packet mostly run to the same sides; where they do not, those that do go together.
 static inline void search_hierarchy(Search *search, const Scene *scene, const Ray *ray)
 {
-    const integer none = (integer)(8);
+    const integer none = (integer)(BOX_RAYS_SIGNS);
     Vector d = ray->direction;
     integer signs = lanes_select(d.x < (real)(0), (integer)(1), (integer)(0)) |
                     lanes_select(d.y < (real)(0), (integer)(2), (integer)(0)) |
@@ -242,11 +250,13 @@ static inline void search_hierarchy(Search *search, const Scene *scene, const Ra
     integer pending = lanes_select(search->open, signs, none);
     for (;;) {
         scalar_integer first = lanes_smallest(pending);
-        if (first == 8) break;
-        mask members = pending == (integer)(first);
+        if (first == BOX_RAYS_SIGNS) break;
+        mask members = pending == (integer)(first), others = search->open & !members;
         pending = lanes_select(members, none, pending);
+        search->open = search->open & members;
         BoxRays rays = box_rays(ray, scene->header->bounds, (uint)first);
-        search_bvh(search, scene, ray, &rays, members);
+        search_bvh(search, scene, ray, &rays);
+        search->open = search->open | others;
     }
 }
 

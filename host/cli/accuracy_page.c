@@ -1,6 +1,5 @@
 #include "host/cli/accuracy_page.h"
 
-#include "host/base/embedded.h"
 #include "host/base/fault.h"
 #include "host/cli/accuracy_page_parts.h"
 #include "host/cli/html.h"

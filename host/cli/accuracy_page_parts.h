@@ -1,8 +1,12 @@
 // The parts of the page of glint accuracy.
 #pragma once
 
+#include "host/base/embedded.h"
 #include "host/base/text.h"
 #include "host/cli/accuracy_report.h"
+
+// The files of host/cli/page/: "page.html", …; ended by a NULL name.
+extern const EmbeddedFile page_files[];
 
 // The mark of its precision, and its name.
 void page_variant_name(Text *page, const AccuracyScene *scene, size_t variant);

@@ -2,7 +2,11 @@
 // changed.
 #pragma once
 
+#include "host/base/embedded.h"
 #include "host/opencl/compute.h"
+
+// The files of kernels/: "render.cl", "sphere.h", …; ended by a NULL name.
+extern const EmbeddedFile kernel_files[];
 
 // `prelude`, then `root` with each quoted include replaced by its file the first time and by an empty line
 // after that, in any branch of the preprocessor; #line before and after, so that the compiler names the file

@@ -47,11 +47,12 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
     return buffer_make(compute, size, size > 0 ? bytes : nothing, flags | CL_MEM_COPY_HOST_PTR);
 }
 
-enum { CACHE_LINE = 128, LARGE_PAGE = 1 << 21 };
+// The largest type of OpenCL C has 128 bytes, and no device asks for buffers to begin at more than that.
+enum { BUFFER_ALIGNMENT = 128, LARGE_PAGE = 1 << 21 };
 
 void *buffer_bytes_allocate(size_t size)
 {
-    size_t alignment = size < 2 * (size_t)LARGE_PAGE ? CACHE_LINE : LARGE_PAGE;
+    size_t alignment = size < 2 * (size_t)LARGE_PAGE ? BUFFER_ALIGNMENT : LARGE_PAGE;
     size_t rounded = (size / alignment + 1) * alignment;
     void *bytes = aligned_alloc(alignment, rounded);
     if (!bytes) fault("out of memory for a buffer of %zu bytes", size);

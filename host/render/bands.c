@@ -196,8 +196,17 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
     for (size_t i = 0; i < PART_COUNT; i++)
         if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
             mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
-    Band band = {rows.first_row, rows.row_count, mapped[0], mapped[1], mapped[2],
-                 mapped[3],      mapped[4],      mapped[5], mapped[6], mapped[7]};
+    // in the order of the parts
+    Band band = {.first_row = rows.first_row,
+                 .row_count = rows.row_count,
+                 .colors = mapped[0],
+                 .t = mapped[1],
+                 .normal = mapped[2],
+                 .position = mapped[3],
+                 .object = mapped[4],
+                 .shadow = mapped[5],
+                 .ray = mapped[6],
+                 .path = mapped[7]};
     double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
     bool go_on = sink(context, &band, done);
     for (size_t i = 0; i < PART_COUNT; i++)

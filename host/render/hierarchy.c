@@ -229,7 +229,8 @@ static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded)
 
 static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *bounded)
 {
-    uint32_t counts[8] = {0};
+    uint32_t counts[4 * sizeof header->bounded_counts / sizeof *header->bounded_counts] = {0};
+    _Static_assert(KIND_COUNT <= sizeof counts / sizeof *counts, "a kind without a place in SceneHeader");
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)bounded->kind_counts[kind];
     memcpy(header->bounded_counts, counts, sizeof counts);

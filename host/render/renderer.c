@@ -105,7 +105,7 @@ static bool device_has_room(const FlatScene *flat, const Renderer *renderer, Mes
     return false;
 }
 
-// Frees each array of the host once the device has it.
+// Frees each array of the host as it goes, so that no two copies of all of them exist.
 static void upload(Renderer *renderer, FlatScene *flat)
 {
     bool wide = renderer->report.wide;
