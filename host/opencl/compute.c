@@ -50,14 +50,19 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
 // The largest type of OpenCL C has 128 bytes, and no device asks for buffers to begin at more than that.
 enum { BUFFER_ALIGNMENT = 128, LARGE_PAGE = 1 << 21 };
 
+static bool is_large(size_t size)
+{
+    return size >= 2 * (size_t)LARGE_PAGE;
+}
+
 void *buffer_bytes_allocate(size_t size)
 {
-    size_t alignment = size < 2 * (size_t)LARGE_PAGE ? BUFFER_ALIGNMENT : LARGE_PAGE;
+    size_t alignment = is_large(size) ? LARGE_PAGE : BUFFER_ALIGNMENT;
     size_t rounded = (size / alignment + 1) * alignment;
     void *bytes = aligned_alloc(alignment, rounded);
     if (!bytes) fault("out of memory for a buffer of %zu bytes", size);
 #ifdef MADV_HUGEPAGE
-    if (alignment == LARGE_PAGE) madvise(bytes, rounded, MADV_HUGEPAGE); // a wish: no harm if not granted
+    if (is_large(size)) madvise(bytes, rounded, MADV_HUGEPAGE); // a wish: no harm if not granted
 #endif
     return bytes;
 }
@@ -70,7 +75,8 @@ static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
 
 cl_mem buffer_take(Compute *compute, size_t size, void *bytes)
 {
-    bool in_place = compute->device->type & CL_DEVICE_TYPE_CPU;
+    // what is small is copied: Oclgrind takes memory that it did not copy for uninitialised
+    bool in_place = (compute->device->type & CL_DEVICE_TYPE_CPU) && is_large(size);
     cl_mem buffer = buffer_make(compute, size, bytes,
                                 CL_MEM_READ_ONLY | (in_place ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR));
     if (in_place)

@@ -59,8 +59,8 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
 // has them, which spares a CPU that reads them at random most of its address translations. Given to
 // buffer_take.
 void *buffer_bytes_allocate(size_t size);
-// A read-only buffer of those bytes, which belong to it from then on: a CPU may read them where they are,
-// other devices get a copy. Fails as buffer_create does.
+// A read-only buffer of those bytes, which belong to it from then on: a CPU may read large ones where they
+// are, else the device gets a copy. Fails as buffer_create does.
 cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
 
 // One command's time as its event says it, beside the host's clock around it.
