@@ -213,7 +213,7 @@ function drawLegend(scene) {
   const any = precisions[0];
   if (!any) return "";
   const items = precisions.map((precision) => item([mark(precision)], precision));
-  items.push(item([mark(any, "hollow")], "hollow: another is as good and faster"));
+  items.push(item([mark(any, "hollow")], "hollow: another is as good and faster, or crossed out"));
   if (measured.some((variant) => variant.crossed_out)) {
     items.push(item([mark(any, "hollow"), svg("path", { class: "cross", d: "M-8 -7L8 7M-8 7L8 -7" })], "crossed out"));
   }
