@@ -5,7 +5,7 @@
 
 command -v python3 >/dev/null || skip_all "there is no python3"
 
-documents=(docs/accuracy.md docs/performance.md)
+documents=(docs/accuracy.md docs/performance.md docs/verify.md)
 cp -r docs/measurements "${documents[@]}" "$scratch"
 for document in "${documents[@]}"; do
     copy=$scratch/$(basename "$document")
