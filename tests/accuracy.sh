@@ -4,12 +4,12 @@
 . "$(dirname "$0")/support.bash"
 
 "$GLINT" devices >/dev/null 2>&1 || skip_all "no OpenCL device"
-python_with numpy
+python_with numpy=numpy==2.4.6 flip_evaluator=flip-evaluator==1.7
 
 scene=scenes/mirror-glass.yaml
 small=(--size 96x64 --seconds 0.2)
-"$GLINT" accuracy "$scene" scenes/article.yaml "${small[@]}" --precision fast,double --save "$scratch/saved" --json \
-    >"$scratch/report" 2>"$scratch/errors"
+"$GLINT" accuracy "$scene" scenes/spheres16.yaml scenes/far.yaml "${small[@]}" --precision single,double \
+    --save "$scratch/saved" --json >"$scratch/report" 2>"$scratch/errors"
 status=$?
 if grep -q 'no 64-bit floating point' "$scratch/errors"; then
     [ $status = 1 ] || fail "without a reference: exit status $status, expected 1"
@@ -17,7 +17,7 @@ if grep -q 'no 64-bit floating point' "$scratch/errors"; then
 fi
 [ $status = 0 ] || { fail "exit status $status: $(cat "$scratch/errors")"; finish; }
 check "nothing on standard error" cmp "$scratch/errors" /dev/null
-check "every figure is what numpy makes of the arrays" "$python" tests/accuracy_reference.py "$GLINT" "$scratch/report"
+check "every figure is what numpy makes of the arrays" "$python" tests/accuracy_reference.py "$scratch/report"
 
 # holds WHAT PYTHON: the expression is true of `scene`, the first scene of $scratch/out, and `variants`, its variants.
 holds() {
@@ -34,6 +34,11 @@ holds "the reference is no variant with errors of 0" \
     '[v["status"] for v in variants] == ["measured", "reference"] and "errors" not in variants[1] and variants[1]["frame_ms"]["runs"] > 0'
 holds "glass bends paths" 'variants[0]["errors"]["path"]["edge"] > 0 and scene["edges"]["path"] > scene["edges"]["silhouette"]'
 
+holds "single is enough for an easy scene, and for one millions of units from the origin" 'all(
+    not v["crossed_out"] and v["errors"]["object"]["away"] == v["errors"]["shadow"]["away"] == 0 and
+    v["errors"]["shading"]["rmse"] < 1e-6
+    for easy in report["scenes"][1:] for v in easy["variants"] if v["status"] == "measured")'
+
 # run WANT WHAT ARGUMENTS…: the exit status of glint accuracy, whose output is kept in $scratch/out.
 run() {
     local want=$1 what=$2 got
@@ -44,7 +49,7 @@ run() {
 }
 
 # The reference's own file: what is compared in colors is as before, and no count is made up.
-run 0 "a reference from a file" "$scene" "${small[@]}" --precision fast,double --json \
+run 0 "a reference from a file" "$scene" "${small[@]}" --precision single,double --json \
     --reference "$scratch/saved/0-mirror-glass-reference.color.npy"
 holds "colors only" 'all(variants[0]["errors"][kind]["status"] == "unavailable" for kind in
     ("object", "shadow", "path", "shading", "t", "normal")) and scene["edges"]["status"] == "unavailable"'

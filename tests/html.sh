@@ -37,7 +37,7 @@ check "a page of what a file's colors tell" "$GLINT" accuracy spheres16.yaml "${
 cd - >/dev/null || exit 1
 if [ $failed != 0 ] || is_sanitized; then finish; fi # the pages are those of the other build
 browser=$(command -v chromium) || skip_all "there is no chromium"
-python_with playwright
+python_with playwright=playwright==1.65.2
 check "two scenes" "$python" tests/html_report.py "$browser" "$scratch/page.html" "$scratch/page.json"
 check "crossed out" "$python" tests/html_report.py "$browser" "$scratch/crossed.html"
 check "colors only" "$python" tests/html_report.py "$browser" "$scratch/colors.html"

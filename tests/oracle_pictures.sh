@@ -5,7 +5,7 @@
 # Takes the program from BUILD: the kernels are the same in every build, so that the first build's run is enough.
 . "$(dirname "$0")/support.bash"
 
-python_with flint=python-flint yaml=PyYAML numpy
+python_with flint=python-flint==0.9.0 yaml=PyYAML==6.0.3 numpy=numpy==2.4.6
 long=
 [ "${GLINT_LONG_TESTS-}" != 1 ] || long=--long
 if "$python" -B tests/oracle/pictures.py "${BUILD:-build}/glint" "$scratch" $long; then

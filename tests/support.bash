@@ -43,18 +43,23 @@ skip_all() {
 }
 # python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: python3 (or $PYTHON), else a
 # virtual environment that the tests of a run share, in which pip installs what is missing (by the module's own name
-# where no requirement is given). Skips the test where that cannot be done.
+# where no requirement is given). Skips the test where that cannot be done; once pip had no network, no test asks it for
+# ten minutes.
 python_with() {
     python=${PYTHON:-python3}
     local modules=("${@%%=*}") folder=$shared_cache/glint-tests/python log=$scratch/pip.log
-    local import="import $(IFS=,; echo "${modules[*]}")"
+    local import="import $(IFS=,; echo "${modules[*]}")" offline=$shared_cache/glint-tests/offline
     "$python" -c "$import" 2>/dev/null && return
     command -v "$python" >/dev/null || skip_all "there is no $python"
-    {
-        [ -x "$folder/bin/pip" ] || "$python" -m venv --clear "$folder"
-        python=$folder/bin/python
-        "$python" -c "$import" 2>/dev/null || timeout 300 "$python" -m pip install -q --no-input "${@#*=}"
-    } >"$log" 2>&1 && "$python" -c "$import" 2>>"$log" ||
+    [ -x "$folder/bin/pip" ] || "$python" -m venv --clear "$folder" >"$log" 2>&1 ||
+        skip_all "${modules[*]}: not here, and no virtual environment can be made: $(tail -n 1 "$log")"
+    python=$folder/bin/python
+    "$python" -c "$import" 2>/dev/null && return
+    [ ! "$(find "$offline" -mmin -10 2>/dev/null)" ] || skip_all "${modules[*]}: not here, and pip had no network"
+    timeout 300 "$python" -m pip install -q --no-input "${@#*=}" >"$log" 2>&1
+    local status=$?
+    if [ $status = 124 ] || grep -qi 'connection broken' "$log"; then touch "$offline"; fi
+    [ $status = 0 ] && "$python" -c "$import" 2>"$log" ||
         skip_all "${modules[*]}: not here, and pip cannot install them: $(tail -n 1 "$log")"
 }
 is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
