@@ -48,10 +48,7 @@ static Material random_material(Random *random, size_t index)
     material.specular = random_between(random, 0, 1);
     material.shininess = random_between(random, 0, 100);
     if (index == 1) material.reflection = random_between(random, 0.2, 0.8);
-    if (index == 2) {
-        material.transmission = random_between(random, 0.5, 0.9);
-        material.full_shadow = true;
-    }
+    if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
     if (index == 3) {
         material.checker = true;
         material.checker_size = random_between(random, 0.3, 1);
