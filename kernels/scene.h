@@ -115,7 +115,6 @@ static inline void search_take(Search *search, const Scene *scene, mask found, r
 static inline void search_shapes(Search *search, const Scene *scene, const Ray *ray, uint kind, uint first,
                                  uint last)
 {
-    if (search->any && !lanes_any(search->open)) return;
 #define SEARCH_SHAPES(feature, Type, name, names)                                                            \
     if (HAS_##feature && kind == KIND_##feature) {                                                           \
         for (uint i = first; i < last; i++) {                                                                \
@@ -266,7 +265,7 @@ static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool 
     global const uint *counts = (global const uint *)scene->header->counts;
     global const uint *bounded_counts = (global const uint *)scene->header->bounded_counts;
 #define SEARCH_PLAINLY(feature, Type, name, names)                                                           \
-    if (HAS_##feature)                                                                                       \
+    if (HAS_##feature && lanes_any(search.open))                                                             \
         search_shapes(&search, scene, ray, KIND_##feature, bounded_counts[KIND_##feature],                   \
                       counts[KIND_##feature]);
     SHAPE_LIST(SEARCH_PLAINLY)
