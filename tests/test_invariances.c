@@ -242,7 +242,7 @@ static void order_changes_ids_alone(const Case *c, uint64_t seed)
         uint32_t from[OBJECTS];
         for (uint32_t i = 0; i < OBJECTS; i++)
             from[i] = OBJECTS - 1 - i;
-        for (uint32_t i = OBJECTS; permutation == 1 && i-- > 1;) {
+        for (uint32_t i = OBJECTS - 1; permutation == 1 && i > 0; i--) {
             uint32_t k = (uint32_t)random_between(&random, 0, i + 1), kept = from[i];
             from[i] = from[k];
             from[k] = kept;
