@@ -34,6 +34,14 @@ typedef int scalar_integer;
 // compiled.
 #define OUT_OF_LINE __attribute__((noinline))
 
+// What a kernel does once it knows its work-item. PoCL compiles a kernel's own text three times, for each way
+// to launch it, and what it calls out of line once.
+#if LANES == 1
+#define KERNEL_BODY inline
+#else
+#define KERNEL_BODY OUT_OF_LINE
+#endif
+
 #define JOIN_TOKENS(a, b) a##b
 #define JOIN(a, b)        JOIN_TOKENS(a, b)
 

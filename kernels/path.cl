@@ -3,14 +3,17 @@
 #include "film.h"
 #include "path.h"
 
+static KERNEL_BODY void tile_sign(const Scene *scene, const Tile *tile, global int *paths)
+{
+    natural signature;
+    ray_color(scene, camera_ray(scene->header, tile->pixels, 0, 0, tile->inside), &signature);
+    film_store_integer(paths, tile, 1, 0, integer_from_natural(signature));
+}
+
 kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     Tile tile = band_tile(&band);
-    if (!lanes_any(tile.inside)) return;
-
-    natural signature;
-    ray_color(&scene, camera_ray(header, tile.pixels, 0, 0, tile.inside), &signature);
-    film_store_integer(paths, &tile, 1, 0, integer_from_natural(signature));
+    if (lanes_any(tile.inside)) tile_sign(&scene, &tile, paths);
 }

@@ -3,10 +3,38 @@
 #include "film.h"
 #include "path.h"
 
-// Adds samples first..last-1 to the band's film; the last of all turns the sum into the mean. `offsets` has
-// each sample's place in its pixel, from -1 to 1. What each addition loses is carried to the next, in
-// `losses` from launch to launch (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965): a
-// plain sum of a million equal samples would be off by 1 %.
+// Adds samples first..last-1 to the tile's part of the film; the last of all turns the sum into the mean.
+// `offsets` has each sample's place in its pixel, from -1 to 1. What each addition loses is carried to the
+// next, in `losses` from launch to launch (Kahan, Further remarks on reducing truncation errors, CACM 8(1),
+// 1965): a plain sum of a million equal samples would be off by 1 %.
+static KERNEL_BODY void tile_render(const Scene *scene, const Tile *tile, global const scalar *offsets,
+                                    global scalar *film, global scalar *losses, uint first_sample,
+                                    uint last_sample)
+{
+    Color3 sum = {(real)(0), (real)(0), (real)(0)}, lost = sum;
+    if (first_sample > 0) {
+        sum = film_load_color(film, tile);
+        lost = film_load_color(losses, tile);
+    }
+    for (uint sample = first_sample; sample < last_sample; sample++) {
+        Ray ray = camera_ray(scene->header, tile->pixels, offsets[2 * sample], offsets[2 * sample + 1],
+                             tile->inside);
+        rays_count(scene, RAYS_CAMERA, ray.active);
+        natural path;
+        Color3 color = vector_subtract(ray_color(scene, ray, &path), lost);
+        Color3 next = vector_add(sum, color);
+        lost = vector_subtract(vector_subtract(next, sum), color);
+        sum = next;
+    }
+    uint count = scene->header->picture.z;
+    if (last_sample < count) film_store_color(losses, tile, lost);
+    if (count > 1 && last_sample == count) {
+        real divisor = (real)((scalar)count);
+        sum = (Color3){real_divide(sum.x, divisor), real_divide(sum.y, divisor), real_divide(sum.z, divisor)};
+    }
+    film_store_color(film, tile, sum);
+}
+
 kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar *film, global scalar *losses,
                    uint4 band_pixels, uint first_sample, uint last_sample, global uint *ray_counts)
 {
@@ -14,27 +42,5 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar 
     scene.ray_counts = ray_counts;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     Tile tile = band_tile(&band);
-    if (!lanes_any(tile.inside)) return;
-
-    Color3 sum = {(real)(0), (real)(0), (real)(0)}, lost = sum;
-    if (first_sample > 0) {
-        sum = film_load_color(film, &tile);
-        lost = film_load_color(losses, &tile);
-    }
-    for (uint sample = first_sample; sample < last_sample; sample++) {
-        Ray ray = camera_ray(header, tile.pixels, offsets[2 * sample], offsets[2 * sample + 1], tile.inside);
-        rays_count(&scene, RAYS_CAMERA, ray.active);
-        natural path;
-        Color3 color = vector_subtract(ray_color(&scene, ray, &path), lost);
-        Color3 next = vector_add(sum, color);
-        lost = vector_subtract(vector_subtract(next, sum), color);
-        sum = next;
-    }
-    uint count = header->picture.z;
-    if (last_sample < count) film_store_color(losses, &tile, lost);
-    if (count > 1 && last_sample == count) {
-        real divisor = (real)((scalar)count);
-        sum = (Color3){real_divide(sum.x, divisor), real_divide(sum.y, divisor), real_divide(sum.z, divisor)};
-    }
-    film_store_color(film, &tile, sum);
+    if (lanes_any(tile.inside)) tile_render(&scene, &tile, offsets, film, losses, first_sample, last_sample);
 }

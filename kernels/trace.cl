@@ -7,13 +7,9 @@ enum { RAY_SCALARS = 8, RESULT_SCALARS = 21 };
 // rays: origin, direction, tmin, tmax of each. results: t; the geometric normal, facing the ray; the point;
 // the mirrored ray's origin and direction; the passed one's; how much of the ray passes; and how much light
 // passes along it from tmin to tmax. Behind t all are without meaning where nothing is hit, but for the last.
-kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, global scalar *results,
-                  global int *objects_hit)
+static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
+                                   global scalar *results, global int *objects_hit)
 {
-    Scene scene = SCENE_FROM_ARGUMENTS;
-    uint first = (uint)get_global_id(0) * LANES;
-    if (first >= ray_count) return;
-
     RealLanes value[RAY_SCALARS];
     for (uint lane = 0; lane < LANES; lane++) {
         uint index = min(first + lane, ray_count - 1);
@@ -23,8 +19,8 @@ kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, gl
     Vector origin = {value[0].all, value[1].all, value[2].all};
     Vector direction = {value[3].all, value[4].all, value[5].all};
     Ray ray = ray_make(origin, direction, value[6].all, value[7].all, mask_all());
-    Hit hit = closest_hit(&scene, &ray);
-    Surface surface = surface_at(&scene, &ray, &hit);
+    Hit hit = closest_hit(scene, &ray);
+    Surface surface = surface_at(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce mirrored = {origin, direction, black}, passed = mirrored;
     surface_bounce(&surface, &ray, white, &mirrored, &passed);
@@ -36,7 +32,7 @@ kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, gl
         {hit.t}, {n.x}, {n.y}, {n.z}, {p.x}, {p.y}, {p.z},
         {mo.x}, {mo.y}, {mo.z}, {md.x}, {md.y}, {md.z},
         {po.x}, {po.y}, {po.z}, {pd.x}, {pd.y}, {pd.z},
-        {passed.weight.x}, {light_passing(&scene, &ray)},
+        {passed.weight.x}, {light_passing(scene, &ray)},
     };
     // clang-format on
     IntegerLanes object = {hit.object};
@@ -46,4 +42,12 @@ kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, gl
             results[index * RESULT_SCALARS + i] = result[i].each[lane];
         objects_hit[index] = (int)object.each[lane];
     }
+}
+
+kernel void trace(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, global scalar *results,
+                  global int *objects_hit)
+{
+    Scene scene = SCENE_FROM_ARGUMENTS;
+    uint first = (uint)get_global_id(0) * LANES;
+    if (first < ray_count) rays_trace(&scene, first, rays, ray_count, results, objects_hit);
 }
