@@ -41,10 +41,8 @@ typedef struct {
 // does not compile is a fault: prints the build log and saves the composed text, named in the message.
 void program_build(Compute *compute, const ProgramRequest *request, Program *program);
 // Call after the program's first launch has ended: puts the program into the cache, unless it came from
-// there. Not earlier: PoCL compiles a kernel for a work-group size at its first launch, its binaries hold
-// what was launched by then, and one loaded from a binary hands out that binary for ever (3.1; hence `launch`
-// in the key). Asking for PoCL's binary also costs one more compilation of each kernel, so do it when the
-// picture is out.
+// there. Not earlier: PoCL compiles a kernel at its first launch, its binaries hold what was launched by
+// then, and one loaded from a binary hands out that binary for ever (3.1; hence `launch` in the key).
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
 void program_close(Program *program);
 

@@ -103,8 +103,16 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
     array_push(*list, device);
 }
 
+// PoCL reads this when it compiles a kernel for its first launch. A kernel made for one work-group size is no
+// faster here than the one for all sizes, which its binaries need in any case: without this, it makes both.
+static void pocl_compile_once(void)
+{
+    setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", true);
+}
+
 void device_list_open(DeviceList *list)
 {
+    pocl_compile_once();
     *list = (DeviceList){0};
     cl_uint platform_count = 0;
     if (clGetPlatformIDs(0, NULL, &platform_count) != CL_SUCCESS || platform_count == 0) return;
