@@ -9,6 +9,7 @@
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
 
 // What both directions share; libpng hands it back where it fails.
 typedef struct {
@@ -82,6 +83,8 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
         png_note(state, note);
     png_set_filter(state->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
     png_set_compression_level(state->png, 1);
+    // of what the filter leaves runs are what repeats: as fast as a search for more, and smaller
+    png_set_compression_strategy(state->png, Z_RLE);
     png_write_info(state->png, state->info);
     return true;
 }
