@@ -215,6 +215,5 @@ bool device_open(OpenDevice *open, const char *wish)
 
 void device_close(OpenDevice *open)
 {
-    compute_close(&open->compute);
     device_list_close(&open->devices);
 }

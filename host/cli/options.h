@@ -82,4 +82,5 @@ typedef struct {
 
 // Chooses and opens a device. False: told, nothing to close.
 bool device_open(OpenDevice *open, const char *wish);
+// At a command's end. The context ends with the process: PoCL takes 80 ms to free what its compiler has read.
 void device_close(OpenDevice *open);
