@@ -1,8 +1,10 @@
 #include "host/cli/picture.h"
 
+#include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/cli/version.h"
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,6 +12,11 @@ const char *const picture_aov_names[PICTURE_AOV_COUNT] = {"t",      "normal", "p
                                                           "shadow", "ray",    "path",     "color"};
 
 enum { AOV_COLOR = 1 << 7, NOTE_COUNT_LARGEST = 16 };
+
+typedef struct {
+    void *items;
+    size_t capacity;
+} Scratch;
 
 struct Picture {
     const PictureOptions *options;
@@ -20,10 +27,16 @@ struct Picture {
     const Device *device;
     bool opened;
     ImageWriter *color, *aovs[PICTURE_AOV_COUNT];
-    struct {
-        void *items;
-        size_t capacity;
-    } scratch; // a band in another type
+    Scratch converted; // a band's values in another type
+
+    // A band is written by a thread of its own while the next is rendered; until it has ended, all from here
+    // on is that thread's, and so are the writers and messages.
+    pthread_t thread;
+    bool writing, failed;
+    MessageList *messages;
+    Band band;
+    Scratch parts[PICTURE_AOV_COUNT]; // that it points to
+    double seconds;
 };
 
 char *picture_default_path(const char *scene_path)
@@ -166,18 +179,18 @@ static bool files_open(Picture *picture, MessageList *messages)
     return opened;
 }
 
-static void *scratch_of(Picture *picture, size_t size)
+static void *scratch_reserve(Scratch *scratch, size_t size)
 {
-    if (picture->scratch.capacity < size) {
-        picture->scratch.items = memory_resize(picture->scratch.items, size, 1);
-        picture->scratch.capacity = size;
+    if (scratch->capacity < size) {
+        scratch->items = memory_resize(scratch->items, size, 1);
+        scratch->capacity = size;
     }
-    return picture->scratch.items;
+    return scratch->items;
 }
 
 static const float *narrowed(Picture *picture, const double *values, size_t count)
 {
-    float *narrow = scratch_of(picture, count * sizeof *narrow);
+    float *narrow = scratch_reserve(&picture->converted, count * sizeof *narrow);
     for (size_t i = 0; i < count; i++)
         narrow[i] = (float)values[i];
     return narrow;
@@ -187,7 +200,7 @@ static const float *narrowed(Picture *picture, const double *values, size_t coun
 static const double *positions_in_world(Picture *picture, const Band *band, size_t pixels)
 {
     bool wide = renderer_report(picture->renderer)->wide;
-    double *world = scratch_of(picture, 3 * pixels * sizeof *world);
+    double *world = scratch_reserve(&picture->converted, 3 * pixels * sizeof *world);
     Vector3 eye = picture->scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
     for (size_t i = 0; i < 3 * pixels; i++)
@@ -196,10 +209,10 @@ static const double *positions_in_world(Picture *picture, const Band *band, size
     return world;
 }
 
-bool picture_write(Picture *picture, const Band *band, MessageList *messages)
+static bool band_write(Picture *picture)
 {
-    if (!picture->opened && !files_open(picture, messages)) return false;
-    picture->opened = true;
+    const Band *band = &picture->band;
+    MessageList *messages = picture->messages;
     size_t pixels = (size_t)picture->settings->region_width * band->row_count;
     const void *colors = band->colors;
     if (renderer_report(picture->renderer)->wide && image_format_of(picture->options->path) != IMAGE_NPY)
@@ -215,14 +228,76 @@ bool picture_write(Picture *picture, const Band *band, MessageList *messages)
     return true;
 }
 
+static void *band_thread(void *argument)
+{
+    Picture *picture = argument;
+    double start = clock_seconds();
+    if (!band_write(picture)) picture->failed = true;
+    picture->seconds += clock_seconds() - start;
+    return NULL;
+}
+
+// False: a band could not be written.
+static bool band_written(Picture *picture)
+{
+    if (picture->writing) pthread_join(picture->thread, NULL);
+    picture->writing = false;
+    return !picture->failed;
+}
+
+static const void *part_keep(Scratch *part, const void *values, size_t size)
+{
+    return values ? memcpy(scratch_reserve(part, size), values, size) : NULL;
+}
+
+// The renderer's own memory is for its next band.
+static void band_keep(Picture *picture, const Band *band)
+{
+    size_t pixels = (size_t)picture->settings->region_width * band->row_count;
+    size_t reals = pixels * (renderer_report(picture->renderer)->wide ? sizeof(double) : sizeof(float));
+    size_t integers = pixels * sizeof(uint32_t);
+    Scratch *parts = picture->parts;
+    picture->band = (Band){
+        .first_row = band->first_row,
+        .row_count = band->row_count,
+        .colors = part_keep(&parts[0], band->colors, 3 * reals),
+        .t = part_keep(&parts[1], band->t, reals),
+        .normal = part_keep(&parts[2], band->normal, 3 * reals),
+        .position = part_keep(&parts[3], band->position, 3 * reals),
+        .object = part_keep(&parts[4], band->object, integers),
+        .shadow = part_keep(&parts[5], band->shadow, picture->scene->lights.count * integers),
+        .ray = part_keep(&parts[6], band->ray, 3 * reals),
+        .path = part_keep(&parts[7], band->path, integers),
+    };
+}
+
+bool picture_write(Picture *picture, const Band *band, MessageList *messages)
+{
+    if (!picture->opened && !files_open(picture, messages)) return false;
+    picture->opened = true;
+    if (!band_written(picture)) return false;
+    picture->messages = messages;
+    band_keep(picture, band);
+    picture->writing = pthread_create(&picture->thread, NULL, band_thread, picture) == 0;
+    if (!picture->writing) band_thread(picture);
+    return !picture->failed;
+}
+
 static void picture_free(Picture *picture)
 {
-    free(picture->scratch.items);
+    free(picture->converted.items);
+    for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
+        free(picture->parts[i].items);
     free(picture);
 }
 
-bool picture_commit(Picture *picture, MessageList *messages)
+bool picture_commit(Picture *picture, MessageList *messages, double *seconds)
 {
+    if (!band_written(picture)) {
+        picture_abandon(picture);
+        return false;
+    }
+    double start = clock_seconds();
     bool whole = image_writer_commit(picture->color, messages);
     for (size_t i = 0; i < PICTURE_AOV_COUNT; i++) {
         if (!picture->aovs[i]) continue;
@@ -231,12 +306,14 @@ bool picture_commit(Picture *picture, MessageList *messages)
         else
             image_writer_abandon(picture->aovs[i]);
     }
+    *seconds = picture->seconds + (clock_seconds() - start);
     picture_free(picture);
     return whole;
 }
 
 void picture_abandon(Picture *picture)
 {
+    band_written(picture);
     for (size_t i = 0; i < PICTURE_AOV_COUNT; i++)
         if (picture->aovs[i]) image_writer_abandon(picture->aovs[i]);
     if (picture->color) image_writer_abandon(picture->color);

@@ -26,7 +26,10 @@ unsigned picture_renderer_aovs(const PictureOptions *options);
 // Files are opened with the first band, when the kernels' hash is known.
 Picture *picture_open(const PictureOptions *options, const char *scene_path, const Scene *scene,
                       const RenderSettings *settings, const Renderer *renderer, const Device *device);
+// Encodes a copy of the band while the caller goes on; the messages are the picture's until it is committed
+// or abandoned. False: this band or one before it could not be written.
 bool picture_write(Picture *picture, const Band *band, MessageList *messages);
-// Puts all files in place; frees the picture. False with a message if one could not be.
-bool picture_commit(Picture *picture, MessageList *messages);
+// Puts all files in place; frees the picture. False with a message if one could not be. *seconds: spent on
+// encoding and writing, beside other work or not.
+bool picture_commit(Picture *picture, MessageList *messages, double *seconds);
 void picture_abandon(Picture *picture);

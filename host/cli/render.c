@@ -185,16 +185,13 @@ typedef struct {
     Picture *picture;
     Progress *progress;
     MessageList *messages;
-    double encode_seconds;
 } BandContext;
 
 static bool band_take(void *context, const Band *band, double fraction_done)
 {
     BandContext *take = context;
     if (progress_interrupted()) return false;
-    double start = clock_seconds();
     bool written = picture_write(take->picture, band, take->messages);
-    take->encode_seconds += clock_seconds() - start;
     progress_show(take->progress, fraction_done);
     return written;
 }
@@ -215,14 +212,13 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     progress_open(&progress, options->quiet);
     Picture *picture =
         picture_open(&options->picture, options->scene, scene, &settings, renderer, compute->device);
-    BandContext context = {picture, &progress, &messages, 0};
+    BandContext context = {picture, &progress, &messages};
     bool whole = renderer_render(renderer, picture_renderer_aovs(&options->picture), band_take, &context);
-    double start = clock_seconds();
+    double encode_seconds = 0;
     if (whole)
-        whole = picture_commit(picture, &messages);
+        whole = picture_commit(picture, &messages, &encode_seconds);
     else
         picture_abandon(picture);
-    context.encode_seconds += clock_seconds() - start;
     progress_close(&progress);
     bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
     messages_tell(&messages, NULL);
@@ -232,7 +228,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
                 options->picture.path);
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderer_report(renderer), compute->device, &settings,
-                     &(HostTimes){parse_seconds, context.encode_seconds});
+                     &(HostTimes){parse_seconds, encode_seconds});
     renderer_close(renderer);
     return status;
 }
