@@ -2,6 +2,7 @@
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include "tests/child.h"
+#include <fcntl.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -215,6 +216,47 @@ static void test_many_processes(void **state)
     assert_true(loads(key));
 }
 
+static void entry_set_used(const char *entry_key, time_t when)
+{
+    char *path = cache_entry_path(entry_key);
+    const struct timespec moments[2] = {{when, 0}, {when, 0}};
+    assert_int_equal(utimensat(AT_FDCWD, path, moments, 0), 0);
+    free(path);
+}
+
+// What was used last stays, whenever it was stored.
+static void test_trim(void **state)
+{
+    (void)state;
+    static const char *const keys[] = {"key a", "key b", "key c", "key d"};
+    enum { KEY_COUNT = sizeof keys / sizeof *keys };
+    for (int i = 0; i < KEY_COUNT; i++) {
+        store(keys[i]);
+        entry_set_used(keys[i], 1000 + i);
+    }
+    assert_true(loads("key a"));
+    char *path = cache_entry_path("key a");
+    struct stat status;
+    assert_int_equal(stat(path, &status), 0);
+    *strrchr(path, '/') = '\0';
+    uint64_t size = (uint64_t)status.st_size;
+    cache_trim(path, KEY_COUNT * size);
+    for (int i = 1; i < KEY_COUNT; i++) {
+        char *kept = cache_entry_path(keys[i]);
+        assert_int_equal(access(kept, F_OK), 0);
+        free(kept);
+    }
+    cache_trim(path, 2 * size + size / 2);
+    assert_false(loads("key b"));
+    assert_false(loads("key c"));
+    assert_true(loads("key d"));
+    assert_true(loads("key a"));
+    cache_trim(path, 0);
+    assert_false(loads("key a"));
+    cache_trim("/nowhere/at/all", 0);
+    free(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -226,6 +268,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_unwritable, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_folder_in_place_of_entry, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_many_processes, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_trim, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,9 +2,11 @@
 // the binary is for this machine.
 #include "host/opencl/cache.h"
 
-#include "host/base/fault.h"
+#include "host/base/array.h"
 #include "host/base/output.h"
 #include "host/opencl/compose.h"
+#include <dirent.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,10 +79,61 @@ bool cache_load(const char *key, Text *binary)
     MessageList ignored = {0};
     Text entry = {0};
     bool found = text_read_file(&entry, path, &ignored) && entry_open(&entry, key, binary);
+    if (found) utimensat(AT_FDCWD, path, NULL, 0); // used now
     text_free(&entry);
     message_list_free(&ignored);
     free(path);
     return found;
+}
+
+typedef struct {
+    char *name;
+    struct timespec used;
+    uint64_t size;
+} CacheFile;
+
+typedef struct {
+    CacheFile *items;
+    size_t count, capacity;
+    uint64_t size;
+} CacheFiles;
+
+static int file_compare(const void *a, const void *b)
+{
+    const struct timespec *first = &((const CacheFile *)a)->used, *second = &((const CacheFile *)b)->used;
+    if (first->tv_sec != second->tv_sec) return first->tv_sec < second->tv_sec ? -1 : 1;
+    return first->tv_nsec < second->tv_nsec ? -1 : first->tv_nsec > second->tv_nsec;
+}
+
+// Also what a process that was killed left of an entry.
+static void files_list(CacheFiles *files, DIR *folder)
+{
+    for (const struct dirent *item; (item = readdir(folder)) != NULL;) {
+        struct stat status;
+        if (fstatat(dirfd(folder), item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
+        if (!S_ISREG(status.st_mode)) continue;
+        uint64_t size = (uint64_t)status.st_size;
+        array_push(*files, ((CacheFile){memory_copy_text(item->d_name), status.st_mtim, size}));
+        files->size += size;
+    }
+}
+
+void cache_trim(const char *folder, uint64_t bytes_largest)
+{
+    DIR *open_folder = opendir(folder);
+    if (!open_folder) return;
+    CacheFiles files = {0};
+    files_list(&files, open_folder);
+    if (files.size > bytes_largest) qsort(files.items, files.count, sizeof *files.items, file_compare);
+    for (size_t i = 0; i < files.count; i++) {
+        if (files.size > bytes_largest) {
+            unlinkat(dirfd(open_folder), files.items[i].name, 0);
+            files.size -= files.items[i].size;
+        }
+        free(files.items[i].name);
+    }
+    free(files.items);
+    closedir(open_folder);
 }
 
 void cache_store(const char *key, const Text *binary)
@@ -101,5 +154,7 @@ void cache_store(const char *key, const Text *binary)
             output_abandon(&output);
     }
     message_list_free(&ignored);
+    *strrchr(path, '/') = '\0';
+    cache_trim(path, CACHE_BYTES_LARGEST);
     free(path);
 }

@@ -6,11 +6,16 @@
 #pragma once
 
 #include "host/base/text.h"
+#include <stdint.h>
 
 // Fills `binary`, which must be empty. False if there is no entry; one that is damaged is none.
 bool cache_load(const char *key, Text *binary);
-// Replaces the key's entry.
+// Replaces the key's entry, and trims the cache to CACHE_BYTES_LARGEST.
 void cache_store(const char *key, const Text *binary);
+
+enum { CACHE_BYTES_LARGEST = 128 << 20 }; // several hundred programs
+// Removes what has not been used for the longest time, until no more than that is left.
+void cache_trim(const char *folder, uint64_t bytes_largest);
 
 // The path of the key's entry, to be freed by the caller; NULL: no cache.
 char *cache_entry_path(const char *key);
