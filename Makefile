@@ -72,6 +72,12 @@ ladder: $(BUILD)/tools/numerics/ladder
 $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/reference.o tests/specimen.o) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
+# What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.
+features: $(BUILD)/tools/features
+
+$(BUILD)/tools/features: $(BUILD)/tools/features.o $(library)
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+
 # These two change only when what they hold does, and what depends on it is then built anew.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
 $(BUILD)/version: text := $(GLINT_VERSION)
@@ -121,7 +127,7 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers) tools/numerics/ladder.c \
+linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/numerics/ladder.c \
           $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl tools/numerics/textbook/*.h host/*/*.h tests/*.h \
@@ -182,7 +188,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test ladder bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all tests test ladder features bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(BUILD)/tools/numerics/ladder.d $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)

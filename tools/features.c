@@ -1,0 +1,143 @@
+// What each part of the kernel costs a scene that has no use for it: a frame's and a build's processor time
+// with the kernel made for the scene's own features, then with one more, then with all. Prints a table in
+// Markdown.
+#include "host/base/fault.h"
+#include "host/render/renderer.h"
+#include "host/scene/scene.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+
+enum {
+    VARIANT_COUNT = FEATURE_COUNT + 2, // the scene's own, each feature, all
+    BUILDS = 3,                        // of each variant, of which the shortest counts
+    ROUNDS = 15                        // of frames of all variants in turn; the shortest counts
+};
+
+typedef struct {
+    char name[32];
+    FeatureSet extra;
+    Renderer *renderer;
+    double first_seconds, frame_seconds; // the first holds the build
+} Variant;
+
+static double timeval_seconds(struct timeval time)
+{
+    return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
+}
+
+// Of all threads, and of the linkers that a driver started.
+static double processor_seconds(void)
+{
+    double seconds = 0;
+    static const int whose[] = {RUSAGE_SELF, RUSAGE_CHILDREN};
+    for (size_t i = 0; i < sizeof whose / sizeof *whose; i++) {
+        struct rusage usage;
+        getrusage(whose[i], &usage);
+        seconds += timeval_seconds(usage.ru_utime) + timeval_seconds(usage.ru_stime);
+    }
+    return seconds;
+}
+
+static bool band_drop(void *context, const Band *band, double fraction_done)
+{
+    (void)context, (void)band, (void)fraction_done;
+    return true;
+}
+
+static double frame_seconds(Renderer *renderer)
+{
+    double start = processor_seconds();
+    renderer_render(renderer, 0, band_drop, NULL);
+    return processor_seconds() - start;
+}
+
+static void variant_build(Variant *variant, Compute *compute, const Scene *scene)
+{
+    const RenderSettings settings = {.width = 1920,
+                                     .height = 1080,
+                                     .region_width = 1920,
+                                     .region_height = 1080,
+                                     .sample_count = 1,
+                                     .bounce_count = 5,
+                                     .precision = PRECISION_SINGLE,
+                                     .extra_features = variant->extra,
+                                     .shift_to_eye = true,
+                                     .no_cache = true};
+    MessageList messages = {0};
+    renderer_close(variant->renderer);
+    variant->renderer = renderer_open(compute, scene, &settings, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!variant->renderer) exit(EXIT_FAILURE);
+    variant->first_seconds = fmin(variant->first_seconds, frame_seconds(variant->renderer));
+}
+
+static size_t variants_list(Variant *variants, FeatureSet own)
+{
+    size_t count = 0;
+    variants[count++] = (Variant){.name = "the scene's own"};
+    for (size_t i = 0; i < FEATURE_COUNT; i++) {
+        if (own >> i & 1) continue;
+        variants[count].extra = 1u << i;
+        snprintf(variants[count++].name, sizeof variants->name, "and %s", feature_names[i]);
+    }
+    variants[count++] = (Variant){.name = "all", .extra = FEATURE_ALL};
+    for (size_t i = 0; i < count; i++)
+        variants[i].first_seconds = variants[i].frame_seconds = INFINITY;
+    return count;
+}
+
+static void table_print(const Variant *variants, size_t count, double opening)
+{
+    const Variant *own = variants;
+    printf("| kernel | frame ms | to the first | build ms | more |\n|---|---|---|---|---|\n");
+    for (size_t i = 0; i < count; i++) {
+        double build = variants[i].first_seconds - variants[i].frame_seconds;
+        double own_build = own->first_seconds - own->frame_seconds;
+        printf("| %s | %.1f | %.2f | %.0f | %+.0f |\n", variants[i].name, 1e3 * variants[i].frame_seconds,
+               variants[i].frame_seconds / own->frame_seconds, 1e3 * build, 1e3 * (build - own_build));
+    }
+    printf("\nA process's first build takes %.0f ms more.\n", 1e3 * opening);
+}
+
+int main(int argument_count, char **arguments)
+{
+    if (argument_count != 2) {
+        fputs("usage: features SCENE\n", stderr);
+        return EXIT_FAILURE;
+    }
+    Scene scene = {0};
+    DeviceList devices;
+    Compute compute;
+    MessageList messages = {0};
+    device_list_open(&devices);
+    const Device *device = device_choose(&devices, device_wish(NULL), &messages);
+    bool loaded = scene_load(&scene, arguments[1], &(SceneOptions){0}, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!device || !loaded) return EXIT_FAILURE;
+    compute_open(&compute, device);
+
+    Variant variants[VARIANT_COUNT] = {0};
+    size_t count = variants_list(variants, features_of(&scene));
+    variant_build(&variants[0], &compute, &scene);
+    double first = variants[0].first_seconds;
+    variants[0].first_seconds = INFINITY;
+    for (int round = 0; round < BUILDS; round++)
+        for (size_t i = 0; i < count; i++)
+            variant_build(&variants[i], &compute, &scene);
+    for (int round = 0; round < ROUNDS; round++)
+        for (size_t i = 0; i < count; i++)
+            variants[i].frame_seconds = fmin(variants[i].frame_seconds, frame_seconds(variants[i].renderer));
+    table_print(variants, count, first - variants[0].first_seconds);
+
+    for (size_t i = 0; i < count; i++)
+        renderer_close(variants[i].renderer);
+    scene_free(&scene);
+    compute_close(&compute);
+    device_list_close(&devices);
+    return EXIT_SUCCESS;
+}
