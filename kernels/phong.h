@@ -29,7 +29,8 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     LightRay to_light;
     Vector start = surface_leave(surface, false);
     to_light.strength = (real)(1);
-    if (HAS_DIRECTIONAL_LIGHTS && light->kind.x == LIGHT_KIND_DIRECTIONAL) {
+    bool has_place = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
+    if (HAS_DIRECTIONAL_LIGHTS && (!has_place || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
         to_light.shadow_ray = ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface->found);
         return to_light;

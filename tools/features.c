@@ -12,8 +12,8 @@
 
 enum {
     VARIANT_COUNT = FEATURE_COUNT + 2, // the scene's own, each feature, all
-    BUILDS = 3,                        // of each variant, of which the shortest counts
-    ROUNDS = 15                        // of frames of all variants in turn; the shortest counts
+    BUILDS = 4,                        // of each variant, of which the shortest counts
+    ROUNDS = 25                        // of frames of all variants in turn; the shortest counts
 };
 
 typedef struct {
