@@ -14,8 +14,11 @@ def apart(function, *arguments):
         return child.submit(function, *arguments).result()
 
 
+Run = collections.namedtuple("Run", "seconds processor_seconds peak stdout stderr")
+
+
 def run_once(command, environment=None):
-    """Seconds from start to end, peak bytes, and what was printed."""
+    """Seconds from start to end, and of all processors together; peak bytes; and what was printed."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
         start = time.monotonic()
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=errors, env=environment)
@@ -28,7 +31,7 @@ def run_once(command, environment=None):
             texts.append(stream.read())
     if process.returncode != 0:
         raise RuntimeError(f"{' '.join(map(str, command))}: exit status {process.returncode}: {texts[1][-2000:]}")
-    return seconds, usage.ru_maxrss * 1024, *texts
+    return Run(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024, *texts)
 
 
 def read_ppm(path):
