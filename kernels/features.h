@@ -1,5 +1,5 @@
 // The parts a scene may do without, read by the host and by the kernels. Each NAME is HAS_NAME, 0 or 1, in
-// the kernels. docs/performance.md has the gain that let each one in.
+// the kernels. docs/performance.md has what each one costs where it is not needed.
 #ifndef FEATURES_H
 #define FEATURES_H
 
