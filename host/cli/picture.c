@@ -279,7 +279,8 @@ bool picture_write(Picture *picture, const Band *band, MessageList *messages)
     picture->messages = messages;
     band_keep(picture, band);
     picture->writing = pthread_create(&picture->thread, NULL, band_thread, picture) == 0;
-    if (!picture->writing) band_thread(picture);
+    if (picture->writing) return true; // or told with the next band
+    band_thread(picture);
     return !picture->failed;
 }
 

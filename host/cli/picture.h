@@ -27,7 +27,7 @@ unsigned picture_renderer_aovs(const PictureOptions *options);
 Picture *picture_open(const PictureOptions *options, const char *scene_path, const Scene *scene,
                       const RenderSettings *settings, const Renderer *renderer, const Device *device);
 // Encodes a copy of the band while the caller goes on; the messages are the picture's until it is committed
-// or abandoned. False: this band or one before it could not be written.
+// or abandoned. False: this band could not be written, or an earlier one.
 bool picture_write(Picture *picture, const Band *band, MessageList *messages);
 // Puts all files in place; frees the picture. False with a message if one could not be. *seconds: spent on
 // encoding and writing, beside other work or not.
