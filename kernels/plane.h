@@ -43,8 +43,10 @@ static inline Patch plane_crossing_patch(Vector point, Vector normal, const Ray 
     Vector unit = vector_normalize(normal);
     Vector from_point = ray_point_from(ray, point, t);
     from_point = vector_fma(unit, -vector_dot(unit, from_point), from_point);
-    return patch_make(vector_add(from_point, point), unit,
-                      vector_magnitude(from_point) + vector_magnitude(point));
+    Patch patch = patch_make(vector_add(from_point, point), unit,
+                             vector_magnitude(from_point) + vector_magnitude(point));
+    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
+    return patch;
 }
 
 static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)

@@ -235,6 +235,10 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
         place = vector_fma(radial, radius - distance_, p);
     }
 
+    real size = vector_magnitude(p) + vector_magnitude(base) + radius;
+    Patch patch = patch_make(vector_add(place, base), normal, size);
+    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
+
     if (shape->id.y & REVOLUTION_CAPPED) {
         // of the two surfaces the one whose crossing is nearer to t; at the rim the side
         real to_slab = real_min(fabs(t - crossings.slab.near), fabs(t - crossings.slab.far));
@@ -243,14 +247,13 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
         real end = (real)(shape->range.x);
         real target = lanes_select(height * (real)(2) < end, (real)(0), end);
         Vector on_plane = vector_fma(axis, real_divide(target - height, squared_axis), p);
-        place = vector_select(on_cap, on_plane, place);
         Vector end_normal = vector_normalize(axis);
         mask at_base = target == (real)(0);
         end_normal = vector_select(at_base, vector_negate(end_normal), end_normal);
-        normal = vector_select(on_cap, end_normal, normal);
+        Patch cap = patch_make(vector_add(on_plane, base), end_normal, size);
+        patch_keep(&patch, on_cap, &cap);
     }
-    real size = vector_magnitude(p) + vector_magnitude(base) + radius;
-    return patch_make(vector_add(place, base), normal, size);
+    return patch;
 }
 
 static inline mask cylinder_hit(const Cylinder *cylinder, const Ray *ray, real *t)

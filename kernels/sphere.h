@@ -96,29 +96,31 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     return hit & (*t > ray->near);
 }
 
-// The compensated normal is built from the moment as well, n = (l -+ h d) / r with l = d x E / a and h the
-// root of the discriminant over a, so that it does not lose bits with the distance, nor at a low angle to a
-// large sphere; the point is the center plus r n.
+// From the point as seen from the center, or, compensated, from the moment as well, n = (l -+ h d) / r with
+// l = d x E / a and h the root of the discriminant over a: no bits are lost with the distance.
+static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, real t)
+{
+    if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, center, t));
+    PairVector to_center = pair_vector_difference(center, ray->origin);
+    SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
+    Vector moment = pair_vector_cross_once(to_center, ray->direction);
+    real discriminant = real_max(sphere_discriminant(exact, moment, radius, ray), (real)(0));
+    real inverse = real_divide((real)(1), ray->squared);
+    Vector l = vector_scale(vector_cross(moment, ray->direction), inverse);
+    real h = real_sqrt(discriminant) * inverse;
+    mask far_side = fma(ray->squared, t, exact.b) > (real)(0);
+    return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
+}
+
+// At `fast` the compiler's rearranging undoes what makes c, and so t next to the surface, exact.
 static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);
     real radius = (real)(sphere->center_radius.w);
-    Vector outward;
-    if (IS_COMPENSATED) {
-        PairVector to_center = pair_vector_difference(center, ray->origin);
-        SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
-        Vector moment = pair_vector_cross_once(to_center, ray->direction);
-        real discriminant = real_max(sphere_discriminant(exact, moment, radius, ray), (real)(0));
-        real inverse = real_divide((real)(1), ray->squared);
-        Vector l = vector_scale(vector_cross(moment, ray->direction), inverse);
-        real h = real_sqrt(discriminant) * inverse;
-        mask far_side = fma(ray->squared, t, exact.b) > (real)(0);
-        outward = vector_fma(ray->direction, lanes_select(far_side, h, -h), l);
-    } else {
-        outward = vector_fma(ray->direction, t, vector_subtract(ray->origin, center));
-    }
-    Vector normal = vector_normalize(outward);
-    return patch_make(vector_fma(normal, radius, center), normal, radius + vector_magnitude(center));
+    Vector normal = sphere_normal(center, radius, ray, t);
+    Patch patch = patch_make(vector_fma(normal, radius, center), normal, radius + vector_magnitude(center));
+    if (!IS_FAST) patch_move_to_ray(&patch, ray, t);
+    return patch;
 }
 
 #endif

@@ -114,11 +114,12 @@ static inline Vector triangle_blend(TriangleWeights weights, Vector a, Vector b,
 
 static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
 {
-    (void)t;
     Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
     Vector normal = vector_normalize(triangle_normal(triangle));
     real size = real_max(real_max(vector_magnitude(a), vector_magnitude(b)), vector_magnitude(c));
-    return patch_make(triangle_blend(triangle_weights(triangle, ray), a, b, c), normal, size);
+    Patch patch = patch_make(triangle_blend(triangle_weights(triangle, ray), a, b, c), normal, size);
+    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
+    return patch;
 }
 
 // Bends the shading normal between the vertices' own.

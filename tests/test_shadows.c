@@ -1,7 +1,9 @@
-// Shadows on which a faster search once went wrong.
+// Shadows on which a faster search, or a surface much larger than what lies on it, once went wrong.
 #include "tests/frame.h"
 #include "tests/probe.h"
+#include "tests/reference.h"
 #include "tests/scene_reading.h"
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -67,9 +69,85 @@ static void darkens_an_eclipse_in_meters(void **state)
     scene_free(&scene);
 }
 
+// As the reference has it, but for pixels at an edge.
+static void hold_to_reference(const Scene *scene, const RenderSettings *settings, const char *what)
+{
+    Frame frame = frame_render(&probe_compute, scene, settings, AOV_T | AOV_SHADOW);
+    unsigned open = 0, dark = 0;
+    for (unsigned i = 0; i < frame.width * frame.height; i++) {
+        unsigned x = i % frame.width, y = i / frame.width;
+        ReferenceRay ray = reference_camera_ray(&scene->camera, frame.width, frame.height, x, y);
+        ReferenceColor expected = reference_color(scene, &ray);
+        bool at_edge = isfinite(frame.t[i]) && expected.margin <= 0x1p-16 * frame.t[i];
+        double seen = frame.colors[3 * (size_t)i];
+        if (!at_edge && fabs(seen - expected.color.x) > 0x1p-17)
+            fail_msg("%s, %s, seed %u: pixel %u,%u is %g, not %g", what, precision_names[settings->precision],
+                     settings->perturb_seed, x, y, seen, expected.color.x);
+        open += at_edge;
+        dark += !at_edge && frame.shadow[3 * (size_t)i] == 1;
+    }
+    assert_in_range(open, 0, frame.width * frame.height / 10);
+    assert_true(dark > 20);
+    frame_free(&frame);
+}
+
+// Ground whose numbers are a million times as large as what lies on it: a float of them counts in halves.
+typedef struct {
+    const char *name, *shape;
+    Precision from; // held from this precision on
+} Ground;
+
+static const Ground grounds[] = {
+    {"planet", "sphere: {center: [0, -4194304, 0], radius: 4194304}", PRECISION_SINGLE},
+    {"hollow planet", "sphere: {center: [0, 4194304, 0], radius: 4194304}", PRECISION_SINGLE},
+    {"cylinder", "cylinder: {point: [0, -4194304, 0], axis: [0, 0, 1], radius: 4194304}", PRECISION_STRICT},
+    {"cone", "cone: {from: [0, -4194304, -4194304], to: [0, -4194304, 4194304], radius: [4177920, 4210688]}",
+     PRECISION_STRICT},
+    {"disc", "disc: {center: [-2097152, 65536, 0], normal: [1, 32, 0], radius: 4194304}", PRECISION_STRICT},
+    {"triangle", "triangle: {vertices: [[-4194304, 0, 4194304], [-4194304, 0, -4194304], [4194304, 0, 0]]}",
+     PRECISION_STRICT},
+};
+
+// Marbles of a centimeter keep their shadows, and the ground has none of its own under a sun a twentieth of a
+// degree high.
+static void keeps_small_shadows_on(const Ground *ground)
+{
+    Text text = {0};
+    text_appendf(&text,
+                 "camera: {position: [0, 2, 0], look_at: [0, 1, 2], fov: 60}\n"
+                 "lights:\n"
+                 "  - directional: {direction: [0.5, -0.75, 0.5], intensity: 0.5}\n"
+                 "  - directional: {direction: [-1, -0.001, 0.25], intensity: 0.5}\n"
+                 "  - point: {position: [1, 4, 1], intensity: 0.5}\n"
+                 "objects:\n"
+                 "  - %s\n"
+                 "  - sphere: {center: [-0.25, 0.0625, 2], radius: 0.01}\n"
+                 "  - sphere: {center: [0.25, 0.0625, 2.5], radius: 0.03125}\n"
+                 "  - sphere: {center: [0, 0.25, 4], radius: 0.25}\n",
+                 ground->shape);
+    Scene scene = scene_of_text("ground.yaml", text_c(&text));
+    text_free(&text);
+    for (Precision precision = ground->from; precision < PRECISION_COUNT; precision++) {
+        if (!probe_has(precision)) continue;
+        RenderSettings settings = frame_settings(128, 96, precision);
+        hold_to_reference(&scene, &settings, ground->name);
+        settings.perturb_seed = 1;
+        if (precision == PRECISION_SINGLE) hold_to_reference(&scene, &settings, ground->name);
+    }
+    scene_free(&scene);
+}
+
+static void keeps_small_shadows_on_huge_ground(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof grounds / sizeof *grounds; i++)
+        keeps_small_shadows_on(&grounds[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(keeps_small_shadows_on_huge_ground),
         cmocka_unit_test(takes_a_veils_light_once),
         cmocka_unit_test(darkens_an_eclipse_in_meters),
     };
