@@ -71,11 +71,13 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     ray.origin = origin;
     ray.direction = direction;
     ray.squared = vector_dot(direction, direction);
-    ray.inverse_squared = real_inverse_or_zero(ray.squared);
     ray.near = near;
     ray.far = far;
     ray.travelled = (real)(0);
     ray.active = active & (ray.squared > (real)(0));
+    // 0 in lanes without a ray, which then no sphere asks for a closer look
+    real divisor = lanes_select(ray.active, ray.squared, (real)(1));
+    ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
     if (HAS_BOXES || HAS_BVH)
         ray.inverse = (Vector){real_inverse_or_huge(direction.x), real_inverse_or_huge(direction.y),
                                real_inverse_or_huge(direction.z)};

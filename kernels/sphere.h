@@ -60,14 +60,15 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real radius = (real)(sphere->center_radius.w), squared_radius = radius * radius;
     Vector f = vector_subtract(ray->origin, center);
     real b = vector_dot(f, ray->direction), squared_distance = vector_dot(f, f);
-    real lowered_c = fma(squared_distance, (real)(1 - 32 * UNIT_ROUNDOFF), -squared_radius);
-    mask hit = ray->active & !(b * (b * ray->inverse_squared) < lowered_c);
-    if (!lanes_any(hit)) return hit;
+    real lowered_c = fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF));
+    mask hit = !(b * (b * ray->inverse_squared) < lowered_c);
+    if (!lanes_any(hit)) return mask_none();
+    hit = hit & ray->active;
 
     real c = squared_distance - squared_radius;
     mask outside = c > (real)(32 * UNIT_ROUNDOFF) * squared_radius;
     hit = hit & !(outside & (b > (real)(0)) & (ray->near >= (real)(0)));
-    if (!lanes_any(hit)) return hit;
+    if (!lanes_any(hit)) return mask_none();
 
     real discriminant;
     if (IS_COMPENSATED) {
