@@ -13,7 +13,7 @@ typedef struct {
     real near, far; // hits lie strictly between
     mask active;    // the lanes that carry a ray at all
     real travelled; // from the eye to the origin, for pictures on surfaces
-    // for boxes: 1 / direction; huge where the component is 0
+    // for boxes, triangles and the hierarchy: 1 / direction; huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
     // along it, whose product with a point seen from the origin is the point's t
@@ -47,7 +47,7 @@ static inline real real_inverse_or_huge(real a)
 {
     mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
     real inverse = real_divide((real)(1), lanes_select(zero, (real)(1), a));
-    if (HAS_BOXES & !IS_COMPENSATED)
+    if ((HAS_BOXES | HAS_TRIANGLES) & !IS_COMPENSATED)
         inverse = lanes_select(steps, fma(fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
@@ -78,7 +78,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     // 0 in lanes without a ray, which then no sphere asks for a closer look
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
-    if (HAS_BOXES || HAS_BVH)
+    if (HAS_BOXES || HAS_TRIANGLES || HAS_BVH)
         ray.inverse = (Vector){real_inverse_or_huge(direction.x), real_inverse_or_huge(direction.y),
                                real_inverse_or_huge(direction.z)};
     if (HAS_TRIANGLES) {

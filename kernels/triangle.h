@@ -11,9 +11,9 @@
 #include "plane.h"
 
 typedef struct {
-    real u, v, w;       // edge functions opposite a, b, c; all of one sign inside, edges included
-    real determinant;   // their sum
-    real a_t, b_t, c_t; // where along the ray the vertices lie
+    real u, v, w;     // edge functions opposite a, b, c; all of one sign inside, edges included
+    real determinant; // their sum
+    Vector a, b, c;   // the vertices, from the ray's start
 } TriangleEdges;
 
 static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *ray)
@@ -29,9 +29,9 @@ static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *
     edges.v = product_difference(ax, cy, ay, cx);
     edges.w = product_difference(bx, ay, by, ax);
     edges.determinant = edges.u + edges.v + edges.w;
-    edges.a_t = vector_dot(a, ray->along);
-    edges.b_t = vector_dot(b, ray->along);
-    edges.c_t = vector_dot(c, ray->along);
+    edges.a = a;
+    edges.b = b;
+    edges.c = c;
     return edges;
 }
 
@@ -73,8 +73,46 @@ static inline real triangle_plane_distance(const Triangle *triangle, const Ray *
     return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), otherwise);
 }
 
-// The distance is held between those of the vertices: a sliver seen edge-on would else be hit far outside
-// itself.
+// Where the ray lies between the vertices, and a little beyond them, along one axis.
+static inline Roots triangle_slab(real a, real b, real c, real slack, real inverse)
+{
+    real low = (real_min(real_min(a, b), c) - slack) * inverse;
+    real high = (real_max(real_max(a, b), c) + slack) * inverse;
+    return (Roots){real_min(low, high), real_max(low, high)};
+}
+
+static inline real triangle_reach(real a, real b, real c)
+{
+    return real_max(real_max(fabs(a), fabs(b)), fabs(c));
+}
+
+static inline real roots_hold(Roots roots, real t)
+{
+    return real_min(real_max(t, roots.near), roots.far);
+}
+
+// A triangle seen edge-on would else be hit far outside itself: the edge functions do not know of the
+// distance, whose error grows as the angle gets lower. It is held between the vertices' distances, and within
+// their box, since the hierarchy looks for hits in boxes alone: its own are larger by four times this slack.
+static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real distance_)
+{
+    Vector a = edges->a, b = edges->b, c = edges->c;
+    Vector reach = {triangle_reach(a.x, b.x, c.x), triangle_reach(a.y, b.y, c.y),
+                    triangle_reach(a.z, b.z, c.z)};
+    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_magnitude(reach);
+    real t = distance_;
+    t = roots_hold(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
+    t = roots_hold(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
+    t = roots_hold(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
+    // each of the vertices' distances is off by a few roundings of the largest product in it
+    Vector along = ray->along;
+    real off = (real)(4 * UNIT_ROUNDOFF) *
+               (reach.x * fabs(along.x) + reach.y * fabs(along.y) + reach.z * fabs(along.z));
+    real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
+    return roots_hold(
+        (Roots){real_min(real_min(a_t, b_t), c_t) - off, real_max(real_max(a_t, b_t), c_t) + off}, t);
+}
+
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
     TriangleEdges edges = triangle_edges(triangle, ray);
@@ -84,13 +122,9 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     mask hit = ray->active & (all_positive | all_negative) & (edges.determinant != zero);
     if (!lanes_any(hit)) return hit;
 
-    real nearest = real_min(real_min(edges.a_t, edges.b_t), edges.c_t);
-    real farthest = real_max(real_max(edges.a_t, edges.b_t), edges.c_t);
-    real distance_ = triangle_plane_distance(triangle, ray, (real)(0.5f) * (nearest + farthest));
-    // the vertices' own depths are off by up to 4 u, which the compensated distance is not
-    real slack =
-        IS_COMPENSATED ? (real)(4 * UNIT_ROUNDOFF) * real_max(fabs(nearest), fabs(farthest)) : (real)(0);
-    *t = real_min(real_max(distance_, nearest - slack), farthest + slack);
+    // in the triangle's own plane any place of it will do
+    real otherwise = vector_dot(edges.a, ray->along);
+    *t = triangle_distance_held(&edges, ray, triangle_plane_distance(triangle, ray, otherwise));
     return hit & (*t > ray->near);
 }
 

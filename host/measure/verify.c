@@ -45,7 +45,7 @@ static const struct {
     {"M1", "closed mesh: edges and vertices", {0}},
     {"M2", "closed mesh, far from the origin", {verify_far_mesh}},
     {"M3", "triangles from 2^-40 to 2^40", {verify_scale_ladder}},
-    {"M4", "slivers, and triangles seen edge-on", {verify_within_triangle}},
+    {"M4", "slivers, and triangles seen edge-on", {verify_within_triangle, verify_facing_triangle}},
     {"M5", "degenerate triangles", {verify_degenerate_meshes}},
     {"M6", "hierarchy against every object; any hit against the closest", {verify_hierarchy}},
     {"R1", "shadow of a sphere, up to where it stands", {verify_contact_shadow}},

@@ -1,7 +1,7 @@
 // Checks of triangles, and of the hierarchy, that no table holds.
 #include "host/base/array.h"
+#include "host/measure/verify_exact.h"
 #include "host/measure/verify_families.h"
-#include "host/measure/verify_run.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -102,6 +102,30 @@ void verify_within_triangle(VerifyRun *run)
     free(hits);
 }
 
+// Seen face to face from near, a triangle's distance is its plane's, however far its corners.
+void verify_facing_triangle(VerifyRun *run)
+{
+    enum { COUNT = 1000 };
+    static const Vector3 corners[] = {{2001, 1002, -1998}, {2001, -1998, 1002}, {-3999, 1002, 1002}};
+    ProbeRay rays[COUNT];
+    ProbeHit hits[COUNT];
+    for (uint64_t i = 0; i < COUNT; i++) {
+        Vector3 start = {random_symmetric(72, i, 0), random_symmetric(72, i, 1), random_symmetric(72, i, 2)};
+        rays[i] = ray_of(run, start, (Vector3){1, 2, 2});
+    }
+    Scene scene = scene_empty();
+    scene_add_triangle(&scene, corners);
+    verify_trace(run, &scene, false, rays, COUNT, hits);
+    scene_free(&scene);
+    for (size_t i = 0; i < COUNT; i++) {
+        const double *o = rays[i].origin;
+        Long t = 1 - ((Long)o[0] + 2 * (Long)o[1] + 2 * (Long)o[2]) / 9;
+        run->result->leaks += !verify_is_hit(&hits[i]);
+        if (verify_is_hit(&hits[i]) && run->tier > TIER_B)
+            verify_note_error(run, (double)fabsl(hits[i].t - t) / verify_ulp(run, (double)t), 4);
+    }
+}
+
 static Vector3 random_point(unsigned seed, uint64_t index, unsigned place)
 {
     return (Vector3){random_symmetric(seed, index, place), random_symmetric(seed, index, place + 1),
@@ -177,7 +201,7 @@ void verify_degenerate_meshes(VerifyRun *run)
     free(clean);
 }
 
-enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 50, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 4 };
+enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 50, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 16 };
 
 static void add_other(Scene *scene, ShapeKind kind, uint64_t index)
 {
@@ -236,8 +260,17 @@ static Scene crowd_make(void)
     return scene;
 }
 
-// A quarter of them at random, a quarter along an axis in the plane of a triangle's corner, a half at
-// corners, half of which start where another ray was reflected.
+// A place far from a triangle in its plane, from which it is seen edge-on.
+static Vector3 crowd_in_plane(const Vector3 vertices[3], uint64_t index)
+{
+    Vector3 ab = vector_subtract(vertices[1], vertices[0]), ac = vector_subtract(vertices[2], vertices[0]);
+    Vector3 along = vector_add(vector_scale(ab, random_symmetric(69, index, 1)),
+                               vector_scale(ac, random_symmetric(69, index, 2)));
+    return vector_add(vertices[0], vector_scale(vector_normalize(along), 3));
+}
+
+// A quarter of them at random, a quarter along an axis in the plane of a triangle's corner, a quarter at
+// corners, every other one of triangles seen edge-on, a quarter from where another ray was reflected.
 static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first, const ProbeHit *reflected,
                        ProbeRay *rays)
 {
@@ -252,6 +285,8 @@ static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first,
             direction = (Vector3){parts[0], parts[1], parts[2]};
             origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
         }
+        if (i % 4 == 2 && i / 4 % 2)
+            origin = crowd_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);
         if (i % 4 == 2) direction = vector_subtract(corner, origin);
         if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
             const ProbeHit *hit = &reflected[i - first - 3];

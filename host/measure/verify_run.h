@@ -19,6 +19,7 @@ VerifyCheck verify_coincident_faces;  // P7
 VerifyCheck verify_far_mesh;          // M2
 VerifyCheck verify_scale_ladder;      // M3
 VerifyCheck verify_within_triangle;   // M4
+VerifyCheck verify_facing_triangle;   // M4
 VerifyCheck verify_degenerate_meshes; // M5
 VerifyCheck verify_hierarchy;         // M6
 VerifyCheck verify_critical_angle;    // R4
