@@ -78,6 +78,14 @@ features: $(BUILD)/tools/features
 $(BUILD)/tools/features: $(BUILD)/tools/features.o $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
+# glint verify with its oracle overheard: calls of these functions from other files go through overhear.c.
+overheard := exact_sphere exact_plane exact_cylinder exact_torus exact_highlight exact_judge_surface verify_render
+
+overhear: $(BUILD)/tools/numerics/overhear
+
+$(BUILD)/tools/numerics/overhear: $(BUILD)/tools/numerics/overhear.o $(library)
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(overheard:%=-Wl,--wrap=%) $^ $(LIBS) -o $@
+
 # These two change only when what they hold does, and what depends on it is then built anew.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
 $(BUILD)/version: text := $(GLINT_VERSION)
@@ -128,6 +136,7 @@ CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/numerics/ladder.c \
+          tools/numerics/overhear.c \
           $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl tools/numerics/textbook/*.h host/*/*.h tests/*.h \
@@ -155,7 +164,7 @@ lint-man:
 # The measured parts of the documents; the machine should have nothing else to do.
 accuracy_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
 bench_scenes    := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass bunny demo)
-measured        := accuracy bench bench-lanes
+measured        := accuracy bench bench-lanes verify
 
 docs-measurements: $(BUILD)/glint
 	$(BUILD)/glint accuracy $(accuracy_scenes) --size 960x540 --seconds 40 --json > $(BUILD)/accuracy.json
@@ -163,9 +172,10 @@ docs-measurements: $(BUILD)/glint
 	    --json > $(BUILD)/bench.json
 	$(BUILD)/glint bench scenes/spheres16.yaml --size 1920x1080 --seconds 10 --lanes 1,16 \
 	    --precision single,strict,double --json > $(BUILD)/bench-lanes.json
+	$(BUILD)/glint verify --json > $(BUILD)/verify.json
 	mkdir -p docs/measurements
 	cp $(measured:%=$(BUILD)/%.json) docs/measurements
-	tools/report docs/accuracy.md docs/performance.md
+	tools/report docs/accuracy.md docs/performance.md docs/verify.md
 
 data := $(DESTDIR)$(PREFIX)/share
 
@@ -188,7 +198,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test ladder features bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all tests test ladder features overhear bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d numerics/ladder.d numerics/overhear.d) $(tests:=.d) $(test_objects:.o=.d)

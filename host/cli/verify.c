@@ -245,6 +245,12 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     const VerifyRenderer renderer = {&prober,       prober_open,        prober_trace, prober_close,
                                      prober_render, prober_camera_axes, inexact};
     VerifyTier tier = inexact ? TIER_A : tier_of[precision];
+    if (tier == TIER_D && verify_oracle_bits() < 64)
+        fprintf(stderr,
+                "glint: verify: a long double has %d bits here, so that the pictures of tier D are judged by "
+                "their "
+                "like; rays have exact answers\n",
+                verify_oracle_bits());
     Report report = {.json = json, .tier = (char)('A' + tier)};
     const char *name = precision_names[precision];
     if (json) {
@@ -281,6 +287,7 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
 {
     json_integer(json, "schema", 2);
     json_text(json, "glint", glint_version());
+    json_integer(json, "oracle_bits", verify_oracle_bits());
     json_begin_object(json, "device");
     device_json(json, device);
     json_end(json);

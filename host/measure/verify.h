@@ -68,6 +68,10 @@ typedef struct {
 
 bool verify_is_case(const char *name);
 
+// The bits of the numbers in which pictures are judged. Where a long double is no more than a double,
+// pictures at `double` are judged by their like; rays have exact answers all the same.
+int verify_oracle_bits(void);
+
 // Runs the cases in turn.
 void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
                 void *context);

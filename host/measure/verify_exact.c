@@ -3,6 +3,11 @@
 #include <float.h>
 #include <math.h>
 
+int verify_oracle_bits(void)
+{
+    return LDBL_MANT_DIG;
+}
+
 LongVector long_vector(Vector3 a)
 {
     return (LongVector){a.x, a.y, a.z};
@@ -31,6 +36,22 @@ Long long_dot(LongVector a, LongVector b)
 LongVector long_cross(LongVector a, LongVector b)
 {
     return (LongVector){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+// a b - c d, rounded about once (Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm for the
+// accurate computation of 2x2 determinants", Mathematics of Computation 82, 2013).
+static Long difference_of_products(Long a, Long b, Long c, Long d)
+{
+    Long product = c * d, rest = fmal(-c, d, product);
+    return fmal(a, b, -product) + rest;
+}
+
+// The cross product of a far center and a direction: how far the line passes it, without cancellation.
+static LongVector long_moment(LongVector a, LongVector b)
+{
+    return (LongVector){difference_of_products(a.y, b.z, a.z, b.y),
+                        difference_of_products(a.z, b.x, a.x, b.z),
+                        difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
 Long long_length(LongVector a)
@@ -65,9 +86,8 @@ static void exact_chord(ExactHit *exact, Long middle, Long half_chord)
 ExactHit exact_sphere(LongVector center, Long radius, LongVector direction)
 {
     Long a = long_dot(direction, direction), middle = long_dot(center, direction) / a;
-    LongVector nearest = long_subtract(long_scale(direction, middle), center);
-    // the line's moment tells its distance without cancellation, however far the center
-    LongVector moment = long_cross(center, direction);
+    LongVector moment = long_moment(center, direction);
+    LongVector nearest = long_scale(long_cross(moment, direction), 1 / a);
     Long squared = long_dot(moment, moment) / a;
     ExactHit exact = {.margin = 1 - squared / (radius * radius),
                       .distance = (double)long_length(center),
@@ -97,7 +117,7 @@ ExactHit exact_cylinder(LongVector point, LongVector axis, Long radius, double s
 {
     LongVector unit = long_unit(axis), across = long_cross(direction, unit), from = long_cross(point, unit);
     Long a = long_dot(across, across);
-    Long off = long_dot(point, long_cross(direction, unit));
+    Long off = long_dot(unit, long_moment(point, direction));
     ExactHit exact = {.margin = 1 - off * off / (a * radius * radius),
                       .distance = (double)long_length(from),
                       .radius = (double)radius,
@@ -173,7 +193,8 @@ ExactHit exact_torus(LongVector center, Long major, Long minor, LongVector direc
     Long length = long_length(direction), reach = (major + minor) * 1.25L;
     LongVector unit = long_scale(direction, 1 / length);
     Long middle = long_dot(center, unit);
-    CircleLine line = {long_subtract(long_scale(unit, middle), center), unit, major};
+    LongVector moment = long_moment(center, direction);
+    CircleLine line = {long_scale(long_cross(moment, unit), 1 / length), unit, major};
     ExactHit exact = {.margin = -INFINITY,
                       .distance = (double)long_length(center),
                       .radius = (double)minor,
@@ -207,6 +228,17 @@ ExactHit exact_torus(LongVector center, Long major, Long minor, LongVector direc
     }
     exact.margin = 1 - deepest * deepest / (minor * minor);
     return exact;
+}
+
+Long exact_highlight(LongVector normal, LongVector to_light, LongVector ray, double power)
+{
+    LongVector n = long_unit(normal), l = long_unit(to_light), v = long_unit(ray);
+    Long facing = long_dot(n, l);
+    if (facing <= 0) return 0;
+    LongVector mirrored = long_subtract(long_scale(n, 2 * facing), l), apart = long_add(mirrored, v);
+    Long versine = long_dot(apart, apart) / 2;
+    if (power == 0) return 1;
+    return versine < 1 ? expl(power * log1pl(-versine)) : 0;
 }
 
 bool exact_is_open(const VerifyRun *run, const ExactHit *exact)

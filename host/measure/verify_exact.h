@@ -39,6 +39,10 @@ ExactHit exact_plane(LongVector point, LongVector normal, LongVector direction);
 ExactHit exact_cylinder(LongVector point, LongVector axis, Long radius, double size, LongVector direction);
 ExactHit exact_torus(LongVector center, Long major, Long minor, LongVector direction); // around the z axis
 
+// Phong's max(0, cos)^power for the angle between the mirrored light and the eye, in the way that keeps small
+// angles; 1 for a power of 0. No light reaches what faces away from it.
+Long exact_highlight(LongVector normal, LongVector to_light, LongVector ray, double power);
+
 // Whether the tier leaves open that the ray hits.
 bool exact_is_open(const VerifyRun *run, const ExactHit *exact);
 // Holds a hit or a miss, and the distance of a hit, to what the tier owes; tier A owes nothing here.

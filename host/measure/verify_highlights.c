@@ -4,19 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// max(0, cos)^power for the angle between the mirrored light and the eye, in the way that keeps small angles;
-// 1 for a power of 0. No light reaches what faces away from it.
-static Long exact_highlight(LongVector normal, LongVector to_light, LongVector ray, double power)
-{
-    LongVector n = long_unit(normal), l = long_unit(to_light), v = long_unit(ray);
-    Long facing = long_dot(n, l);
-    if (facing <= 0) return 0;
-    LongVector mirrored = long_subtract(long_scale(n, 2 * facing), l), apart = long_add(mirrored, v);
-    Long versine = long_dot(apart, apart) / 2;
-    if (power == 0) return 1;
-    return versine < 1 ? expl(power * log1pl(-versine)) : 0;
-}
-
 // Where on the unit sphere the highlight is seen.
 static Vector3 highlight_middle(Vector3 eye, Vector3 to_light)
 {

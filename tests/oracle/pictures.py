@@ -12,6 +12,7 @@ import sys
 
 import numpy
 import write_tables
+import yaml
 from color import Beam, Rounding, as_float, trace
 from scene import Scene
 
@@ -170,7 +171,7 @@ def main(glint, folder, is_long):
             text = STAGE + "".join(f"  - {line}\n" for line in SHAPES[name])
             picture = render(glint, text, precision, size, folder)
             width = write_tables.WIDE if precision == "double" else write_tables.NARROW
-            compare(Scene(text, width), picture, rounding, tallies, name)
+            compare(Scene(yaml.safe_load(text), width), picture, rounding, tallies, name)
         print(precision)
         for kind, tally in tallies.items():
             line = f"  {kind:8}{tally.count:7} compared, {tally.open} open, {tally.wrong} wrong"

@@ -1,10 +1,9 @@
-"""Scenes for the oracle: the YAML of docs/scene-format.md, without meshes and pictures on surfaces.
+"""Scenes for the oracle: what the YAML of docs/scene-format.md says, without meshes and pictures on surfaces.
 
 As docs/verify.md tells it, the eye is subtracted in double, then each number is rounded once to the precision; what is
 left is exact."""
 
 import exact
-import yaml
 from exact import dot, rational, subtract, vector
 from flint import arb
 
@@ -78,7 +77,10 @@ class Thing:
             return exact.Revolution(base, axis, map(rounding, radii), caps=given.get("caps", True))
         if kind == "cylinder":
             return exact.Revolution(from_eye(given["point"]), way("axis"), [size("radius")] * 2, endless=True)
-        slope = exact.middle((arb(rational(float(given["angle"]))) * arb.pi() / 180).tan())
+        if "slope" in given:
+            slope = rational(given["slope"])
+        else:
+            slope = exact.middle((arb(rational(float(given["angle"]))) * arb.pi() / 180).tan())
         return exact.DoubleCone(from_eye(given["apex"]), way("axis"), slope)
 
     def outward(self, point):
@@ -106,8 +108,8 @@ def unit(values):
 
 
 class Scene:
-    def __init__(self, text, width):
-        given = yaml.safe_load(text)
+    def __init__(self, given, width):
+        """given: what a scene file says."""
         eye = [float(x) for x in given["camera"]["position"]]
         rounding = width.rounding
 

@@ -31,7 +31,7 @@ static const SpecimenKind ladder_kinds[SHAPES] = {
 };
 
 typedef struct {
-    size_t ray_count; // of each shape, over all rungs
+    size_t ray_count; // of each shape, over all rungs; 0: no errors are measured
     size_t
         sample_count; // not 0: print so many rays of each rung and specimen with what they meet, and no more
     bool hold, time;
@@ -431,7 +431,7 @@ int main(int argument_count, char **arguments)
     Json *json = json_open();
     json_text(json, "device", device->name);
     json_begin_array(json, "rungs");
-    for (int i = 0; i < SHAPES; i++) {
+    for (int i = 0; options.ray_count > 0 && i < SHAPES; i++) {
         LadderShape shape = shape_make(ladder_kinds[i]);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
         for (int rung = 0; rung < RUNG_COUNT; rung++)
