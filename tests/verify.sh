@@ -36,6 +36,11 @@ for lanes in 1 8; do
 done
 check "$precision: the same bits at 8 lanes as at 1" cmp "$scratch/1.hashes" "$scratch/8.hashes"
 
+# So do kernels of what each scene needs alone.
+hashes() { "$GLINT" verify S5 C7 --precision $precision --json "$@" | grep '"hash"'; }
+check "$precision: the same bits when lean" diff <(hashes) <(hashes --lean)
+check 'there are bits to compare' test "$(hashes --lean | wc -l)" = 2
+
 # A renderer that errs a thousand times as much as a device may is found out, whatever case one asks.
 status=0
 "$GLINT" verify P2 R3 --precision single --perturb 1:1000 >"$scratch/erring" || status=$?

@@ -15,13 +15,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OPTION_JSON = OPTION_OWN };
+enum { OPTION_JSON = OPTION_OWN, OPTION_LEAN };
 
 static const struct option long_options[] = {
     {"device", required_argument, NULL, OPTION_DEVICE},
     {"precision", required_argument, NULL, OPTION_PRECISION},
     {"lanes", required_argument, NULL, OPTION_LANES},
     {"no-cache", no_argument, NULL, OPTION_NO_CACHE},
+    {"lean", no_argument, NULL, OPTION_LEAN},
     {"json", no_argument, NULL, OPTION_JSON},
     PERTURB_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
@@ -38,11 +39,14 @@ static const char help_text[] =
     "      --precision P     fast, single, strict or double (default: all that the device has)\n"
     "      --lanes N         rays a work-item carries: 1, 4, 8 or 16 (default: the device's own)\n"
     "      --no-cache        build the kernels anew and keep nothing\n"
+    "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
+    "compiler\n"
     "      --json            the results as JSON\n";
 
 typedef struct {
     CommonOptions common;
     bool every_precision, json;
+    bool lean;          // each scene has kernels of its own
     VerifyChoice cases; // none named: all
 } VerifyOptions;
 
@@ -55,7 +59,8 @@ typedef struct {
     uint32_t lanes;                       // the last one's
 } Prober;
 
-// With every feature built in, so that one program serves all scenes.
+// With every feature built in, so that one program serves all scenes; lean, with what a scene needs, and the
+// rays sent on from hits.
 static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hierarchy, uint32_t width,
                                      uint32_t height)
 {
@@ -74,7 +79,7 @@ static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hi
         .no_cache = prober->options->common.no_cache,
         .perturb_seed = prober->options->common.perturb_seed,
         .perturb_scale = prober->options->common.perturb_scale,
-        .extra_features = FEATURE_ALL,
+        .extra_features = prober->options->lean ? FEATURE_REFLECTION | FEATURE_TRANSMISSION : FEATURE_ALL,
     };
     MessageList messages = {0};
     Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
@@ -343,6 +348,8 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
         if (option == OPTION_PRECISION) options->every_precision = false;
         if (option == OPTION_JSON)
             options->json = true;
+        else if (option == OPTION_LEAN)
+            options->lean = true;
         else if (option_common(&options->common, option, optarg, &valid) && !valid)
             return EXIT_USER;
     }

@@ -12,7 +12,7 @@ _glint_options() {
         "--lenient -h --help" ;;
     accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
         "--perturb --device --lenient -h --help" ;;
-    verify) echo "--device --precision --lanes --no-cache --perturb --json -h --help" ;;
+    verify) echo "--device --precision --lanes --no-cache --perturb --lean --json -h --help" ;;
     *) echo "--version --help" ;;
     esac
 }

@@ -22,6 +22,7 @@ complete -c glint -n '__fish_seen_subcommand_from render trace' -l bvh -x -a 'au
 complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l no-cache -d 'Build the kernel anew'
 complete -c glint -n '__fish_seen_subcommand_from render trace accuracy verify' -l perturb -x -d 'Err as other devices may, SEED[:SCALE]'
 complete -c glint -n '__fish_seen_subcommand_from render trace check bench accuracy' -l lenient -d 'Skip unknown elements of a .rt scene'
+complete -c glint -n '__fish_seen_subcommand_from verify' -l lean -d 'Build small kernels, for a slow compiler'
 complete -c glint -n '__fish_seen_subcommand_from check devices diff bench accuracy verify' -l json -d 'For programs'
 complete -c glint -n '__fish_seen_subcommand_from trace' -l rays -r -F -d 'File of rays'
 complete -c glint -n '__fish_seen_subcommand_from render bench accuracy' -l size -x -d 'Width and height, as WxH'

@@ -60,6 +60,7 @@ _glint_verify() {
         '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
         '--no-cache[build the kernels anew]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
+        '--lean[build small kernels, for a slow compiler]' \
         '--json[for programs]' \
         '(- *)'{-h,--help}'[list the options]'
 }
