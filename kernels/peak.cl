@@ -1,21 +1,25 @@
 // What the device can do at most: arithmetic without memory, and memory without arithmetic.
 #include "lanes.h"
 
-// Independent of one another, to keep pipelines of 4 steps in 2 units busy; each takes one fma a round.
-#define CHAIN_COUNT 8
-
+// Eight chains, independent of one another, keep pipelines of 4 steps in 2 units busy; each takes one fma a
+// round. They are variables, not an array: what a compiler does not unroll would load and store it.
 kernel void arithmetic(uint round_count, scalar factor, scalar addend, global scalar *results)
 {
     size_t item = get_global_id(0);
-    real chains[CHAIN_COUNT];
-    for (uint i = 0; i < CHAIN_COUNT; i++)
-        chains[i] = (real)((scalar)(item + i));
-    for (uint round = 0; round < round_count; round++)
-        for (uint i = 0; i < CHAIN_COUNT; i++)
-            chains[i] = fma(chains[i], (real)(factor), (real)(addend));
-    RealLanes sum = {chains[0]};
-    for (uint i = 1; i < CHAIN_COUNT; i++)
-        sum.all += chains[i];
+    const real m = (real)(factor), n = (real)(addend), one = (real)(1);
+    real a = (real)((scalar)item), b = a + one, c = b + one, d = c + one;
+    real e = d + one, f = e + one, g = f + one, h = g + one;
+    for (uint round = 0; round < round_count; round++) {
+        a = fma(a, m, n);
+        b = fma(b, m, n);
+        c = fma(c, m, n);
+        d = fma(d, m, n);
+        e = fma(e, m, n);
+        f = fma(f, m, n);
+        g = fma(g, m, n);
+        h = fma(h, m, n);
+    }
+    RealLanes sum = {((a + b) + (c + d)) + ((e + f) + (g + h))};
     scalar total = 0;
     for (uint lane = 0; lane < LANES; lane++)
         total += sum.each[lane];

@@ -5,7 +5,7 @@
 
 static const double launch_seconds = 0.03, total_seconds = 0.3;
 
-enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of CHAIN_COUNT chains
+enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of eight chains
 enum { COPY_BYTES_LARGEST = 128 << 20, COPY_BYTES_OF_ITEM = 16 };
 
 static double launch_length(Peak *peak, const LaunchTime *time)
