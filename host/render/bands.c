@@ -7,9 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-// Work-items of a group. Neighboring tiles meet the same objects.
-static const size_t group_size[2] = {8, 8};
-
 enum {
     FIRST_LAUNCH_SAMPLES = 1 << 17,  // before any time is known
     BAND_BYTES_LARGEST = 4 << 20,    // of one film
@@ -33,6 +30,15 @@ static TileShape tile_shape(uint32_t lanes)
     default:
         return (TileShape){1, 1};
     }
+}
+
+// Work-items along each side of a group. Neighboring pixels meet the same objects. But a work-item that
+// carries a whole tile of them makes a group of its own: PoCL lays out the private variables of a group's
+// items side by side, and those of 64, each with room for the rays that wait behind glass, are more than a
+// cache holds.
+static size_t group_side(const Renderer *renderer)
+{
+    return renderer->report.lanes == 1 ? 8 : 1;
 }
 
 // The buffers that a band is rendered into, sized for `rows`.
@@ -97,11 +103,15 @@ typedef struct {
     uint32_t first_row, row_count;
 } BandRows;
 
-static void band_launch_size(const Renderer *renderer, BandRows rows, size_t *global)
+static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows)
 {
     TileShape tile = tile_shape(renderer->report.lanes);
-    global[0] = rounded_up((renderer->settings.region_width + tile.width - 1) / tile.width, group_size[0]);
-    global[1] = rounded_up((rows.row_count + tile.height - 1) / tile.height, group_size[1]);
+    size_t side = group_side(renderer);
+    const size_t local[2] = {side, side};
+    const size_t global[2] = {
+        rounded_up((renderer->settings.region_width + tile.width - 1) / tile.width, side),
+        rounded_up((rows.row_count + tile.height - 1) / tile.height, side)};
+    return renderer_launch(renderer, kind, 2, global, local);
 }
 
 static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint argument, BandRows rows)
@@ -140,9 +150,7 @@ static double band_render(Renderer *renderer, const Film *film, BandRows rows, u
     kernel_argument(kernel, FLAT_COUNT + 5, sizeof last, &last);
     kernel_argument(kernel, FLAT_COUNT + 6, sizeof(cl_mem), &film->ray_counts);
     if (renderer->settings.counting) ray_counts_clear(renderer, film);
-    size_t global[2];
-    band_launch_size(renderer, rows, global);
-    LaunchTime time = renderer_launch(renderer, KERNEL_RENDER, 2, global, group_size);
+    LaunchTime time = band_launch(renderer, KERNEL_RENDER, rows);
     if (renderer->settings.counting) ray_counts_add(renderer, film);
     return time.trusted ? time.event_seconds : time.host_seconds;
 }
@@ -157,9 +165,7 @@ static void band_aovs(Renderer *renderer, const Film *film, unsigned aovs, BandR
         kernel_argument(kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
     cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
     kernel_argument(kernel, FLAT_COUNT + 7, sizeof shadow_count, &shadow_count);
-    size_t global[2];
-    band_launch_size(renderer, rows, global);
-    renderer_launch(renderer, KERNEL_AOV, 2, global, group_size);
+    band_launch(renderer, KERNEL_AOV, rows);
 }
 
 static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
@@ -167,9 +173,7 @@ static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_PATH);
     band_set_place(renderer, kernel, FLAT_COUNT, rows);
     kernel_argument(kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->path);
-    size_t global[2];
-    band_launch_size(renderer, rows, global);
-    renderer_launch(renderer, KERNEL_PATH, 2, global, group_size);
+    band_launch(renderer, KERNEL_PATH, rows);
 }
 
 static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows, BandSink sink,
@@ -227,13 +231,19 @@ static uint64_t pace_samples(const Pace *pace)
     return (uint64_t)fmin(pace->target_seconds / pace->seconds_per_sample, 4 * pace->last_samples);
 }
 
+// Rows of whole groups.
+static uint32_t rows_step(const Renderer *renderer)
+{
+    return tile_shape(renderer->report.lanes).height * (uint32_t)group_side(renderer);
+}
+
 static uint32_t pace_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
     uint64_t rows = pace_samples(pace) / row_samples;
-    uint32_t step = tile_shape(renderer->report.lanes).height * (uint32_t)group_size[1];
+    uint32_t step = rows_step(renderer);
     if (rows < step) rows = step;
     rows -= rows % step;
     return rows < most ? (uint32_t)rows : most;
@@ -246,7 +256,7 @@ static uint32_t film_rows_largest(const Renderer *renderer, unsigned aovs)
     size_t row_bytes = film_pixels(renderer, 1) * 3 * renderer_scalar_size(renderer);
     if (aovs & AOV_SHADOW) row_bytes += film_shadow_size(renderer, 1);
     size_t rows = BAND_BYTES_LARGEST / row_bytes;
-    size_t step = tile_shape(renderer->report.lanes).height * group_size[1];
+    size_t step = rows_step(renderer);
     rows = rows < step ? step : rows - rows % step;
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
