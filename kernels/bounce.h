@@ -20,20 +20,15 @@ static inline mask bounce_counts(const Bounce *bounce)
 
 static inline Ray bounce_ray(const Bounce *bounce)
 {
-    Ray ray = ray_make(bounce->origin, bounce->direction, (real)(0), (real)(LARGEST), bounce_counts(bounce));
+    Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_counts(bounce));
     ray.travelled = bounce->travelled;
     return ray;
-}
-
-static inline Vector ray_unit_direction(const Ray *ray)
-{
-    return vector_normalize(ray->direction);
 }
 
 static inline Vector reflected_direction(Vector direction, Vector normal)
 {
     real away = vector_dot(direction, normal);
-    return vector_normalize(vector_fma(normal, (real)(-2) * away, direction));
+    return vector_renormalize(vector_fma(normal, (real)(-2) * away, direction));
 }
 
 // Snell's law for a unit direction against a unit normal that faces it; the mask tells where there is total
@@ -53,38 +48,50 @@ static inline mask refracted_direction(Vector direction, Vector normal, mask ent
     return total;
 }
 
-// What the surface sends on: the mirrored ray, and the one through it. Where all is reflected the mirrored
-// ray carries what would have passed; the mask returned tells where.
-static inline mask surface_bounce(const Surface *surface, const Ray *ray, Color3 weight, Bounce *mirrored,
-                                  Bounce *passed)
+// Only on a smooth surface are there two normals, and may one send a ray where the other would not.
+static inline Vector mirrored_direction(const Surface *surface, Vector direction)
 {
-    Vector direction = ray_unit_direction(ray);
+    Vector mirrored = reflected_direction(direction, surface->shading_normal);
+    if (!HAS_TRIANGLES) return mirrored;
+    mask sunk = vector_dot(mirrored, surface->normal) <= (real)(0);
+    return vector_select(sunk, reflected_direction(direction, surface->normal), mirrored);
+}
+
+static inline mask passed_direction(const Surface *surface, Vector direction, Vector *passed)
+{
+    mask total =
+        refracted_direction(direction, surface->shading_normal, surface->entering, surface->ior, passed);
+    if (!HAS_TRIANGLES) return total;
+    mask outward = !total & (vector_dot(*passed, surface->normal) >= (real)(0));
+    if (!lanes_any(outward)) return total;
+    Vector plain;
+    mask plain_total =
+        refracted_direction(direction, surface->normal, surface->entering, surface->ior, &plain);
+    *passed = vector_select(outward, plain, *passed);
+    return lanes_select(outward, plain_total, total);
+}
+
+// What the surface sends on: the mirrored ray, and the one through it. Where all is reflected the mirrored
+// ray carries what would have passed; the mask returned tells where. `direction` is the ray's, unit. A ray
+// that carries nothing in any lane is left out, unless all are asked for.
+static inline mask surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
+                                  Bounce *mirrored, Bounce *passed)
+{
     real reflection = surface->reflection;
-    mask total = mask_none();
-    if (HAS_TRANSMISSION) {
-        total = refracted_direction(direction, surface->shading_normal, surface->entering, surface->ior,
-                                    &passed->direction);
-        // a smooth surface's normal may send the ray back out where its geometry would not
-        mask outward = !total & (vector_dot(passed->direction, surface->normal) >= (real)(0));
-        if (lanes_any(outward)) {
-            Vector plain_direction;
-            mask plain_total = refracted_direction(direction, surface->normal, surface->entering,
-                                                   surface->ior, &plain_direction);
-            passed->direction = vector_select(outward, plain_direction, passed->direction);
-            total = lanes_select(outward, plain_total, total);
-        }
+    mask total = mask_none(), transparent = surface->transmission > (real)(0);
+    if (HAS_TRANSMISSION && (all || lanes_any(transparent))) {
+        total = passed_direction(surface, direction, &passed->direction);
         real transmission = lanes_select(total, (real)(0), surface->transmission);
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
         passed->origin = surface_leave(surface, true);
         passed->weight = vector_scale(weight, transmission);
-        total = total & (surface->transmission > (real)(0));
+        total = total & transparent;
     }
-    mirrored->direction = reflected_direction(direction, surface->shading_normal);
-    mask sunk = vector_dot(mirrored->direction, surface->normal) <= (real)(0);
-    mirrored->direction =
-        vector_select(sunk, reflected_direction(direction, surface->normal), mirrored->direction);
-    mirrored->origin = surface_leave(surface, false);
-    mirrored->weight = vector_scale(weight, reflection);
+    if (all || lanes_any(reflection > (real)(0))) {
+        mirrored->direction = mirrored_direction(surface, direction);
+        mirrored->origin = surface_leave(surface, false);
+        mirrored->weight = vector_scale(weight, reflection);
+    }
     mirrored->travelled = passed->travelled = surface->travelled;
     return total;
 }

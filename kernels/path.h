@@ -62,7 +62,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
         Bounce next = {ray.origin, ray.direction, black, depth + 1, ray.travelled}, other = next;
         mask total = mask_none();
         if (any_found && depth < scene->header->bounces.x)
-            total = surface_bounce(&surface, &ray, weight, &next, &other);
+            total = surface_bounce(&surface, vector_renormalize(ray.direction), weight, false, &next, &other);
         if (SIGNS_PATHS)
             *path = path_sign(*path, &ray, &hit, bounce_counts(&next), bounce_counts(&other), total);
         rays_count(scene, RAYS_REFLECTED, bounce_counts(&next));

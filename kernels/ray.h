@@ -89,6 +89,17 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     return ray;
 }
 
+// Without an end, along a direction that is unit, or 0: its square is 1 + e with e of a few u, one over that
+// is 1 - e but for the square of e.
+static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
+{
+    Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
+    if (IS_COMPENSATED) return ray;
+    ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
+    if (HAS_TRIANGLES) ray.along = vector_scale(direction, ray.inverse_squared);
+    return ray;
+}
+
 // The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies
 // before it.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)

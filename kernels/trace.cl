@@ -23,7 +23,7 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
     Surface surface = surface_at(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce mirrored = {origin, direction, black}, passed = mirrored;
-    surface_bounce(&surface, &ray, white, &mirrored, &passed);
+    surface_bounce(&surface, vector_normalize(direction), white, true, &mirrored, &passed);
 
     Vector n = surface.normal, p = surface.position;
     Vector mo = mirrored.origin, md = mirrored.direction, po = passed.origin, pd = passed.direction;

@@ -80,6 +80,13 @@ static inline Vector vector_normalize(Vector a)
     return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), length_)));
 }
 
+// The same for what is unit but for some rounding, e: by Newton's step, whose error is e^2.
+static inline Vector vector_renormalize(Vector a)
+{
+    if (IS_COMPENSATED) return vector_normalize(a);
+    return vector_scale(a, fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
+}
+
 // |x| + |y| + |z|: what error bounds are proportional to.
 static inline real vector_magnitude(Vector a)
 {
