@@ -214,15 +214,22 @@ static inline real real_log_complement(real s)
     return fma(k, ln2_high, fma(k, ln2_low, log_m));
 }
 
+// Below this real_exp_negative is 0.
+#if IS_DOUBLE
+#define EXP_LOWEST (-708.0)
+#else
+#define EXP_LOWEST (-87.0f)
+#endif
+
 // e^x for x <= 0: 2^k times the Taylor series of the rest, |rest| <= ln(2)/2 (Abramowitz, Stegun, 4.2.1). 0
 // where the result would be subnormal.
 static inline real real_exp_negative(real x)
 {
 #if IS_DOUBLE
-    const real lowest = (real)(-708.0), log2_e = (real)(0x1.71547652b82fep0);
+    const real lowest = (real)(EXP_LOWEST), log2_e = (real)(0x1.71547652b82fep0);
     const real ln2_high = (real)(0x1.62e42fefa39efp-1), ln2_low = (real)(0x1.abc9e3b39803fp-56);
 #else
-    const real lowest = (real)(-87.0f), log2_e = (real)(0x1.715476p0f);
+    const real lowest = (real)(EXP_LOWEST), log2_e = (real)(0x1.715476p0f);
     const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
 #endif
     real within = real_max(x, lowest);
@@ -257,6 +264,12 @@ static inline real real_complement_power(real s, real n)
     real power = perturbed_power(real_exp_negative(n * real_log_complement(s)), s, n);
 #endif
     return real_min(power, (real)(1));
+}
+
+// Where (1 - s)^n, which is at most e^(-n s), may be more than 0.
+static inline mask real_complement_power_counts(real s, real n)
+{
+    return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));
 }
 
 #endif

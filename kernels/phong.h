@@ -44,15 +44,18 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     return to_light;
 }
 
-// max(0, cos)^shininess for the angle between two unit vectors. Near the highlight's center the cosine has no
-// bits left for a high power; its complement s = |a - b|^2 / 2 has. A power of 0 gives 1.
-static inline real phong_highlight(Vector reflected, Vector to_eye, real shininess)
+// max(0, cos)^shininess for the angle between two unit vectors, wanted in some lanes. Near the highlight's
+// center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has. A power of 0
+// gives 1.
+static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
 {
     Vector difference = vector_subtract(reflected, to_eye);
     real s = (real)(0.5f) * vector_dot(difference, difference);
-    mask facing = s < (real)(1);
-    real highlight = real_complement_power(lanes_select(facing, s, (real)(0.5f)), shininess);
-    highlight = lanes_select(facing, highlight, (real)(0));
+    mask counts = real_complement_power_counts(s, shininess);
+    real highlight = (real)(0);
+    if (lanes_any(wanted & counts))
+        highlight = lanes_select(
+            counts, real_complement_power(lanes_select(counts, s, (real)(0.5f)), shininess), highlight);
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 
@@ -77,10 +80,12 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, uin
 
     Color3 reached = vector_scale(vector_of(light.color), to_light.strength * passing);
     Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), facing);
-    if (lanes_any(lit & (surface->specular > (real)(0)))) {
+    mask glossy = lit & (surface->specular > (real)(0));
+    if (lanes_any(glossy)) {
         Vector reflected =
             vector_fma(surface->shading_normal, facing + facing, vector_negate(to_light.direction));
-        real highlight = surface->specular * phong_highlight(reflected, surface->to_eye, surface->shininess);
+        real highlight =
+            surface->specular * phong_highlight(glossy, reflected, surface->to_eye, surface->shininess);
         color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
     }
     return vector_select(lit, color_multiply(color, reached), black);
