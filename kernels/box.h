@@ -33,7 +33,7 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
     real near = real_max(real_max(x.near, y.near), z.near);
     real far = real_min(real_min(x.far, y.far), z.far);
     *t = ray_first(ray, near, far);
-    return ray->active & (near <= far) & (*t > ray->near);
+    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->near);
 }
 
 // How near t is to a slab's crossings, and on which of its faces that lies: a ray that runs towards larger

@@ -41,7 +41,8 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     } else {
         crossing = disc_crossing(center, normal, ray);
         real steepest_squared = vector_dot(normal, normal) * ray->squared;
-        mask grazing = ray->active & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
+        mask grazing =
+            RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
         if (lanes_any(grazing)) {
             DiscCrossing exact = disc_crossing_exactly(center, normal, ray);
             crossing.height = lanes_select(grazing, exact.height, crossing.height);

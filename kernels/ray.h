@@ -34,6 +34,10 @@ typedef struct {
     real size;
 } Patch;
 
+// A mask from memory, compared anew: then LLVM sees that a bit tells all of a lane, and keeps in mask
+// registers what is made of it. Of a function's result it does not.
+#define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
+
 static inline real real_inverse_or_zero(real a)
 {
     mask zero = a == (real)(0);

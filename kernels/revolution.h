@@ -184,7 +184,7 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
 {
     RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray);
     Roots side = crossings.side, slab = crossings.slab;
-    mask hit = ray->active & crossings.real_roots;
+    mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
     if (shape->id.y & REVOLUTION_CAPPED) {
         real near = real_max(side.near, slab.near);
         real far = real_min(side.far, slab.far);

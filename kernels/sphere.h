@@ -63,7 +63,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real lowered_c = fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF));
     mask hit = !(b * (b * ray->inverse_squared) < lowered_c);
     if (!lanes_any(hit)) return mask_none();
-    hit = hit & ray->active;
+    hit = hit & RAY_ACTIVE(ray);
 
     real c = squared_distance - squared_radius;
     mask outside = c > (real)(32 * UNIT_ROUNDOFF) * squared_radius;

@@ -107,7 +107,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     real reach = major + minor;
     real squared_distance = vector_dot(closest, closest);
     real half_chord_squared = fma(reach * (real)(1.001f), reach, -squared_distance);
-    mask hit = ray->active & (half_chord_squared >= (real)(0));
+    mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
     if (!lanes_any(hit)) return hit;
 
     TorusLine line = {vector_cross(closest, axis),

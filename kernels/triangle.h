@@ -119,7 +119,7 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     const real zero = (real)(0);
     mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
     mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
-    mask hit = ray->active & (all_positive | all_negative) & (edges.determinant != zero);
+    mask hit = RAY_ACTIVE(ray) & (all_positive | all_negative) & (edges.determinant != zero);
     if (!lanes_any(hit)) return hit;
 
     // in the triangle's own plane any place of it will do
