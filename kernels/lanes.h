@@ -12,22 +12,26 @@
 typedef double scalar;
 typedef double4 scalar4;
 typedef long scalar_integer;
-#define REAL_BASE      double
-#define INTEGER_BASE   long
-#define UNIT_ROUNDOFF  0x1p-53
-#define INFINITY_BITS  0x7ff0000000000000L
-#define LARGEST        DBL_MAX
-#define SMALLEST_RATIO 0x1p-1000
+#define REAL_BASE        double
+#define INTEGER_BASE     long
+#define UNIT_ROUNDOFF    0x1p-53
+#define INFINITY_BITS    0x7ff0000000000000L
+#define LARGEST          DBL_MAX
+#define INTEGER_LARGEST  0x7fffffffffffffffL
+#define scalar_from_bits as_double
+#define SMALLEST_RATIO   0x1p-1000
 #else
 typedef float scalar;
 typedef float4 scalar4;
 typedef int scalar_integer;
-#define REAL_BASE      float
-#define INTEGER_BASE   int
-#define UNIT_ROUNDOFF  0x1p-24f
-#define INFINITY_BITS  0x7f800000
-#define LARGEST        FLT_MAX
-#define SMALLEST_RATIO 0x1p-120f
+#define REAL_BASE        float
+#define INTEGER_BASE     int
+#define UNIT_ROUNDOFF    0x1p-24f
+#define INFINITY_BITS    0x7f800000
+#define LARGEST          FLT_MAX
+#define INTEGER_LARGEST  0x7fffffff
+#define scalar_from_bits as_float
+#define SMALLEST_RATIO   0x1p-120f
 #endif
 
 // For a large function that is called from several places with little in hand: inlined, each copy would be
@@ -110,6 +114,25 @@ static inline mask mask_none(void)
     return (real)(0) != (real)(0);
 }
 
+// Lanes as an array, to load and store them one by one.
+typedef union {
+    real all;
+    scalar each[LANES];
+} RealLanes;
+
+typedef union {
+    integer all;
+    scalar_integer each[LANES];
+} IntegerLanes;
+
+#if LANES == 4
+#define LANE_BIT ((integer)(1, 2, 4, 8))
+#elif LANES == 8
+#define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128))
+#elif LANES == 16
+#define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
+#endif
+
 // clang can take a whole vector to one value, which its code for x86 and Arm does by few instructions;
 // halving, written out, is several times as long. What clang compiles to SPIR may not have it.
 #if defined(__x86_64__) || defined(__aarch64__)
@@ -173,6 +196,28 @@ static inline scalar_integer lanes_smallest(integer value)
 }
 #endif
 
+// The mask's lanes as bits, the first lane's lowest.
+static inline uint lanes_bits(mask condition)
+{
+#if LANES == 1
+    return condition != 0;
+#elif REDUCES_LANES
+    return (uint)__builtin_reduce_or(lanes_select(condition, LANE_BIT, (integer)(0)));
+#else
+    IntegerLanes lanes = {condition};
+    uint bits = 0;
+    for (uint lane = 0; lane < LANES; lane++)
+        bits |= (lanes.each[lane] != 0) << lane;
+    return bits;
+#endif
+}
+
+// The place of the lowest bit that is set; not of 0.
+static inline uint bit_lowest(uint bits)
+{
+    return 31 - clz(bits & -bits);
+}
+
 static inline bool lanes_all(mask condition)
 {
     return !lanes_any(!condition);
@@ -189,15 +234,61 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
-// Lanes as an array, to load and store them one by one.
+// 16 reals, and the smallest lane of each: `all` becomes `each`.
+enum { LEASTS = 16 };
 typedef union {
-    real all;
-    scalar each[LANES];
-} RealLanes;
+    real all[LEASTS];
+    scalar each[LEASTS];
+} Leasts;
 
-typedef union {
-    integer all;
-    scalar_integer each[LANES];
-} IntegerLanes;
+#if LANES > 1
+static inline real real_min_of_pairs(real a, real b)
+{
+    return real_min((real)(a.even, b.even), (real)(a.odd, b.odd));
+}
+#endif
+
+// Two reals whose lanes were compared in pairs fill one, so that all of them take little longer than one
+// alone.
+static inline void leasts_find(Leasts *leasts)
+{
+#if LANES > 1
+#pragma unroll
+    for (uint count = LEASTS / 2; count >= LEASTS / LANES; count /= 2) {
+#pragma unroll
+        for (uint i = 0; i < count; i++)
+            leasts->all[i] = real_min_of_pairs(leasts->all[2 * i], leasts->all[2 * i + 1]);
+    }
+#endif
+}
+
+// The largest of the lanes; -LARGEST of none.
+static inline scalar lanes_largest(mask members, real a)
+{
+    // as integers the bits of negative numbers run the wrong way
+    const uint sign = 8 * sizeof(scalar) - 1;
+    integer bits = bits_from_real(lanes_select(members, -a, (real)(LARGEST)));
+    scalar_integer least = lanes_smallest(bits ^ ((bits >> sign) & (integer)(INTEGER_LARGEST)));
+    return -scalar_from_bits(least ^ ((least >> sign) & INTEGER_LARGEST));
+}
+
+// Starts to fetch memory that will soon be read, by lines of a cache. PoCL's own prefetch does nothing.
+static inline void memory_fetch(global const char *from, uint size)
+{
+#if REDUCES_LANES
+#pragma unroll
+    for (uint at = 0; at < size; at += 64)
+        __builtin_prefetch((global const void *)(from + at));
+#endif
+}
+
+static inline real real_load(global const scalar *from)
+{
+#if LANES == 1
+    return *from;
+#else
+    return JOIN(vload, LANES)(0, from);
+#endif
+}
 
 #endif

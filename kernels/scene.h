@@ -3,6 +3,7 @@
 #ifndef SCENE_H
 #define SCENE_H
 
+#include "bvh.h"
 #include "disc.h"
 #include "plane.h"
 #include "revolution.h"
@@ -129,134 +130,101 @@ static inline void search_shapes(Search *search, const Scene *scene, const Ray *
     SHAPE_LIST(SEARCH_SHAPES)
 }
 
-// A packet's rays as boxes are tested with them. All of them run to the same side along each axis, so that
-// which of a box's planes is the near one is known for the packet.
-typedef struct {
-    Vector inverse;         // 1 / direction, bounded
-    Vector to_near, to_far; // a plane's distance is plane * inverse + this
-    uint near[3], far[3]; // which of a box's numbers is the near plane along each axis, and which the far one
-    uint signs;           // bit i: the direction's component i is negative
-} BoxRays;
-
-// A hit may lie outside its primitive's box, for any shape: each test is off by a few u times the distance
-// between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
-// here adds a few u of the coordinates. Boxes count as larger by all of that.
-//
-// Products are bounded: 1 / direction is held below 2^120 (2^1000) over the coordinates, where the ray does
-// not move along that axis by as much as the slack, however far it goes.
-static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, uint signs)
-{
-    Vector center = vector_of(bounds);
-    real reach = vector_magnitude(vector_subtract(ray->origin, center)) + (real)(bounds.w);
-    real coordinates = fma((real)(2), vector_magnitude(center), reach);
-    real slack = fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
-    const real huge = (real)(1 / SMALLEST_RATIO);
-    real largest = real_min(huge * real_inverse_power(coordinates), huge);
-    BoxRays rays;
-    rays.inverse = (Vector){real_min(real_max(ray->inverse.x, -largest), largest),
-                            real_min(real_max(ray->inverse.y, -largest), largest),
-                            real_min(real_max(ray->inverse.z, -largest), largest)};
-    Vector inverse = rays.inverse;
-    Vector to_origin = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
-    Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
-    rays.to_near = vector_subtract(to_origin, around);
-    rays.to_far = vector_add(to_origin, around);
-    for (uint axis = 0; axis < 3; axis++) {
-        rays.near[axis] = axis + (signs >> axis & 1 ? BVH_HIGH : BVH_LOW);
-        rays.far[axis] = axis + (signs >> axis & 1 ? BVH_LOW : BVH_HIGH);
-    }
-    rays.signs = signs;
-    return rays;
-}
-
-enum { BOX_RAYS_SIGNS = 8 }; // numbers of signs
-
-// Where the rays enter a child's box.
-static inline real box_rays_enter(const BoxRays *rays, global const scalar *box, real near)
-{
-    real x = fma((real)(box[rays->near[0]]), rays->inverse.x, rays->to_near.x);
-    real y = fma((real)(box[rays->near[1]]), rays->inverse.y, rays->to_near.y);
-    real z = fma((real)(box[rays->near[2]]), rays->inverse.z, rays->to_near.z);
-    return real_max(real_max(x, y), real_max(z, near));
-}
-
-static inline real box_rays_leave(const BoxRays *rays, global const scalar *box, real limit)
-{
-    real x = fma((real)(box[rays->far[0]]), rays->inverse.x, rays->to_far.x);
-    real y = fma((real)(box[rays->far[1]]), rays->inverse.y, rays->to_far.y);
-    real z = fma((real)(box[rays->far[2]]), rays->inverse.z, rays->to_far.z);
-    return real_min(real_min(x, y), real_min(z, limit));
-}
-
 // No further than this is a lane interested; not at all where it has found what it looked for. Always below
-// LARGEST, the place of a box that a lane does not meet.
+// LARGEST.
 static inline real search_limit(const Search *search)
 {
     return lanes_select(search->open, real_min(search->hit.t, (real)(LARGEST / 2)), (real)(-LARGEST));
 }
 
-// Down the tree, the nearer child first; a packet visits what any of its lanes meets.
-static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays)
+// A child on its way to be visited, and where the beam meets its box at the earliest.
+typedef struct {
+    uint first, what;
+    scalar near;
+} Waiting;
+
+// Each node leaves at most all but one of its children waiting.
+#define WAITING_LARGEST ((BVH_WIDTH - 1) * BVH_DEPTH_LARGEST + 1)
+
+// Starts to fetch what will be read when its turn comes.
+static inline void waiting_fetch(const Scene *scene, uint first, uint what)
 {
-    uint2 waiting[BVH_DEPTH_LARGEST];
-    real waiting_nears[BVH_DEPTH_LARGEST];
-    uint waiting_count = 0;
-    uint2 child = (uint2)(0, BVH_NODE);
-    real limit = search_limit(search);
-    for (;;) {
-        if ((child.y & 0xff) == BVH_NODE) {
-            global const BvhNode *node = &scene->nodes[child.x];
-            global const scalar *box_0 = (global const scalar *)node->planes, *box_1 = box_0 + BVH_CHILD;
-            real near_0 = box_rays_enter(rays, box_0, ray->near);
-            real near_1 = box_rays_enter(rays, box_1, ray->near);
-            mask meets_0 = near_0 <= box_rays_leave(rays, box_0, limit);
-            mask meets_1 = near_1 <= box_rays_leave(rays, box_1, limit);
-            bool any_0 = lanes_any(meets_0), any_1 = lanes_any(meets_1);
-            uint4 children = node->children;
-            if (any_0 & any_1) {
-                bool second_nearer = rays->signs >> (children.y >> BVH_AXIS_SHIFT) & 1;
-                child = second_nearer ? children.zw : children.xy;
-                waiting[waiting_count] = second_nearer ? children.xy : children.zw;
-                waiting_nears[waiting_count++] = second_nearer
-                                                     ? lanes_select(meets_0, near_0, (real)(LARGEST))
-                                                     : lanes_select(meets_1, near_1, (real)(LARGEST));
-                continue;
-            }
-            if (any_0 | any_1) {
-                child = any_0 ? children.xy : children.zw;
-                continue;
-            }
-        } else {
-            search_shapes(search, scene, ray, child.y & 0xff, child.x, child.x + (child.y >> 8 & 0xff));
-            limit = search_limit(search);
+    if (what == BVH_NODE)
+        memory_fetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
+    else if (HAS_TRIANGLES && (what & 0xff) == KIND_TRIANGLES)
+        memory_fetch((global const char *)&scene->triangles[first], 2 * sizeof(Triangle));
+}
+
+// Puts a node's children that rays meet on the stack, the nearest last.
+static inline uint node_open(const Scene *scene, uint index, const Beam *beam, const BoxRays *rays,
+                             const Ray *ray, real limit, scalar beam_limit, Waiting *waiting, uint count)
+{
+    global const BvhNode *node = &scene->nodes[index];
+    const uint bottom = count;
+    global const uint *firsts = (global const uint *)node->first, *whats = (global const uint *)node->what;
+    for (uint part = 0; part < BVH_WIDTH; part += LANES) {
+        global const scalar *boxes = (global const scalar *)node->planes + part;
+        RealLanes nears;
+        uint met = lanes_bits(beam_meets(beam, boxes, beam_limit, &nears.all));
+        for (; met != 0; met &= met - 1) {
+            uint child = bit_lowest(met);
+            // a single ray is its own beam
+            if (LANES > 1 && !lanes_any(beam_rays_meet(beam, rays, ray, boxes + child, limit))) continue;
+            scalar near = nears.each[child];
+            uint place = count++;
+            for (; place > bottom && waiting[place - 1].near < near; place--)
+                waiting[place] = waiting[place - 1];
+            waiting[place] = (Waiting){firsts[part + child], whats[part + child], near};
+            waiting_fetch(scene, firsts[part + child], whats[part + child]);
         }
-        do {
-            if (waiting_count == 0) return;
-            waiting_count--;
-        } while (!lanes_any(waiting_nears[waiting_count] <= limit));
-        child = waiting[waiting_count];
+    }
+    return count;
+}
+
+// Down the tree, the nearest child first; a packet visits what any of its lanes meets.
+static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays,
+                              const Beam *beam)
+{
+    Waiting waiting[WAITING_LARGEST];
+    waiting[0] = (Waiting){0, BVH_NODE, beam->near};
+    uint count = 1;
+    real limit = search_limit(search);
+    scalar beam_limit = beam->limit;
+    while (count > 0) {
+        Waiting next = waiting[--count];
+        if (next.near > beam_limit) continue;
+        if (next.what == BVH_NODE) {
+            count = node_open(scene, next.first, beam, rays, ray, limit, beam_limit, waiting, count);
+        } else {
+            search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8));
+            if (!lanes_any(search->open)) return;
+            limit = search_limit(search);
+            beam_limit = lanes_largest(search->open, limit);
+        }
     }
 }
 
 // Rays of one packet mostly run to the same sides; where they do not, those that do go together.
 static inline void search_hierarchy(Search *search, const Scene *scene, const Ray *ray)
 {
-    const integer none = (integer)(BOX_RAYS_SIGNS);
+    global const SceneHeader *header = scene->header;
+    BoxRays rays = box_rays(ray, header->bounds);
+    mask looking = box_rays_meet(&rays, ray, header->bounds_low, header->bounds_high, search_limit(search));
+    if (!lanes_any(looking)) return;
+    const integer zero = (integer)(0), others_signs = (integer)(8);
     Vector d = ray->direction;
-    integer signs = lanes_select(d.x < (real)(0), (integer)(1), (integer)(0)) |
-                    lanes_select(d.y < (real)(0), (integer)(2), (integer)(0)) |
-                    lanes_select(d.z < (real)(0), (integer)(4), (integer)(0));
-    integer pending = lanes_select(search->open, signs, none);
-    for (;;) {
-        scalar_integer first = lanes_smallest(pending);
-        if (first == BOX_RAYS_SIGNS) break;
-        mask members = pending == (integer)(first), others = search->open & !members;
-        pending = lanes_select(members, none, pending);
+    integer signs = lanes_select(d.x < (real)(0), (integer)(1), zero) |
+                    lanes_select(d.y < (real)(0), (integer)(2), zero) |
+                    lanes_select(d.z < (real)(0), (integer)(4), zero);
+    do {
+        scalar_integer first = lanes_smallest(lanes_select(looking, signs, others_signs));
+        mask members = looking & (signs == (integer)(first)), others = search->open & !members;
+        looking = looking & !members;
         search->open = search->open & members;
-        BoxRays rays = box_rays(ray, scene->header->bounds, (uint)first);
-        search_bvh(search, scene, ray, &rays);
+        Beam beam = beam_make(&rays, ray, members, (uint)first, search_limit(search));
+        search_bvh(search, scene, ray, &rays, &beam);
         search->open = search->open | others;
-    }
+    } while (lanes_any(looking));
 }
 
 static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool any)

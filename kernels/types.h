@@ -104,20 +104,23 @@ typedef struct {
 #define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
 enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
 
-// A node of the bounding volume hierarchy holds its two children's boxes: twelve numbers, in `float` with the
-// rest one line of a cache. A child is another node, or the primitives first .. first + count of one kind.
+// A node of the bounding volume hierarchy: the boxes of up to BVH_WIDTH children, of all children first the
+// low x, then the low y and so on. A child is another node, or the primitives first .. first + count of one
+// kind. Where there is none the box is inside out.
+//
+// The host makes nodes as wide as the kernel's packets are, but no narrower than 4.
+enum { BVH_WIDTH_LEAST = 4, BVH_WIDTH_LARGEST = 16 };
+enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
+#ifdef __OPENCL_VERSION__
+#define BVH_WIDTH (LANES < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : LANES)
 typedef struct {
-    scalar4 planes[3]; // BVH_LOW, BVH_HIGH, BVH_CHILD: where each begins
-    // x: first child's node or first primitive, y: BVH_NODE or count << 8 | kind, with the axis along which
-    // the second child lies behind the first in the bits from BVH_AXIS_SHIFT; z, w: the second's
-    uint4 children;
+    scalar4 planes[BVH_PLANES * BVH_WIDTH / 4];
+    uint4 first[BVH_WIDTH / 4]; // the child's node or first primitive
+    uint4 what[BVH_WIDTH / 4];  // BVH_NODE or count << 8 | kind
 } BvhNode;
+#endif
 
-// Where a child's low corner begins among a node's numbers, and its high one; the second child's are
-// BVH_CHILD further.
-enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_CHILD = 6 };
-
-enum { BVH_NODE = 0xff, BVH_AXIS_SHIFT = 16, BVH_DEPTH_LARGEST = 80 };
+enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 
 // Where an object's id leads.
 typedef struct {
@@ -179,13 +182,14 @@ typedef struct {
     scalar4 background, ambient;
     // A picture's ray: forward + x right + y up, x and y in half pixels from the picture's center.
     scalar4 forward, right, up;
-    scalar4 bounds;  // of what hangs in the hierarchy: xyz: center, w: no point lies farther from it, summed
-                     // over the axes
-    scalar4 sample;  // x: width of a sample's share of a pixel, at distance 1
-    uint4 picture;   // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;   // x: of a ray, at most
-    uint4 counts[2]; // of each KIND_…, in its order
-    uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
+    scalar4 bounds; // of what hangs in the hierarchy: xyz: center, w: no point lies farther from it, summed
+                    // over the axes
+    scalar4 bounds_low, bounds_high; // its corners
+    scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
+    uint4 picture;                   // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;                   // x: of a ray, at most
+    uint4 counts[2];                 // of each KIND_…, in its order
+    uint4 bounded_counts[2];         // as many of them, from the first, hang in the hierarchy
 } SceneHeader;
 
 #endif

@@ -1,8 +1,7 @@
 // The hierarchy: what a tree must be for any boxes, that no hit depends on it, and that closed meshes do not
 // leak. GLINT_LONG_TESTS=1 sends a million rays where this sends some ten thousand.
 #include "host/base/array.h"
-#include "host/render/bvh.h"
-#include "host/render/flat_types.h"
+#include "host/render/bvh_widen.h"
 #include "tests/probe.h"
 #include <math.h>
 #include <setjmp.h>
@@ -97,6 +96,42 @@ static void node_check(Walk *walk, uint32_t index, unsigned depth)
     }
 }
 
+// Wide nodes: every primitive in exactly one leaf, every node met once, none deeper than the kernels' stack
+// of waiting children allows.
+static void wide_node_check(Walk *walk, const BvhWide *wide, unsigned width, uint32_t index, unsigned depth)
+{
+    assert_true(index < wide->node_count);
+    assert_true(depth <= BVH_DEPTH_LARGEST);
+    const BvhWideNode *node = &wide->nodes[index];
+    assert_true(node->child_count <= width);
+    uint32_t next = node->first_node;
+    for (unsigned i = 0; i < node->child_count; i++) {
+        const BvhChild *child = node->children[i];
+        if (child->count > 0) {
+            leaf_check(walk, child);
+            continue;
+        }
+        assert_true(next > index);
+        for (unsigned k = 0; k < wide->nodes[next].child_count; k++)
+            assert_contains(&child->box, &wide->nodes[next].children[k]->box);
+        walk->depth++; // counts nodes here
+        wide_node_check(walk, wide, width, next++, depth + 1);
+    }
+}
+
+static void wide_check(const Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, unsigned width)
+{
+    BvhWide wide;
+    bvh_widen(&wide, bvh, width);
+    Walk walk = {bvh, boxes, kinds, memory_allocate_zeroed(bvh->primitive_count, 1), 1};
+    wide_node_check(&walk, &wide, width, 0, 1);
+    for (size_t i = 0; i < bvh->primitive_count; i++)
+        assert_int_equal(walk.seen[i], 1);
+    assert_int_equal(walk.depth, wide.node_count);
+    free(walk.seen);
+    bvh_wide_free(&wide);
+}
+
 // Every primitive in exactly one leaf, leaves of one kind, boxes that hold what is below them, bounded depth.
 static void tree_check(const BvhBox *boxes, const uint8_t *kinds, size_t count)
 {
@@ -108,6 +143,8 @@ static void tree_check(const BvhBox *boxes, const uint8_t *kinds, size_t count)
         assert_int_equal(walk.seen[i], 1);
     assert_true(walk.depth <= BVH_DEPTH_LARGEST);
     assert_int_equal(walk.depth, bvh.depth);
+    for (unsigned width = BVH_WIDTH_LEAST; width <= BVH_WIDTH_LARGEST; width *= 2)
+        wide_check(&bvh, boxes, kinds, width);
     free(walk.seen);
     bvh_free(&bvh);
 }

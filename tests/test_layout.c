@@ -13,6 +13,12 @@
 
 #include <cmocka.h>
 
+// A node's width is its kernel's: this is that of one lane.
+typedef struct {
+    scalar4 planes[BVH_PLANES];
+    uint4 first[1], what[1];
+} HostBvhNode;
+
 // Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
 // member. REALS are scalar4, INTEGERS uint4.
 // clang-format off
@@ -23,6 +29,8 @@
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds)                         \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds_low)                     \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds_high)                    \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
@@ -65,10 +73,14 @@
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
     REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, a_b)                      \
     REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, c_density)                \
-    REALS(FLAT_NODES, BvhNode, BvhNode, planes[0])                                  \
-    REALS(FLAT_NODES, BvhNode, BvhNode, planes[1])                                 \
-    REALS(FLAT_NODES, BvhNode, BvhNode, planes[2])                                  \
-    INTEGERS(FLAT_NODES, BvhNode, BvhNode, children)                             \
+    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[0])                           \
+    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[1])                           \
+    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[2])                           \
+    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[3])                           \
+    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[4])                           \
+    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
+    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, first[0])                         \
+    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, what[0])                          \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
@@ -126,7 +138,7 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
     MessageList messages = {0};
     assert_true(textures_hang(&flat, &scene, &settings, &messages));
     message_list_free(&messages);
-    hierarchy_hang(&flat);
+    hierarchy_hang(&flat, 1);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         assert_true(flat.arrays[kind].count > 0);
         layouts[kind] = flat.arrays[kind].layout;

@@ -14,7 +14,9 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     SHAPE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = {sizeof(TriangleNormals), sizeof(TriangleNormals) / sizeof(scalar4), 0},
     [FLAT_TRIANGLE_UVS] = {sizeof(TriangleUvs), sizeof(TriangleUvs) / sizeof(scalar4), 0},
-    [FLAT_NODES] = {sizeof(BvhNode), offsetof(BvhNode, children) / sizeof(scalar4), 1},
+    // as the widest; hierarchy.c makes them as wide as the kernel wants them
+    [FLAT_NODES] = {BVH_WIDTH_LARGEST / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
+                    BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
     [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
     [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 2},
     [FLAT_LIGHTS] = {sizeof(FlatLight), offsetof(FlatLight, kind) / sizeof(scalar4), 1},
@@ -190,13 +192,26 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
     }
 }
 
-FlatArray flat_array_make(size_t kind, size_t count)
+static FlatArray array_make(FlatLayout layout, size_t count)
 {
-    size_t size = count * layouts[kind].size;
-    FlatArray array = {aligned_alloc(64, (size + 127) / 64 * 64), count, layouts[kind]};
+    size_t size = count * layout.size;
+    FlatArray array = {aligned_alloc(64, (size + 127) / 64 * 64), count, layout};
     if (!array.items) fault("out of memory for %zu flat structs", count);
     memset(array.items, 0, size);
     return array;
+}
+
+FlatArray flat_array_make(size_t kind, size_t count)
+{
+    return array_make(layouts[kind], count);
+}
+
+FlatArray flat_nodes_make(size_t count, unsigned width)
+{
+    const FlatLayout widest = layouts[FLAT_NODES];
+    const unsigned parts = BVH_WIDTH_LARGEST / width;
+    return array_make(
+        (FlatLayout){widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts}, count);
 }
 
 void *flat_array_at(const FlatArray *array, size_t index)

@@ -48,7 +48,8 @@ typedef struct {
 void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings);
 void flat_scene_free(FlatScene *flat);
 
-FlatArray flat_array_make(size_t kind, size_t count); // zeroed
+FlatArray flat_array_make(size_t kind, size_t count);    // zeroed
+FlatArray flat_nodes_make(size_t count, unsigned width); // of `width` children: a power of two, 4 to 16
 void *flat_array_at(const FlatArray *array, size_t index);
 uint32_t flat_id(const FlatArray *array, size_t index); // of a shape's struct: the object's
 

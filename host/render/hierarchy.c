@@ -1,7 +1,8 @@
 #include "host/render/hierarchy.h"
 
 #include "host/base/fault.h"
-#include "host/render/bvh.h"
+#include "host/render/bvh_widen.h"
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,9 @@ static Vector3 circle_reach(Vector3 unit)
 {
     return (Vector3){hypot(unit.y, unit.z), hypot(unit.x, unit.z), hypot(unit.x, unit.y)};
 }
+
+// Where no ray comes, in double and in float.
+static const double nowhere = FLT_MAX;
 
 static Vector3 vector_of(scalar4 v)
 {
@@ -171,60 +175,39 @@ static void array_reorder(FlatScene *flat, size_t kind, const Bvh *bvh, const Bo
         entries[flat_id(array, i)].kind_index_material.y = (uint32_t)i;
 }
 
-static void child_write(const BvhChild *child, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
-                        uint32_t *reference, uint32_t *what)
+static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
+                       unsigned width, double *planes)
 {
-    bool empty = child->box.low[0] > child->box.high[0];
-    if (child->count == 0 && !empty) {
-        *reference = child->first;
-        *what = BVH_NODE;
-        return;
+    uint32_t *first = (uint32_t *)(planes + BVH_PLANES * width), *what = first + width;
+    uint32_t next_node = wide->first_node;
+    for (unsigned i = 0; i < width; i++) {
+        const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
+        for (unsigned axis = 0; axis < 3; axis++) {
+            planes[(BVH_LOW + axis) * width + i] = child ? child->box.low[axis] : nowhere;
+            planes[(BVH_HIGH + axis) * width + i] = child ? child->box.high[axis] : -nowhere;
+        }
+        if (child && child->count > 0) {
+            first[i] = order[child->first];
+            what[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+        } else if (child) {
+            first[i] = next_node++;
+            what[i] = BVH_NODE;
+        }
     }
-    *reference = empty ? 0 : order[child->first];
-    *what = empty ? 0 : child->count << 8 | bounded->kinds[bvh->order[child->first]];
 }
 
-static void box_write(const BvhBox *box, double *planes)
+static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded, unsigned width)
 {
-    // an empty child has no primitives: any box will do
-    if (box->low[0] > box->high[0]) return;
-    memcpy(planes + BVH_LOW, box->low, sizeof box->low);
-    memcpy(planes + BVH_HIGH, box->high, sizeof box->high);
-}
-
-// The axis along which a node's children lie farthest apart, and whether the second lies before the first.
-static unsigned children_axis(const BvhNodeBuild *node, bool *swapped)
-{
-    const BvhBox *a = &node->children[0].box, *b = &node->children[1].box;
-    unsigned axis = 0;
-    double farthest = 0;
-    for (unsigned k = 0; k < 3; k++) {
-        double apart = b->low[k] + b->high[k] - (a->low[k] + a->high[k]);
-        if (!(fabs(apart) > fabs(farthest))) continue;
-        farthest = apart;
-        axis = k;
-    }
-    *swapped = farthest < 0;
-    return axis;
-}
-
-static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded)
-{
-    free(flat->arrays[FLAT_NODES].items);
-    flat->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, bvh->node_count);
-    BvhNode *nodes = flat->arrays[FLAT_NODES].items;
+    BvhWide wide;
+    bvh_widen(&wide, bvh, width);
+    FlatArray *nodes = &flat->arrays[FLAT_NODES];
+    free(nodes->items);
+    *nodes = flat_nodes_make(wide.node_count, width);
     uint32_t *order = order_in_kinds(bvh, bounded);
-    for (size_t i = 0; i < bvh->node_count; i++) {
-        bool swapped;
-        unsigned axis = children_axis(&bvh->nodes[i], &swapped);
-        const BvhChild *first = &bvh->nodes[i].children[swapped], *second = &bvh->nodes[i].children[!swapped];
-        box_write(&first->box, (double *)nodes[i].planes);
-        box_write(&second->box, (double *)nodes[i].planes + BVH_CHILD);
-        child_write(first, bvh, bounded, order, &nodes[i].children.x, &nodes[i].children.y);
-        child_write(second, bvh, bounded, order, &nodes[i].children.z, &nodes[i].children.w);
-        nodes[i].children.y |= axis << BVH_AXIS_SHIFT;
-    }
+    for (size_t i = 0; i < wide.node_count; i++)
+        node_write(&wide.nodes[i], bvh, bounded, order, width, flat_array_at(nodes, i));
     free(order);
+    bvh_wide_free(&wide);
 }
 
 static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *bounded)
@@ -235,17 +218,19 @@ static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *boun
         counts[kind] = (uint32_t)bounded->kind_counts[kind];
     memcpy(header->bounded_counts, counts, sizeof counts);
     const BvhBox *left = &bvh->nodes[0].children[0].box, *right = &bvh->nodes[0].children[1].box;
-    double center[3], reach = 0;
+    double low[3], high[3], center[3], reach = 0;
     for (int axis = 0; axis < 3; axis++) { // an empty child's box is inside out, and adds nothing
-        double low = fmin(left->low[axis], right->low[axis]),
-               high = fmax(left->high[axis], right->high[axis]);
-        center[axis] = 0.5 * low + 0.5 * high;
-        reach += 0.5 * high - 0.5 * low;
+        low[axis] = fmin(left->low[axis], right->low[axis]);
+        high[axis] = fmax(left->high[axis], right->high[axis]);
+        center[axis] = 0.5 * low[axis] + 0.5 * high[axis];
+        reach += 0.5 * high[axis] - 0.5 * low[axis];
     }
     header->bounds = (scalar4){center[0], center[1], center[2], reach};
+    header->bounds_low = (scalar4){low[0], low[1], low[2], 0};
+    header->bounds_high = (scalar4){high[0], high[1], high[2], 0};
 }
 
-void hierarchy_hang(FlatScene *flat)
+void hierarchy_hang(FlatScene *flat, unsigned lanes)
 {
     Bounded bounded;
     bounded_collect(&bounded, flat);
@@ -254,7 +239,7 @@ void hierarchy_hang(FlatScene *flat)
         bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
         free(bounded.boxes);
         bounded.boxes = NULL;
-        nodes_write(flat, &bvh, &bounded);
+        nodes_write(flat, &bvh, &bounded, lanes < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : lanes);
         for (size_t kind = 0; kind < KIND_COUNT; kind++)
             array_reorder(flat, kind, &bvh, &bounded);
         header_note(flat->arrays[FLAT_HEADER].items, &bvh, &bounded);

@@ -176,7 +176,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     bool hangs = settings->bvh == BVH_ON || (settings->bvh == BVH_AUTO && bounded_count >= BVH_WORTHWHILE);
     if (hangs && bounded_count > 0) {
         start = clock_seconds();
-        hierarchy_hang(&flat);
+        hierarchy_hang(&flat, report->lanes);
         report->features |= FEATURE_BVH;
         report->bvh_seconds = clock_seconds() - start;
     }

@@ -1,0 +1,24 @@
+// A binary hierarchy gathered into nodes of many children.
+#pragma once
+
+#include "host/render/bvh.h"
+#include "host/render/flat_types.h"
+
+typedef struct {
+    const BvhChild
+        *children[BVH_WIDTH_LARGEST]; // of the binary tree: inner ones, with count 0, are wide nodes too
+    unsigned child_count;
+    uint32_t first_node; // its inner children are this wide node and those behind it, in their order
+} BvhWideNode;
+
+typedef struct {
+    BvhWideNode *nodes; // the root first, children behind their parent
+    size_t node_count;
+} BvhWide;
+
+// Nodes of at most `width` children, 2 to BVH_WIDTH_LARGEST, so chosen that the sum of the nodes' areas is
+// the least that the binary tree allows: areas stand for how often rays come by (Ylitie, Karras, Laine,
+// Efficient incoherent ray traversal on GPUs through compressed wide BVHs, HPG 2017; leaves stay as they are
+// here). What is written to `wide` lasts as long as the binary tree.
+void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width);
+void bvh_wide_free(BvhWide *wide);
