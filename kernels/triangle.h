@@ -35,19 +35,9 @@ static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *
     return edges;
 }
 
-// From one vertex to another, divided by a power of two: exact, and the cross product of two sides does not
-// vanish where the triangle is tiny.
-static inline Vector triangle_side(Vector from, Vector to)
-{
-    Vector side = vector_subtract(to, from);
-    real largest = real_max(real_max(fabs(side.x), fabs(side.y)), fabs(side.z));
-    return vector_scale(side, real_inverse_power(largest));
-}
-
 static inline Vector triangle_normal(const Triangle *triangle)
 {
-    Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
-    return vector_cross(triangle_side(a, b), triangle_side(a, c));
+    return (Vector){(real)(triangle->a.w), (real)(triangle->b.w), (real)(triangle->c.w)};
 }
 
 // The distance of the triangle's plane. Seen at a low angle both products with the normal cancel, hence twice
@@ -92,7 +82,7 @@ static inline real roots_hold(Roots roots, real t)
 }
 
 // A triangle seen edge-on would else be hit far outside itself: the edge functions do not know of the
-// distance, whose error grows as the angle gets lower. It is held between the vertices' distances, and within
+// distance, whose error, of 5 u at most where it is faced, grows as the angle gets lower. It is held between the vertices' distances, and within
 // their box, since the hierarchy looks for hits in boxes alone: its own are larger by four times this slack.
 static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real distance_)
 {
@@ -124,7 +114,12 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
 
     // in the triangle's own plane any place of it will do
     real otherwise = vector_dot(edges.a, ray->along);
-    *t = triangle_distance_held(&edges, ray, triangle_plane_distance(triangle, ray, otherwise));
+    real distance_ = triangle_plane_distance(triangle, ray, otherwise);
+    real facing = vector_dot(triangle_normal(triangle), ray->direction);
+    mask edge_on = hit & (facing * facing < (real)(0.1875f) * ray->squared);
+    if (lanes_any(edge_on))
+        distance_ = lanes_select(edge_on, triangle_distance_held(&edges, ray, distance_), distance_);
+    *t = distance_;
     return hit & (*t > ray->near);
 }
 

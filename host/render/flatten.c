@@ -115,6 +115,20 @@ static Revolution revolution_flatten(const Rounding *rounding, Vector3 from, Vec
     };
 }
 
+// a b - c d to 1.5 ulp (Kahan's; Jeannerod, Louvet, Muller, Further analysis of Kahan's algorithm for the
+// accurate computation of 2x2 determinants, Mathematics of Computation 82, 2013).
+static double product_difference(double a, double b, double c, double d)
+{
+    double cd = c * d;
+    return fma(a, b, -cd) + fma(-c, d, cd);
+}
+
+static Vector3 cross_product(Vector3 a, Vector3 b)
+{
+    return (Vector3){product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),
+                     product_difference(a.x, b.y, a.y, b.x)};
+}
+
 static bool has_area(Vector3 a, Vector3 b, Vector3 c)
 {
     return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
@@ -126,10 +140,16 @@ static bool has_area(Vector3 a, Vector3 b, Vector3 c)
 static Triangle triangle_flatten(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
 {
     if (!has_area(a, b, c)) b = c = a;
-    return (Triangle){scalar4_of(point_from_eye(rounding, a), 0),
-                      scalar4_of(point_from_eye(rounding, b), 0),
-                      scalar4_of(point_from_eye(rounding, c), 0),
-                      {0}};
+    Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
+            seen_c = point_from_eye(rounding, c);
+    Vector3 ab = vector_subtract(seen_b, seen_a), ac = vector_subtract(seen_c, seen_a);
+    if (rounding->wide) { // what a float can be has products that double can hold
+        ab = axis_scaled(ab);
+        ac = axis_scaled(ac);
+    }
+    Vector3 normal = vector_rounded(rounding, axis_scaled(cross_product(ab, ac)));
+    return (Triangle){
+        scalar4_of(seen_a, normal.x), scalar4_of(seen_b, normal.y), scalar4_of(seen_c, normal.z), {0}};
 }
 
 static void object_flatten(const Rounding *rounding, const Object *object, const Material *material,
