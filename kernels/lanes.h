@@ -254,7 +254,7 @@ static inline void leasts_find(Leasts *leasts)
 {
 #if LANES > 1
 #pragma unroll
-    for (uint count = LEASTS / 2; count >= LEASTS / LANES; count /= 2) {
+    for (uint count = LEASTS >> 1; count * LANES >= LEASTS; count >>= 1) {
 #pragma unroll
         for (uint i = 0; i < count; i++)
             leasts->all[i] = real_min_of_pairs(leasts->all[2 * i], leasts->all[2 * i + 1]);

@@ -82,8 +82,9 @@ static inline real roots_hold(Roots roots, real t)
 }
 
 // A triangle seen edge-on would else be hit far outside itself: the edge functions do not know of the
-// distance, whose error, of 5 u at most where it is faced, grows as the angle gets lower. It is held between the vertices' distances, and within
-// their box, since the hierarchy looks for hits in boxes alone: its own are larger by four times this slack.
+// distance, whose error, of 5 u at most where it is faced, grows as the angle gets lower. It is held between
+// the vertices' distances, and within their box, since the hierarchy looks for hits in boxes alone: its own
+// are larger by four times this slack.
 static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real distance_)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;

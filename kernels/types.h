@@ -112,11 +112,12 @@ enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
 enum { BVH_WIDTH_LEAST = 4, BVH_WIDTH_LARGEST = 16 };
 enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #ifdef __OPENCL_VERSION__
-#define BVH_WIDTH (LANES < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : LANES)
+#define BVH_WIDTH   (LANES < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : LANES)
+#define BVH_QUARTER (BVH_WIDTH >> 2)
 typedef struct {
-    scalar4 planes[BVH_PLANES * BVH_WIDTH / 4];
-    uint4 first[BVH_WIDTH / 4]; // the child's node or first primitive
-    uint4 what[BVH_WIDTH / 4];  // BVH_NODE or count << 8 | kind
+    scalar4 planes[BVH_PLANES * BVH_QUARTER];
+    uint4 first[BVH_QUARTER]; // the child's node or first primitive
+    uint4 what[BVH_QUARTER];  // BVH_NODE or count << 8 | kind
 } BvhNode;
 #endif
 
