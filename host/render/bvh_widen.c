@@ -104,6 +104,7 @@ static void child_gather(const Widening *widening, const BvhChild *child, unsign
 
 void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
 {
+    if (width < 2 || width > BVH_WIDTH_LARGEST) fault("a node of %u children", width);
     Widening widening = {bvh, memory_allocate(bvh->node_count, sizeof(Costs)), width};
     costs_find(&widening);
     uint32_t *roots = memory_allocate(bvh->node_count, sizeof *roots);
