@@ -9,8 +9,9 @@
 // between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
 // here adds a few u of the coordinates. Boxes count as larger by all of that, the `slack`.
 //
-// Products are bounded: 1 / direction is held below 2^120 (2^1000) over the coordinates, where the ray does
-// not move along that axis by as much as the slack, however far it goes.
+// Products are bounded: 1 / direction is held below 2^120 (2^1000) over the coordinates, where a ray does not
+// move along that axis by as much as the slack on its way through the scene. That holds while the direction's
+// largest component is well above 2^-100 (2^-950) of the coordinates.
 #ifndef BVH_H
 #define BVH_H
 

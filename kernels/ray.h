@@ -79,7 +79,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     ray.far = far;
     ray.travelled = (real)(0);
     ray.active = active & (ray.squared > (real)(0));
-    // 0 in lanes without a ray, which then no sphere asks for a closer look
+    // 0 in lanes without a ray: then of spheres only one around the origin looks closer at them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
     if (HAS_BOXES || HAS_TRIANGLES || HAS_BVH)

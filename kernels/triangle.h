@@ -82,9 +82,8 @@ static inline real roots_hold(Roots roots, real t)
 }
 
 // A triangle seen edge-on would else be hit far outside itself: the edge functions do not know of the
-// distance, whose error, of 5 u at most where it is faced, grows as the angle gets lower. It is held between
-// the vertices' distances, and within their box, since the hierarchy looks for hits in boxes alone: its own
-// are larger by four times this slack.
+// distance, whose error grows as the angle gets lower. It is held between the vertices' distances, and within
+// their box, since the hierarchy looks for hits in boxes alone: its own are larger by four times this slack.
 static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real distance_)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
@@ -116,10 +115,16 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     // in the triangle's own plane any place of it will do
     real otherwise = vector_dot(edges.a, ray->along);
     real distance_ = triangle_plane_distance(triangle, ray, otherwise);
-    real facing = vector_dot(triangle_normal(triangle), ray->direction);
-    mask edge_on = hit & (facing * facing < (real)(0.1875f) * ray->squared);
-    if (lanes_any(edge_on))
-        distance_ = lanes_select(edge_on, triangle_distance_held(&edges, ray, distance_), distance_);
+    mask held = hit;
+    // At other angles, of a sine of 1/4 or more since the normal's square is 3 at most, the distance is
+    // within 5 u over that sine, a third of what boxes allow. A needle's normal may be worse than that in
+    // double.
+    if (!IS_DOUBLE) {
+        real facing = vector_dot(triangle_normal(triangle), ray->direction);
+        held = held & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
+    }
+    if (lanes_any(held))
+        distance_ = lanes_select(held, triangle_distance_held(&edges, ray, distance_), distance_);
     *t = distance_;
     return hit & (*t > ray->near);
 }

@@ -71,7 +71,7 @@ typedef struct {
 } Torus;
 
 typedef struct {
-    scalar4 a, b, c; // w: x, y and z of the normal, at any length, 0 where there is none
+    scalar4 a, b, c; // w: x, y and z of the normal, whose largest is 1/2 to 1, or all 0
     uint4 id; // y: 1 + the index of its TriangleNormals, 0 where it is flat; z: 1 + that of its TriangleUvs,
               // or 0
 } Triangle;

@@ -251,8 +251,20 @@ static void test_trim(void **state)
     assert_false(loads("key c"));
     assert_true(loads("key d"));
     assert_true(loads("key a"));
+    static const char *const others[] = {"notes", "0123456789abcdef.txt", "0123456789abcdef.bin.old"};
+    static const char left_over[] = ".0123456789abcdef.bin.a1b2c3";
+    int cache = open(path, O_RDONLY | O_DIRECTORY);
+    for (size_t i = 0; i < 3; i++)
+        close(openat(cache, others[i], O_CREAT | O_WRONLY, 0600));
+    close(openat(cache, left_over, O_CREAT | O_WRONLY, 0600));
     cache_trim(path, 0);
     assert_false(loads("key a"));
+    assert_int_equal(faccessat(cache, left_over, F_OK, 0), -1);
+    for (size_t i = 0; i < 3; i++) {
+        assert_int_equal(faccessat(cache, others[i], F_OK, 0), 0);
+        assert_int_equal(unlinkat(cache, others[i], 0), 0);
+    }
+    close(cache);
     cache_trim("/nowhere/at/all", 0);
     free(path);
 }

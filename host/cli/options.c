@@ -215,5 +215,6 @@ bool device_open(OpenDevice *open, const char *wish)
 
 void device_close(OpenDevice *open)
 {
+    open->compute = (Compute){0};
     device_list_close(&open->devices);
 }

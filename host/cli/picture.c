@@ -215,7 +215,8 @@ static bool band_write(Picture *picture)
     MessageList *messages = picture->messages;
     size_t pixels = (size_t)picture->settings->region_width * band->row_count;
     const void *colors = band->colors;
-    if (renderer_report(picture->renderer)->wide && image_format_of(picture->options->path) != IMAGE_NPY)
+    if (colors && renderer_report(picture->renderer)->wide &&
+        image_format_of(picture->options->path) != IMAGE_NPY)
         colors = narrowed(picture, colors, 3 * pixels);
     if (!image_writer_rows(picture->color, colors, band->row_count, messages)) return false;
 
@@ -278,7 +279,8 @@ bool picture_write(Picture *picture, const Band *band, MessageList *messages)
     if (!band_written(picture)) return false;
     picture->messages = messages;
     band_keep(picture, band);
-    picture->writing = pthread_create(&picture->thread, NULL, band_thread, picture) == 0;
+    picture->writing =
+        !picture->options->apart && pthread_create(&picture->thread, NULL, band_thread, picture) == 0;
     if (picture->writing) return true; // or told with the next band
     band_thread(picture);
     return !picture->failed;

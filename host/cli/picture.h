@@ -14,6 +14,7 @@ typedef struct {
     unsigned aovs; // a bit for each of picture_aov_names
     Transfer transfer;
     unsigned bits;
+    bool apart; // a band is encoded before the next one is rendered: neither takes the other's time
 } PictureOptions;
 
 typedef struct Picture Picture;
@@ -26,8 +27,8 @@ unsigned picture_renderer_aovs(const PictureOptions *options);
 // Files are opened with the first band, when the kernels' hash is known.
 Picture *picture_open(const PictureOptions *options, const char *scene_path, const Scene *scene,
                       const RenderSettings *settings, const Renderer *renderer, const Device *device);
-// Encodes a copy of the band while the caller goes on; the messages are the picture's until it is committed
-// or abandoned. False: this band could not be written, or an earlier one.
+// Encodes a copy of the band while the caller goes on, unless it is to be done apart; the messages are the
+// picture's until it is committed or abandoned. False: this band could not be written, or an earlier one.
 bool picture_write(Picture *picture, const Band *band, MessageList *messages);
 // Puts all files in place; frees the picture. False with a message if one could not be. *seconds: spent on
 // encoding and writing, beside other work or not.

@@ -202,6 +202,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
     if (!options->has_transfer)
         options->picture.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    options->picture.apart = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     if (!renderer) {

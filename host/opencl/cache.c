@@ -105,11 +105,24 @@ static int file_compare(const void *a, const void *b)
     return first->tv_nsec < second->tv_nsec ? -1 : first->tv_nsec > second->tv_nsec;
 }
 
-// Also what a process that was killed left of an entry.
+// An entry, or what a process that was killed while it wrote one left of it: whatever else lies in the folder
+// is not ours.
+static bool is_entry_name(const char *name)
+{
+    static const char ending[] = ".bin";
+    bool temporary = *name == '.';
+    name += temporary;
+    if (strspn(name, "0123456789abcdef") != 16 || strncmp(name + 16, ending, strlen(ending)) != 0)
+        return false;
+    const char *rest = name + 16 + strlen(ending);
+    return temporary ? *rest == '.' && strlen(rest) == strlen(".XXXXXX") : *rest == '\0';
+}
+
 static void files_list(CacheFiles *files, DIR *folder)
 {
     for (const struct dirent *item; (item = readdir(folder)) != NULL;) {
         struct stat status;
+        if (!is_entry_name(item->d_name)) continue;
         if (fstatat(dirfd(folder), item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
         if (!S_ISREG(status.st_mode)) continue;
         uint64_t size = (uint64_t)status.st_size;

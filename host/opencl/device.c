@@ -107,7 +107,7 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
 // faster here than the one for all sizes, which its binaries need in any case: without this, it makes both.
 static void pocl_compile_once(void)
 {
-    setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", true);
+    setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", false);
 }
 
 void device_list_open(DeviceList *list)

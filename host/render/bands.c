@@ -38,7 +38,8 @@ static TileShape tile_shape(uint32_t lanes)
 // cache holds.
 static size_t group_side(const Renderer *renderer)
 {
-    return renderer->report.lanes == 1 ? 8 : 1;
+    bool on_cpu = renderer->compute->device->type & CL_DEVICE_TYPE_CPU;
+    return renderer->report.lanes > 1 && on_cpu ? 1 : 8;
 }
 
 // The buffers that a band is rendered into, sized for `rows`.

@@ -2,7 +2,6 @@
 
 #include "host/base/fault.h"
 #include "host/render/bvh_widen.h"
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,9 +11,6 @@ static Vector3 circle_reach(Vector3 unit)
 {
     return (Vector3){hypot(unit.y, unit.z), hypot(unit.x, unit.z), hypot(unit.x, unit.y)};
 }
-
-// Where no ray comes, in double and in float.
-static const double nowhere = FLT_MAX;
 
 static Vector3 vector_of(scalar4 v)
 {
@@ -175,16 +171,42 @@ static void array_reorder(FlatScene *flat, size_t kind, const Bvh *bvh, const Bo
         entries[flat_id(array, i)].kind_index_material.y = (uint32_t)i;
 }
 
-static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
-                       unsigned width, double *planes)
+static BvhBox bvh_bounds(const Bvh *bvh)
 {
-    uint32_t *first = (uint32_t *)(planes + BVH_PLANES * width), *what = first + width;
+    BvhBox bounds;
+    const BvhBox *left = &bvh->nodes[0].children[0].box, *right = &bvh->nodes[0].children[1].box;
+    for (int axis = 0; axis < 3; axis++) { // an empty child's box is inside out, and adds nothing
+        bounds.low[axis] = fmin(left->low[axis], right->low[axis]);
+        bounds.high[axis] = fmax(left->high[axis], right->high[axis]);
+    }
+    return bounds;
+}
+
+// Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
+// primitives there: the rest of an empty place is 0.
+static BvhBox empty_place(const BvhBox *bounds)
+{
+    BvhBox box;
+    for (int axis = 0; axis < 3; axis++) {
+        double extent = bounds->high[axis] - bounds->low[axis];
+        box.low[axis] = bounds->high[axis] + extent;
+        box.high[axis] = bounds->low[axis] - extent;
+    }
+    return box;
+}
+
+static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
+                       const BvhBox *empty, unsigned width, void *node)
+{
+    double *planes = node;
+    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *what = first + width;
     uint32_t next_node = wide->first_node;
     for (unsigned i = 0; i < width; i++) {
         const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
+        const BvhBox *box = child ? &child->box : empty;
         for (unsigned axis = 0; axis < 3; axis++) {
-            planes[(BVH_LOW + axis) * width + i] = child ? child->box.low[axis] : nowhere;
-            planes[(BVH_HIGH + axis) * width + i] = child ? child->box.high[axis] : -nowhere;
+            planes[(BVH_LOW + axis) * width + i] = box->low[axis];
+            planes[(BVH_HIGH + axis) * width + i] = box->high[axis];
         }
         if (child && child->count > 0) {
             first[i] = order[child->first];
@@ -204,8 +226,9 @@ static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded,
     free(nodes->items);
     *nodes = flat_nodes_make(wide.node_count, width);
     uint32_t *order = order_in_kinds(bvh, bounded);
+    const BvhBox bounds = bvh_bounds(bvh), empty = empty_place(&bounds);
     for (size_t i = 0; i < wide.node_count; i++)
-        node_write(&wide.nodes[i], bvh, bounded, order, width, flat_array_at(nodes, i));
+        node_write(&wide.nodes[i], bvh, bounded, order, &empty, width, flat_array_at(nodes, i));
     free(order);
     bvh_wide_free(&wide);
 }
@@ -217,11 +240,10 @@ static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *boun
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)bounded->kind_counts[kind];
     memcpy(header->bounded_counts, counts, sizeof counts);
-    const BvhBox *left = &bvh->nodes[0].children[0].box, *right = &bvh->nodes[0].children[1].box;
-    double low[3], high[3], center[3], reach = 0;
-    for (int axis = 0; axis < 3; axis++) { // an empty child's box is inside out, and adds nothing
-        low[axis] = fmin(left->low[axis], right->low[axis]);
-        high[axis] = fmax(left->high[axis], right->high[axis]);
+    const BvhBox bounds = bvh_bounds(bvh);
+    const double *low = bounds.low, *high = bounds.high;
+    double center[3], reach = 0;
+    for (int axis = 0; axis < 3; axis++) {
         center[axis] = 0.5 * low[axis] + 0.5 * high[axis];
         reach += 0.5 * high[axis] - 0.5 * low[axis];
     }
