@@ -251,6 +251,8 @@ int command_render(int argument_count, char **arguments)
         double parse_seconds = clock_seconds() - start;
         if (device_open(&open, options.common.device)) {
             status = scene_render(&options, &scene, &open.compute, parse_seconds);
+            // what was under way is let go in order
+            if (status == EXIT_INTERRUPTED) compute_close(&open.compute);
             device_close(&open);
         }
     }
