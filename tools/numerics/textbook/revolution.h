@@ -41,7 +41,7 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     real b = vector_dot(f, ray->direction) - start * rise - radius * growth;
     real c = vector_dot(f, f) - start * start - radius * radius;
     real discriminant = b * b - a * c;
-    mask hit = ray->active & (discriminant >= (real)(0));
+    mask hit = RAY_ACTIVE(ray) & (discriminant >= (real)(0));
     Roots roots = quadratic_roots((real)(1) / a, b, discriminant);
     bool finite = shape->id.y & REVOLUTION_FINITE, capped = shape->id.y & REVOLUTION_CAPPED;
 
@@ -61,7 +61,7 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
             real to_end = (height - start) / rise;
             Vector p = vector_fma(ray->direction, to_end, f);
             real squared = vector_dot(p, p) - height * height;
-            nearest_take(&nearest, ray, to_end, ray->active & (squared <= end_radius * end_radius));
+            nearest_take(&nearest, ray, to_end, RAY_ACTIVE(ray) & (squared <= end_radius * end_radius));
         }
     }
     *t = nearest.t;

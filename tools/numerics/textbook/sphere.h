@@ -11,7 +11,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real b = vector_dot(f, ray->direction);
     real c = vector_dot(f, f) - radius * radius;
     real discriminant = b * b - ray->squared * c;
-    mask hit = ray->active & (discriminant >= (real)(0));
+    mask hit = RAY_ACTIVE(ray) & (discriminant >= (real)(0));
     if (!lanes_any(hit)) return hit;
     Roots roots = quadratic_roots(ray->inverse_squared, b, discriminant);
     *t = sphere->id.y & ONLY_INSIDE ? roots.far : ray_first(ray, roots.near, roots.far);

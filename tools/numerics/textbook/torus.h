@@ -67,7 +67,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     real y = cubic_root((real)(-0.5f) * p, -r, (real)(0.5f) * r * p - (real)(1.0f / 8) * q * q);
     real u = y * y - r, v = (real)(2) * y - p;
     mask splits =
-        ray->active & (textbook_is_zero(u) | (u > (real)(0))) & (textbook_is_zero(v) | (v > (real)(0)));
+        RAY_ACTIVE(ray) & (textbook_is_zero(u) | (u > (real)(0))) & (textbook_is_zero(v) | (v > (real)(0)));
     u = sqrt(real_max(u, (real)(0)));
     v = sqrt(real_max(v, (real)(0)));
     v = lanes_select(q < (real)(0), -v, v);

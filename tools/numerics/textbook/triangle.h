@@ -30,7 +30,7 @@ static inline mask triangle_crossing(const Triangle *triangle, const Ray *ray, r
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
     TriangleWeights weights;
-    mask hit = ray->active & triangle_crossing(triangle, ray, t, &weights);
+    mask hit = RAY_ACTIVE(ray) & triangle_crossing(triangle, ray, t, &weights);
     return hit & (*t > ray->near);
 }
 
