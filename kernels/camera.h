@@ -19,7 +19,9 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
     Vector direction = vector_fma(vector_of(header->right), x,
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
     const Vector eye = {(real)(0), (real)(0), (real)(0)};
-    return ray_make_unit(eye, vector_normalize(direction), active);
+    Ray ray = ray_make_unit(eye, vector_normalize(direction), active);
+    ray_take_apex(&ray, APEX_EYE);
+    return ray;
 }
 
 #endif

@@ -13,6 +13,9 @@ typedef struct {
     real near, far; // hits lie strictly between
     mask active;    // the lanes that carry a ray at all
     real travelled; // from the eye to the origin, for pictures on surfaces
+    // APEX_…: all lanes' lines pass through one point, within u |direction|
+    uint apex;
+    real apex_slack;
     // for boxes, triangles and the hierarchy: 1 / direction; huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
@@ -78,6 +81,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     ray.near = near;
     ray.far = far;
     ray.travelled = (real)(0);
+    ray.apex = APEX_NONE;
     ray.active = active & (ray.squared > (real)(0));
     // 0 in lanes without a ray: then of spheres only one around the origin looks closer at them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
@@ -102,6 +106,27 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
     if (HAS_TRIANGLES) ray.along = vector_scale(direction, ray.inverse_squared);
     return ray;
+}
+
+static inline void ray_take_apex(Ray *ray, uint apex)
+{
+    ray->apex = apex;
+    // lanes without a ray miss all
+    ray->apex_slack = lanes_select(ray->active, (real)(128 * UNIT_ROUNDOFF) * (ray->squared * ray->squared),
+                                   (real)(-LARGEST));
+}
+
+// The lines that certainly miss a ball, for rays with an apex. A line along d through a point misses a ball
+// around v, seen from there, if (v . d)^2 < p d^2 for the point's power p = v^2 - r^2. The ball counts as
+// larger by 64 u (|v| + |d|): by what a test of the shape in it may be off, by roundings here, and by the
+// line's own way past the apex. That is less than 256 u v^2, which p has been lowered by, and 128 u d^2.
+static inline mask ray_misses_ball(const Ray *ray, global const Ball *ball)
+{
+    global const scalar *center_power = (global const scalar *)ball;
+    real along =
+        fma((real)(center_power[0]), ray->direction.x,
+            fma((real)(center_power[1]), ray->direction.y, (real)(center_power[2]) * ray->direction.z));
+    return fma(along, along, ray->apex_slack) < ray->squared * (real)(center_power[3]);
 }
 
 // The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies

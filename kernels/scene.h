@@ -18,6 +18,7 @@ typedef struct {
     global const TriangleNormals *triangle_normals;
     global const TriangleUvs *triangle_uvs;
     global const BvhNode *nodes;
+    global const Ball *balls;
     global const ObjectEntry *objects;
     global const Material *materials;
     global const Light *lights;
@@ -32,14 +33,14 @@ typedef struct {
 #define SCENE_ARGUMENTS                                                                                      \
     global const SceneHeader *header,                                                                        \
         SHAPE_LIST(SCENE_SHAPE_ARGUMENT) global const TriangleNormals *triangle_normals,                     \
-        global const TriangleUvs *triangle_uvs, global const BvhNode *nodes,                                 \
+        global const TriangleUvs *triangle_uvs, global const BvhNode *nodes, global const Ball *balls,       \
         global const ObjectEntry *objects, global const Material *materials, global const Light *lights,     \
         global const TextureLevel *texture_levels, global const Texel *texels
 #define SCENE_SHAPE_VALUE(feature, Type, name, names) names,
 #define SCENE_FROM_ARGUMENTS                                                                                 \
     {                                                                                                        \
-        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, nodes, objects, materials,     \
-            lights, texture_levels, texels, 0                                                                \
+        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, nodes, balls, objects,         \
+            materials, lights, texture_levels, texels, 0                                                     \
     }
 
 // Adds the lanes to a count, in a counting build only.
@@ -112,13 +113,31 @@ static inline void search_take(Search *search, const Scene *scene, mask found, r
     hit->object = lanes_select(closer, object, hit->object);
 }
 
-// Tests shapes first .. last - 1 of one kind.
+// The ray's row of balls, 0 where it has none.
+static inline global const Ball *ray_balls(const Scene *scene, const Ray *ray)
+{
+    if (ray->apex == APEX_NONE) return 0;
+    return scene->balls + (size_t)(ray->apex - APEX_EYE) * scene->header->balls.x;
+}
+
+// How many of the first balls, up to `count`, all lanes' lines miss.
+static inline uint balls_missed(global const Ball *balls, uint count, const Ray *ray)
+{
+    uint missed = 0;
+    while (missed < count && lanes_all(ray_misses_ball(ray, &balls[missed])))
+        missed++;
+    return missed;
+}
+
+// Tests shapes first .. last - 1 of one kind; `balls`, where there are any, are theirs.
 static inline void search_shapes(Search *search, const Scene *scene, const Ray *ray, uint kind, uint first,
-                                 uint last)
+                                 uint last, global const Ball *balls)
 {
 #define SEARCH_SHAPES(feature, Type, name, names)                                                            \
     if (HAS_##feature && kind == KIND_##feature) {                                                           \
         for (uint i = first; i < last; i++) {                                                                \
+            if (balls) i += balls_missed(balls + (i - first), last - i, ray);                                \
+            if (i == last) break;                                                                            \
             Type shape = scene->names[i];                                                                    \
             real t = ray->far;                                                                               \
             mask found = name##_hit(&shape, ray, &t);                                                        \
@@ -196,7 +215,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
         if (next.what == BVH_NODE) {
             count = node_open(scene, next.first, beam, rays, ray, limit, beam_limit, waiting, count);
         } else {
-            search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8));
+            search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8), 0);
             if (!lanes_any(search->open)) return;
             limit = search_limit(search);
             beam_limit = lanes_largest(search->open, limit);
@@ -208,6 +227,8 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 static inline void search_hierarchy(Search *search, const Scene *scene, const Ray *ray)
 {
     global const SceneHeader *header = scene->header;
+    global const Ball *balls = ray_balls(scene, ray);
+    if (balls && balls_missed(balls, 1, ray)) return;
     BoxRays rays = box_rays(ray, header->bounds);
     mask looking = box_rays_meet(&rays, ray, header->bounds_low, header->bounds_high, search_limit(search));
     if (!lanes_any(looking)) return;
@@ -227,16 +248,27 @@ static inline void search_hierarchy(Search *search, const Scene *scene, const Ra
     } while (lanes_any(looking));
 }
 
+// Tests what does not hang in the hierarchy.
+static inline void search_plainly(Search *search, const Scene *scene, const Ray *ray)
+{
+    global const uint *counts = (global const uint *)scene->header->counts;
+    global const uint *bounded_counts = (global const uint *)scene->header->bounded_counts;
+    global const Ball *balls = ray_balls(scene, ray);
+    if (balls) balls++; // the hierarchy's
+#define SEARCH_PLAINLY(feature, Type, name, names)                                                           \
+    if (HAS_##feature && lanes_any(search->open)) {                                                          \
+        uint first = bounded_counts[KIND_##feature], last = counts[KIND_##feature];                          \
+        bool round = balls && KIND_##feature != KIND_PLANES;                                                 \
+        search_shapes(search, scene, ray, KIND_##feature, first, last, round ? balls : 0);                   \
+        if (round) balls += last - first;                                                                    \
+    }
+    SHAPE_LIST(SEARCH_PLAINLY)
+}
+
 static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool any)
 {
     Search search = {{ray->far, (integer)(-1)}, ray->active, any, (integer)(0)};
-    global const uint *counts = (global const uint *)scene->header->counts;
-    global const uint *bounded_counts = (global const uint *)scene->header->bounded_counts;
-#define SEARCH_PLAINLY(feature, Type, name, names)                                                           \
-    if (HAS_##feature && lanes_any(search.open))                                                             \
-        search_shapes(&search, scene, ray, KIND_##feature, bounded_counts[KIND_##feature],                   \
-                      counts[KIND_##feature]);
-    SHAPE_LIST(SEARCH_PLAINLY)
+    search_plainly(&search, scene, ray);
     if (HAS_BVH) search_hierarchy(&search, scene, ray);
     return search;
 }

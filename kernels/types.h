@@ -123,6 +123,19 @@ typedef struct {
 
 enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 
+// A ball around something, as seen from an apex: a point that all rays of a packet pass through, the eye or a
+// light at a place. Each apex has a row of SceneHeader's balls.x of them: that of all that hangs in the
+// hierarchy, then of each shape that does not, kind by kind; planes have none.
+typedef struct {
+    scalar4
+        center_power; // xyz: from the apex to the center; w: the apex's power, |xyz|^2 - radius^2, lowered
+                      // by what roundings come to (kernels/ray.h), or -BALL_LARGEST around the unbounded
+} Ball;
+
+#define BALL_LARGEST 1e37f
+
+enum { APEX_NONE, APEX_EYE, APEX_FIRST_LIGHT };
+
 // Where an object's id leads.
 typedef struct {
     uint4 kind_index_material; // x: KIND_…, y: index in that shape's array, z: index of the material
@@ -189,6 +202,7 @@ typedef struct {
     scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
     uint4 picture;                   // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: of a ray, at most
+    uint4 balls;                     // x: of each apex
     uint4 counts[2];                 // of each KIND_…, in its order
     uint4 bounded_counts[2];         // as many of them, from the first, hang in the hierarchy
 } SceneHeader;

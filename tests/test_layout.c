@@ -3,6 +3,7 @@
 // narrowing.
 #include "host/base/fault.h"
 #include "host/opencl/compose.h"
+#include "host/render/balls.h"
 #include "host/render/hierarchy.h"
 #include "host/render/textures.h"
 #include "tests/probe.h"
@@ -34,6 +35,7 @@ typedef struct {
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, balls)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[1])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounded_counts[0])           \
@@ -81,6 +83,7 @@ typedef struct {
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, first[0])                         \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, what[0])                          \
+    REALS(FLAT_BALLS, Ball, Ball, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
@@ -139,6 +142,7 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
     assert_true(textures_hang(&flat, &scene, &settings, &messages));
     message_list_free(&messages);
     hierarchy_hang(&flat, 1);
+    balls_lay(&flat, wide);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         assert_true(flat.arrays[kind].count > 0);
         layouts[kind] = flat.arrays[kind].layout;

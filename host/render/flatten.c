@@ -8,7 +8,7 @@
 
 // clang-format off
 static const FlatLayout layouts[FLAT_COUNT] = {
-    [FLAT_HEADER] = {sizeof(SceneHeader), offsetof(SceneHeader, picture) / sizeof(scalar4), 6},
+    [FLAT_HEADER] = {sizeof(SceneHeader), offsetof(SceneHeader, picture) / sizeof(scalar4), 7},
 #define SHAPE_LAYOUT(feature, Type, name, names) \
     [FLAT_FIRST_SHAPE + KIND_##feature] = {sizeof(Type), offsetof(Type, id) / sizeof(scalar4), 1},
     SHAPE_LIST(SHAPE_LAYOUT)
@@ -17,6 +17,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     // as the widest; hierarchy.c makes them as wide as the kernel wants them
     [FLAT_NODES] = {BVH_WIDTH_LARGEST / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
+    [FLAT_BALLS] = {sizeof(Ball), sizeof(Ball) / sizeof(scalar4), 0},
     [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
     [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 2},
     [FLAT_LIGHTS] = {sizeof(FlatLight), offsetof(FlatLight, kind) / sizeof(scalar4), 1},

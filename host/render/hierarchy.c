@@ -40,9 +40,7 @@ static bool revolution_box(const Revolution *shape, BvhBox *box)
     return true;
 }
 
-// The box of one primitive; false where it has none. A disc's is that of the ball around it: where the ray
-// lies nearly in its plane the kernels know no more about t.
-static bool primitive_box(size_t kind, const void *primitive, BvhBox *box)
+bool primitive_box(size_t kind, const void *primitive, BvhBox *box)
 {
     *box = (BvhBox){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     const Vector3 nothing = {0, 0, 0};

@@ -1,6 +1,7 @@
 // The flat scene's bounded primitives hung into a hierarchy.
 #pragma once
 
+#include "host/render/bvh.h"
 #include "host/render/flatten.h"
 
 // Fills FLAT_NODES, orders each shape's array as the leaves have it (unbounded shapes last), and notes in the
@@ -10,3 +11,7 @@ void hierarchy_hang(FlatScene *flat, unsigned lanes);
 
 // How many primitives could hang.
 size_t hierarchy_bounded_count(const FlatScene *flat);
+
+// The box of one primitive; false where it has none. A disc's is that of the ball around it: where the ray
+// lies nearly in its plane the kernels know no more about t.
+bool primitive_box(size_t kind, const void *primitive, BvhBox *box);

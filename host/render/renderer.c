@@ -1,6 +1,7 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
+#include "host/render/balls.h"
 #include "host/render/hierarchy.h"
 #include "host/render/renderer_state.h"
 #include "host/render/textures.h"
@@ -180,6 +181,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
         report->features |= FEATURE_BVH;
         report->bvh_seconds = clock_seconds() - start;
     }
+    balls_lay(&flat, report->wide);
     if (!device_has_room(&flat, renderer, messages)) {
         flat_scene_free(&flat);
         free(renderer);

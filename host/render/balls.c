@@ -1,0 +1,103 @@
+#include "host/render/balls.h"
+
+#include "host/render/hierarchy.h"
+#include "host/scene/vector.h"
+#include <float.h>
+#include <math.h>
+
+typedef struct {
+    Vector3 center;
+    double radius; // infinite around what is unbounded
+} Sphere3;
+
+static Vector3 vector_of(scalar4 v)
+{
+    return (Vector3){v.x, v.y, v.z};
+}
+
+static Sphere3 box_sphere(const BvhBox *box)
+{
+    Vector3 low = {box->low[0], box->low[1], box->low[2]}, high = {box->high[0], box->high[1], box->high[2]};
+    Vector3 half = vector_scale(vector_subtract(high, low), 0.5);
+    return (Sphere3){vector_add(low, half), vector_length(half)};
+}
+
+static Sphere3 primitive_sphere(size_t kind, const void *primitive)
+{
+    if (kind == KIND_SPHERES) {
+        const Sphere *sphere = primitive;
+        return (Sphere3){vector_of(sphere->center_radius), sphere->center_radius.w};
+    }
+    if (kind == KIND_DISCS) {
+        const Disc *disc = primitive;
+        return (Sphere3){vector_of(disc->center_radius), disc->center_radius.w};
+    }
+    if (kind == KIND_TORI) {
+        const Torus *torus = primitive;
+        return (Sphere3){vector_of(torus->center_major), torus->center_major.w + torus->axis_minor.w};
+    }
+    BvhBox box;
+    if (!primitive_box(kind, primitive, &box)) return (Sphere3){.radius = INFINITY};
+    return box_sphere(&box);
+}
+
+static Ball ball_seen(Sphere3 sphere, Vector3 apex, double roundoff)
+{
+    Vector3 v = vector_subtract(sphere.center, apex);
+    double squared = vector_dot(v, v), power = squared * (1 - 256 * roundoff) - sphere.radius * sphere.radius;
+    if (!(fabs(power) <= BALL_LARGEST && squared <= BALL_LARGEST)) return (Ball){{0, 0, 0, -BALL_LARGEST}};
+    return (Ball){{v.x, v.y, v.z, power}};
+}
+
+// Where nothing hangs all rays miss.
+static Ball hierarchy_ball(const SceneHeader *header, Vector3 apex, double roundoff)
+{
+    const uint32_t *hanging = (const uint32_t *)header->bounded_counts;
+    uint32_t count = 0;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        count += hanging[kind];
+    if (count == 0) return (Ball){{0, 0, 0, BALL_LARGEST}};
+    scalar4 low = header->bounds_low, high = header->bounds_high;
+    const BvhBox bounds = {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+    return ball_seen(box_sphere(&bounds), apex, roundoff);
+}
+
+// How many of a kind have balls, and where they begin.
+typedef struct {
+    size_t first, count;
+} Plain;
+
+static Plain plain_of(const FlatScene *flat, size_t kind)
+{
+    const SceneHeader *header = flat->arrays[FLAT_HEADER].items;
+    size_t first = ((const uint32_t *)header->bounded_counts)[kind];
+    return (Plain){first, kind == KIND_PLANES ? 0 : flat->arrays[FLAT_FIRST_SHAPE + kind].count - first};
+}
+
+static void row_lay(const FlatScene *flat, Vector3 apex, double roundoff, Ball *row)
+{
+    *row++ = hierarchy_ball(flat->arrays[FLAT_HEADER].items, apex, roundoff);
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        Plain plain = plain_of(flat, kind);
+        for (size_t i = 0; i < plain.count; i++) {
+            const void *primitive = flat_array_at(&flat->arrays[FLAT_FIRST_SHAPE + kind], plain.first + i);
+            *row++ = ball_seen(primitive_sphere(kind, primitive), apex, roundoff);
+        }
+    }
+}
+
+void balls_lay(FlatScene *flat, bool wide)
+{
+    double roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
+    SceneHeader *header = flat->arrays[FLAT_HEADER].items;
+    const FlatArray *lights = &flat->arrays[FLAT_LIGHTS];
+    size_t count = 1;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        count += plain_of(flat, kind).count;
+    header->balls.x = (uint32_t)count;
+    flat->arrays[FLAT_BALLS] = flat_array_make(FLAT_BALLS, count * (1 + lights->count));
+    Ball *row = flat->arrays[FLAT_BALLS].items;
+    row_lay(flat, (Vector3){0, 0, 0}, roundoff, row);
+    for (size_t i = 0; i < lights->count; i++)
+        row_lay(flat, vector_of(((const FlatLight *)lights->items)[i].position), roundoff, row += count);
+}
