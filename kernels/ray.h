@@ -16,7 +16,7 @@ typedef struct {
     // APEX_…: all lanes' lines pass through one point, within u |direction|
     uint apex;
     real apex_slack;
-    // for boxes, triangles and the hierarchy: 1 / direction; huge where the component is 0
+    // by ray_make_frame: 1 / direction, huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
     // along it, whose product with a point seen from the origin is the point's t
@@ -86,15 +86,18 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     // 0 in lanes without a ray: then of spheres only one around the origin looks closer at them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
-    if (HAS_BOXES || HAS_TRIANGLES || HAS_BVH)
-        ray.inverse = (Vector){real_inverse_or_huge(direction.x), real_inverse_or_huge(direction.y),
-                               real_inverse_or_huge(direction.z)};
-    if (HAS_TRIANGLES) {
-        real largest = real_max(real_max(fabs(direction.x), fabs(direction.y)), fabs(direction.z));
-        frame_across(vector_scale(direction, real_inverse_power(largest)), &ray.across_u, &ray.across_v);
-        ray.along = vector_scale(direction, ray.inverse_squared);
-    }
     return ray;
+}
+
+// What boxes, triangles and the hierarchy ask for: only rays that come near one have it.
+static inline void ray_make_frame(Ray *ray)
+{
+    Vector d = ray->direction;
+    ray->inverse = (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
+    if (!HAS_TRIANGLES) return;
+    real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
+    frame_across(vector_scale(d, real_inverse_power(largest)), &ray->across_u, &ray->across_v);
+    ray->along = vector_scale(d, ray->inverse_squared);
 }
 
 // Without an end, along a direction that is unit, or 0: its square is 1 + e with e of a few u, one over that
@@ -104,7 +107,6 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
     if (IS_COMPENSATED) return ray;
     ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
-    if (HAS_TRIANGLES) ray.along = vector_scale(direction, ray.inverse_squared);
     return ray;
 }
 

@@ -224,11 +224,12 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 }
 
 // Rays of one packet mostly run to the same sides; where they do not, those that do go together.
-static inline void search_hierarchy(Search *search, const Scene *scene, const Ray *ray)
+static inline void search_hierarchy(Search *search, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
     global const Ball *balls = ray_balls(scene, ray);
     if (balls && balls_missed(balls, 1, ray)) return;
+    ray_make_frame(ray);
     BoxRays rays = box_rays(ray, header->bounds);
     mask looking = box_rays_meet(&rays, ray, header->bounds_low, header->bounds_high, search_limit(search));
     if (!lanes_any(looking)) return;
@@ -249,23 +250,26 @@ static inline void search_hierarchy(Search *search, const Scene *scene, const Ra
 }
 
 // Tests what does not hang in the hierarchy.
-static inline void search_plainly(Search *search, const Scene *scene, const Ray *ray)
+static inline void search_plainly(Search *search, const Scene *scene, Ray *ray)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
     global const uint *bounded_counts = (global const uint *)scene->header->bounded_counts;
+    uint boxes = HAS_BOXES ? counts[KIND_BOXES] - bounded_counts[KIND_BOXES] : 0;
+    uint triangles = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bounded_counts[KIND_TRIANGLES] : 0;
+    if (boxes + triangles > 0) ray_make_frame(ray);
     global const Ball *balls = ray_balls(scene, ray);
     if (balls) balls++; // the hierarchy's
 #define SEARCH_PLAINLY(feature, Type, name, names)                                                           \
     if (HAS_##feature && lanes_any(search->open)) {                                                          \
         uint first = bounded_counts[KIND_##feature], last = counts[KIND_##feature];                          \
-        bool round = balls && KIND_##feature != KIND_PLANES;                                                 \
-        search_shapes(search, scene, ray, KIND_##feature, first, last, round ? balls : 0);                   \
-        if (round) balls += last - first;                                                                    \
+        bool has_balls = balls && KIND_##feature != KIND_PLANES;                                             \
+        search_shapes(search, scene, ray, KIND_##feature, first, last, has_balls ? balls : 0);               \
+        if (has_balls) balls += last - first;                                                                \
     }
     SHAPE_LIST(SEARCH_PLAINLY)
 }
 
-static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool any)
+static OUT_OF_LINE Search scene_search(const Scene *scene, Ray *ray, bool any)
 {
     Search search = {{ray->far, (integer)(-1)}, ray->active, any, (integer)(0)};
     search_plainly(&search, scene, ray);
@@ -273,7 +277,7 @@ static OUT_OF_LINE Search scene_search(const Scene *scene, const Ray *ray, bool 
     return search;
 }
 
-static inline Hit closest_hit(const Scene *scene, const Ray *ray)
+static inline Hit closest_hit(const Scene *scene, Ray *ray)
 {
     return scene_search(scene, ray, false).hit;
 }
@@ -285,7 +289,7 @@ static inline mask hit_found(const Hit *hit)
 
 // How much light passes along each active ray between near and far: 1 where nothing stands, 0 behind anything
 // opaque. What is transparent passes its transmission, unbent, once for each object.
-static inline real light_passing(const Scene *scene, const Ray *ray)
+static inline real light_passing(const Scene *scene, Ray *ray)
 {
     Search search = scene_search(scene, ray, true);
     const real none = (real)(0), all = (real)(1);
