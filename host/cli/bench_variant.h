@@ -8,7 +8,6 @@ typedef struct {
     const Scene *scene;
     RenderSettings settings;
     Renderer *renderer; // NULL: not opened, or it does not fit the device
-    char *pixels;       // where a run's picture ends up
 } Variant;
 
 // All that comes before the runs: counts the rays and, where asked for, measures the builds. What does not
