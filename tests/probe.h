@@ -1,6 +1,8 @@
 // The renderer as tests use it: one device for the whole program, taken as glint takes its own.
 #pragma once
 
+#include "host/base/fault.h"
+#include "host/opencl/compose.h"
 #include "host/render/renderer.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -43,6 +45,27 @@ static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings 
     message_list_print(&messages, stderr);
     message_list_free(&messages);
     return renderer;
+}
+
+// A program of a test's own kernels, which may include the shipped ones.
+static inline cl_program probe_program(const char *text, const char *prelude)
+{
+    size_t file_count = 0;
+    while (kernel_files[file_count].name)
+        file_count++;
+    EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
+    memcpy(files, kernel_files, file_count * sizeof *files);
+    files[file_count] = (EmbeddedFile){"probe.cl", text};
+    char *composed = kernel_compose(files, "probe.cl", prelude, NULL);
+    if (composed == NULL) fault("a test's kernel cannot be composed");
+    const char *source = composed;
+    cl_int status;
+    cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
+    cl_check(status, "clCreateProgramWithSource");
+    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, "-cl-std=CL1.2", NULL, NULL));
+    free(composed);
+    free(files);
+    return program;
 }
 
 // Closest hits with every feature built in, so that one program serves all scenes. False where the device

@@ -2,7 +2,6 @@
 // members, as the device's compiler has them in float and in double, and their values after the host's
 // narrowing.
 #include "host/base/fault.h"
-#include "host/opencl/compose.h"
 #include "host/render/balls.h"
 #include "host/render/hierarchy.h"
 #include "host/render/textures.h"
@@ -174,26 +173,12 @@ static void kernels_write(Text *text)
 
 static cl_program program_make(bool wide)
 {
-    size_t file_count = 0;
-    while (kernel_files[file_count].name)
-        file_count++;
-    EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
-    memcpy(files, kernel_files, file_count * sizeof *files);
     Text text = {0};
     kernels_write(&text);
-    files[file_count] = (EmbeddedFile){"layout.cl", text_c(&text)};
     const char *prelude =
         wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
-    char *composed = kernel_compose(files, "layout.cl", prelude, NULL);
-    assert_non_null(composed);
-    const char *source = composed;
-    cl_int status;
-    cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
-    cl_check(status, "clCreateProgramWithSource");
-    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, "-cl-std=CL1.2", NULL, NULL));
-    free(composed);
+    cl_program program = probe_program(text_c(&text), prelude);
     text_free(&text);
-    free(files);
     return program;
 }
 

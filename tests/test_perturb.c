@@ -1,7 +1,6 @@
 // At `strict` a device's own quotients and roots, wrong by what the specification allows, are repaired to the
 // correctly rounded ones.
 #include "host/base/array.h"
-#include "host/opencl/compose.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
 #include <float.h>
@@ -25,28 +24,13 @@ static const char kernel_text[] = "#include \"numerics.h\"\n"
 
 static cl_program program_make(uint32_t seed)
 {
-    size_t file_count = 0;
-    while (kernel_files[file_count].name)
-        file_count++;
-    EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
-    memcpy(files, kernel_files, file_count * sizeof *files);
-    files[file_count] = (EmbeddedFile){"repair.cl", kernel_text};
     char prelude[256];
     snprintf(prelude, sizeof prelude,
              "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 1\n#define IS_DOUBLE 0\n"
              "#define REPAIRS_DIVIDE 1\n#define PERTURB 1\n#define PERTURB_SCALE 1\n"
              "#define PERTURB_SEED %uu\n",
              seed);
-    char *composed = kernel_compose(files, "repair.cl", prelude, NULL);
-    assert_non_null(composed);
-    const char *source = composed;
-    cl_int status;
-    cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
-    cl_check(status, "clCreateProgramWithSource");
-    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, "-cl-std=CL1.2", NULL, NULL));
-    free(composed);
-    free(files);
-    return program;
+    return probe_program(kernel_text, prelude);
 }
 
 // Runs the kernel on a and b; what comes back belongs to the caller.
