@@ -116,8 +116,9 @@ static inline void search_take(Search *search, const Scene *scene, mask found, r
 // The ray's row of balls, 0 where it has none.
 static inline global const Ball *ray_balls(const Scene *scene, const Ray *ray)
 {
-    if (ray->apex == APEX_NONE) return 0;
-    return scene->balls + (size_t)(ray->apex - APEX_EYE) * scene->header->balls.x;
+    uint count = scene->header->balls.x;
+    if (ray->apex == APEX_NONE || count == 0) return 0;
+    return scene->balls + (size_t)(ray->apex - APEX_EYE) * count;
 }
 
 // How many of the first balls, up to `count`, all lanes' lines miss.

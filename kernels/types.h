@@ -202,7 +202,7 @@ typedef struct {
     scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
     uint4 picture;                   // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: of a ray, at most
-    uint4 balls;                     // x: of each apex
+    uint4 balls;                     // x: of each apex; 0: there are none
     uint4 counts[2];                 // of each KIND_…, in its order
     uint4 bounded_counts[2];         // as many of them, from the first, hang in the hierarchy
 } SceneHeader;

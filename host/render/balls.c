@@ -86,6 +86,9 @@ static void row_lay(const FlatScene *flat, Vector3 apex, double roundoff, Ball *
     }
 }
 
+// Beyond it the balls would take more memory than what they are around.
+enum { BALLS_LARGEST = 1 << 20 };
+
 void balls_lay(FlatScene *flat, bool wide)
 {
     double roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
@@ -94,6 +97,10 @@ void balls_lay(FlatScene *flat, bool wide)
     size_t count = 1;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         count += plain_of(flat, kind).count;
+    if (count > BALLS_LARGEST / (1 + lights->count)) {
+        flat->arrays[FLAT_BALLS] = flat_array_make(FLAT_BALLS, 1); // a kernel's argument all the same
+        return;
+    }
     header->balls.x = (uint32_t)count;
     flat->arrays[FLAT_BALLS] = flat_array_make(FLAT_BALLS, count * (1 + lights->count));
     Ball *row = flat->arrays[FLAT_BALLS].items;
