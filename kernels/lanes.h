@@ -196,11 +196,27 @@ static inline scalar_integer lanes_smallest(integer value)
 }
 #endif
 
+// Where clang names the one instruction of x86 that takes a mask to its bits; what stands in for it below is
+// some ten.
+#if defined(__x86_64__) && defined(__has_builtin)
+#if LANES == 16 && !IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
+#define MASK_BITS __builtin_ia32_cvtd2mask512
+#elif LANES == 8 && IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtq2mask512)
+#define MASK_BITS __builtin_ia32_cvtq2mask512
+#elif LANES == 8 && !IS_DOUBLE && defined(__AVX__) && __has_builtin(__builtin_ia32_movmskps256)
+#define MASK_BITS(condition) __builtin_ia32_movmskps256(real_from_bits(condition))
+#elif LANES == 4 && IS_DOUBLE && defined(__AVX__) && __has_builtin(__builtin_ia32_movmskpd256)
+#define MASK_BITS(condition) __builtin_ia32_movmskpd256(real_from_bits(condition))
+#endif
+#endif
+
 // The mask's lanes as bits, the first lane's lowest.
 static inline uint lanes_bits(mask condition)
 {
 #if LANES == 1
     return condition != 0;
+#elif defined(MASK_BITS)
+    return (uint)MASK_BITS(condition);
 #elif REDUCES_LANES
     return (uint)__builtin_reduce_or(lanes_select(condition, LANE_BIT, (integer)(0)));
 #else
