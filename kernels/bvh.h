@@ -65,12 +65,12 @@ static inline mask box_rays_meet(const BoxRays *rays, const Ray *ray, scalar4 lo
            real_min(real_min(x.leave, y.leave), real_min(z.leave, limit));
 }
 
-// What rays that all run to the same side have in common along one axis. No ray is at a plane at p before the
-// smaller of p * least + near_least and p * most + near_most, and none after the larger of p * least +
-// far_least and p * most + far_most.
+// What rays that all run to the same side have in common along one axis. None is at a plane at p ahead of
+// them before p * least + to_near, or after p * most + to_far. For planes behind them it would be the other
+// way round, but both are below 0 there, where no ray looks.
 typedef struct {
     scalar least, most; // 1 / direction
-    scalar near_least, near_most, far_least, far_most;
+    scalar to_near, to_far;
     uint near, far; // which of a box's planes is the near one, and which the far one
 } BeamAxis;
 
@@ -92,17 +92,15 @@ static inline void beam_axis_gather(Leasts *leasts, uint axis, mask members, rea
     leasts->all[BEAM_END + axis] = lanes_select(members, fma(origin, side, -slack), none);
 }
 
-static inline BeamAxis beam_axis(const Leasts *leasts, uint axis, bool negative)
+static inline BeamAxis beam_axis(const Leasts *leasts, uint axis, bool negative, scalar everywhere)
 {
     scalar least = leasts->each[BEAM_LEAST + axis], most = -leasts->each[BEAM_MOST + axis];
     scalar start = leasts->each[BEAM_START + axis], end = leasts->each[BEAM_END + axis];
     const scalar side = negative ? -1 : 1;
     return (BeamAxis){side * least,
                       side * most,
-                      start * least,
-                      start * most,
-                      -end * least,
-                      -end * most,
+                      start * least - everywhere,
+                      everywhere - end * most,
                       axis + (negative ? BVH_HIGH : BVH_LOW),
                       axis + (negative ? BVH_LOW : BVH_HIGH)};
 }
@@ -119,10 +117,12 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
         leasts.all[i] = lanes_select(members, -limit, (real)(LARGEST));
     leasts_find(&leasts);
     Beam beam;
-    beam.x = beam_axis(&leasts, 0, signs & 1);
-    beam.y = beam_axis(&leasts, 1, signs & 2);
-    beam.z = beam_axis(&leasts, 2, signs & 4);
     beam.near = leasts.each[BEAM_NEAR];
+    // where one does look there, the beam is all of space, unless it is a single ray
+    const scalar everywhere = LANES > 1 && beam.near < 0 ? LARGEST / 2 : 0;
+    beam.x = beam_axis(&leasts, 0, signs & 1, everywhere);
+    beam.y = beam_axis(&leasts, 1, signs & 2, everywhere);
+    beam.z = beam_axis(&leasts, 2, signs & 4, everywhere);
     beam.limit = -leasts.each[BEAM_LIMIT];
     beam.to_near = vector_subtract(rays->to_plane, rays->around);
     beam.to_far = vector_add(rays->to_plane, rays->around);
@@ -131,16 +131,12 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
 
 static inline real beam_axis_enter(const BeamAxis *axis, global const scalar *boxes)
 {
-    real plane = real_load(boxes + axis->near * BVH_WIDTH);
-    return real_min(fma(plane, (real)(axis->least), (real)(axis->near_least)),
-                    fma(plane, (real)(axis->most), (real)(axis->near_most)));
+    return fma(real_load(boxes + axis->near * BVH_WIDTH), (real)(axis->least), (real)(axis->to_near));
 }
 
 static inline real beam_axis_leave(const BeamAxis *axis, global const scalar *boxes)
 {
-    real plane = real_load(boxes + axis->far * BVH_WIDTH);
-    return real_max(fma(plane, (real)(axis->least), (real)(axis->far_least)),
-                    fma(plane, (real)(axis->most), (real)(axis->far_most)));
+    return fma(real_load(boxes + axis->far * BVH_WIDTH), (real)(axis->most), (real)(axis->to_far));
 }
 
 // The boxes, as many as there are lanes, that the beam meets, and the distance before which no ray is in
