@@ -175,9 +175,11 @@ static inline void waiting_fetch(const Scene *scene, uint first, uint what)
         memory_fetch((global const char *)&scene->triangles[first], 2 * sizeof(Triangle));
 }
 
-// Puts a node's children that rays meet on the stack, the nearest last.
+// Puts a node's children that rays meet on the stack, the nearest last; where anything may block them, the
+// farthest: what lies around a ray's start, mostly the surface it left, blocks it least.
 static inline uint node_open(const Scene *scene, uint index, const Beam *beam, const BoxRays *rays,
-                             const Ray *ray, real limit, scalar beam_limit, Waiting *waiting, uint count)
+                             const Ray *ray, real limit, scalar beam_limit, bool any, Waiting *waiting,
+                             uint count)
 {
     global const BvhNode *node = &scene->nodes[index];
     const uint bottom = count;
@@ -192,8 +194,11 @@ static inline uint node_open(const Scene *scene, uint index, const Beam *beam, c
             if (LANES > 1 && !lanes_any(beam_rays_meet(beam, rays, ray, boxes + child, limit))) continue;
             scalar near = nears.each[child];
             uint place = count++;
-            for (; place > bottom && waiting[place - 1].near < near; place--)
-                waiting[place] = waiting[place - 1];
+            for (; place > bottom; place--) {
+                Waiting below = waiting[place - 1];
+                if (any ? below.near <= near : below.near >= near) break;
+                waiting[place] = below;
+            }
             waiting[place] = (Waiting){firsts[part + child], whats[part + child], near};
             waiting_fetch(scene, firsts[part + child], whats[part + child]);
         }
@@ -201,7 +206,7 @@ static inline uint node_open(const Scene *scene, uint index, const Beam *beam, c
     return count;
 }
 
-// Down the tree, the nearest child first; a packet visits what any of its lanes meets.
+// Down the tree; a packet visits what any of its lanes meets.
 static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays,
                               const Beam *beam)
 {
@@ -214,7 +219,8 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
         Waiting next = waiting[--count];
         if (next.near > beam_limit) continue;
         if (next.what == BVH_NODE) {
-            count = node_open(scene, next.first, beam, rays, ray, limit, beam_limit, waiting, count);
+            count =
+                node_open(scene, next.first, beam, rays, ray, limit, beam_limit, search->any, waiting, count);
         } else {
             search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8), 0);
             if (!lanes_any(search->open)) return;
