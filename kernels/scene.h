@@ -173,6 +173,8 @@ static inline void waiting_fetch(const Scene *scene, uint first, uint what)
         memory_fetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
     else if (HAS_TRIANGLES && (what & 0xff) == KIND_TRIANGLES)
         memory_fetch((global const char *)&scene->triangles[first], 2 * sizeof(Triangle));
+    else if (HAS_SPHERES && (what & 0xff) == KIND_SPHERES)
+        memory_fetch((global const char *)&scene->spheres[first], sizeof(Sphere));
 }
 
 // Puts a node's children that rays meet on the stack, the nearest last; where anything may block them, the
