@@ -130,6 +130,14 @@ static inline uint balls_missed(global const Ball *balls, uint count, const Ray 
     return missed;
 }
 
+// Starts to fetch what is read of the closest hit.
+static inline void object_fetch(const Scene *scene, uint kind, uint4 id)
+{
+    memory_fetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
+    if (HAS_TRIANGLES && kind == KIND_TRIANGLES && id.y > 0)
+        memory_fetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
+}
+
 // Tests shapes first .. last - 1 of one kind; `balls`, where there are any, are theirs.
 static inline void search_shapes(Search *search, const Scene *scene, const Ray *ray, uint kind, uint first,
                                  uint last, global const Ball *balls)
@@ -144,7 +152,10 @@ static inline void search_shapes(Search *search, const Scene *scene, const Ray *
             mask found = name##_hit(&shape, ray, &t);                                                        \
             if (!lanes_any(found)) continue;                                                                 \
             search_take(search, scene, found, t, shape.id.x);                                                \
-            if (search->any && !lanes_any(search->open)) break;                                              \
+            if (!search->any)                                                                                \
+                object_fetch(scene, kind, shape.id);                                                         \
+            else if (!lanes_any(search->open))                                                               \
+                break;                                                                                       \
         }                                                                                                    \
     }
     SHAPE_LIST(SEARCH_SHAPES)

@@ -33,16 +33,6 @@ typedef struct {
 
 static inline Patch shape_patch(const Scene *scene, uint kind, uint index, const Ray *ray, real t)
 {
-    // alone in that part of it lies in another array
-    if (HAS_TRIANGLES && kind == KIND_TRIANGLES) {
-        Triangle triangle = scene->triangles[index];
-        Patch patch = triangle_patch(&triangle, ray, t);
-        if (triangle.id.y > 0) {
-            TriangleNormals normals = scene->triangle_normals[triangle.id.y - 1];
-            triangle_smooth(&triangle, &normals, ray, &patch);
-        }
-        return patch;
-    }
 #define PATCH_OF_SHAPE(feature, Type, name, names)                                                           \
     if (HAS_##feature && kind == KIND_##feature) {                                                           \
         Type shape = scene->names[index];                                                                    \
@@ -50,6 +40,54 @@ static inline Patch shape_patch(const Scene *scene, uint kind, uint index, const
     }
     SHAPE_LIST(PATCH_OF_SHAPE)
     return patch_make(ray->origin, ray->direction, (real)(0));
+}
+
+typedef struct {
+    mask lanes; // that met them
+    Patch patch;
+    PicturePoint point; // where a picture lies on them
+} MetTriangles;
+
+// The triangles of one material among the lanes' objects. In a fine mesh each lane meets one of its own:
+// their numbers are gathered one triangle after the other, what is made of them is made for all lanes at
+// once.
+static OUT_OF_LINE MetTriangles triangles_met(const Scene *scene, integer objects, uint material,
+                                              const Ray *ray, real t)
+{
+    const Vector nothing = {(real)(0), (real)(0), (real)(0)};
+    const integer settled = (integer)(INT_MAX);
+    MetTriangles met;
+    met.lanes = mask_none();
+    Vector normal = nothing;
+    Corners corners = {nothing, nothing, nothing}, normals = corners, uvs = corners;
+    real density = (real)(scene->materials[material].mirror_glass.w);
+    for (;;) {
+        scalar_integer object = lanes_smallest(objects);
+        if (object == INT_MAX) break;
+        mask same = objects == (integer)(object);
+        objects = lanes_select(same, settled, objects);
+        uint4 entry = scene->objects[object].kind_index_material;
+        if (entry.x != KIND_TRIANGLES || entry.z != material) continue;
+        met.lanes = met.lanes | same;
+        Triangle triangle = scene->triangles[entry.y];
+        corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), corners);
+        normal = vector_select(same, triangle_normal(&triangle), normal);
+        if (triangle.id.y > 0) {
+            TriangleNormals own = scene->triangle_normals[triangle.id.y - 1];
+            normals = corners_select(same, corners_of(own.a, own.b, own.c), normals);
+        }
+        if (HAS_IMAGES && triangle.id.z > 0) {
+            TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
+            uvs = corners_select(same, corners_of(own.a_b, (scalar4)(own.a_b.zw, 0, 0), own.c_density), uvs);
+            density = lanes_select(same, (real)(own.c_density.z), density);
+        }
+    }
+    TriangleWeights weights = triangle_weights(corners, ray);
+    met.patch = triangle_crossing_patch(corners, normal, weights, ray, t);
+    triangle_smooth(normals, weights, &met.patch);
+    Vector uv = triangle_blend(weights, uvs);
+    met.point = (PicturePoint){uv.x, uv.y, density};
+    return met;
 }
 
 // The checker's square at each point: even or odd. On a plane or disc squares lie in the surface; elsewhere
@@ -77,7 +115,7 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
 }
 
 // Rays of one tile mostly meet one or two objects: each object among the hits is looked up once, for all its
-// lanes.
+// lanes, but triangles of one material together.
 static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *hit)
 {
     Surface surface;
@@ -96,14 +134,22 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
     for (;;) {
         scalar_integer object = lanes_smallest(pending);
         if (object == INT_MAX) break;
-        mask same = pending == (integer)(object);
-        pending = lanes_select(same, settled, pending);
-
         uint4 entry = scene->objects[object].kind_index_material;
-        Patch found = shape_patch(scene, entry.x, entry.y, ray, hit->t);
+        mask same = pending == (integer)(object);
+        Patch found;
+        PicturePoint point;
+        if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
+            MetTriangles met = triangles_met(scene, pending, entry.z, ray, hit->t);
+            same = met.lanes;
+            found = met.patch;
+            point = met.point;
+        } else {
+            found = shape_patch(scene, entry.x, entry.y, ray, hit->t);
+        }
+        pending = lanes_select(same, settled, pending);
         patch_keep(&patch, same, &found);
-
         Material material = scene->materials[entry.z];
+
         Color3 color = vector_of(material.color);
         if (HAS_CHECKERS && material.grid.w != 0) {
             mask against = vector_dot(found.normal, ray->direction) > (real)(0);
@@ -111,8 +157,10 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
             mask odd = checker_odd(scene, entry.x, entry.y, &found, inward, material.grid);
             color = vector_select(odd, vector_of(material.other_color), color);
         }
-        if (HAS_IMAGES && material.image.x > 0)
-            color = picture_color(scene, entry.x, entry.y, &material, &found, ray, surface.travelled, same);
+        if (HAS_IMAGES && material.image.x > 0) {
+            if (entry.x != KIND_TRIANGLES) point = picture_point(scene, entry.x, entry.y, &material, &found);
+            color = picture_color(scene, entry.x, &material, point, &found, ray, surface.travelled, same);
+        }
         surface.color = vector_select(same, color, surface.color);
         surface.diffuse = vector_select(same, vector_of(material.diffuse), surface.diffuse);
         surface.ambient = lanes_select(same, (real)(material.color.w), surface.ambient);

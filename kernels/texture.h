@@ -27,22 +27,8 @@ static inline PicturePoint sphere_picture_point(const Sphere *sphere, Vector out
     return point;
 }
 
-static inline PicturePoint triangle_picture_point(const Scene *scene, const Triangle *triangle,
-                                                  const Ray *ray)
-{
-    TriangleUvs uvs = scene->triangle_uvs[triangle->id.z - 1];
-    TriangleWeights weights = triangle_weights(triangle, ray);
-    PicturePoint point;
-    point.u = fma(weights.a, (real)(uvs.a_b.x),
-                  fma(weights.b, (real)(uvs.a_b.z), weights.c * (real)(uvs.c_density.x)));
-    point.v = fma(weights.a, (real)(uvs.a_b.y),
-                  fma(weights.b, (real)(uvs.a_b.w), weights.c * (real)(uvs.c_density.y)));
-    point.density = (real)(uvs.c_density.z);
-    return point;
-}
-
 static inline PicturePoint picture_point(const Scene *scene, uint kind, uint index, const Material *material,
-                                         const Patch *patch, const Ray *ray)
+                                         const Patch *patch)
 {
     scalar4 grid_u = (scalar4)(0), grid_v = (scalar4)(0);
     if (HAS_SPHERES && kind == KIND_SPHERES) {
@@ -50,10 +36,7 @@ static inline PicturePoint picture_point(const Scene *scene, uint kind, uint ind
         return sphere_picture_point(&sphere, patch->normal,
                                     scene->texture_levels[material->image.x - 1].place);
     }
-    if (HAS_TRIANGLES && kind == KIND_TRIANGLES) {
-        Triangle triangle = scene->triangles[index];
-        if (triangle.id.z > 0) return triangle_picture_point(scene, &triangle, ray);
-    } else if (HAS_PLANES && kind == KIND_PLANES) {
+    if (HAS_PLANES && kind == KIND_PLANES) {
         grid_u = scene->planes[index].grid_u;
         grid_v = scene->planes[index].grid_v;
     } else if (HAS_DISCS && kind == KIND_DISCS) {
@@ -133,10 +116,10 @@ static inline scalar4 picture_filtered(const Scene *scene, uint4 image, scalar u
 
 // The picture's color where the lanes in `wanted` meet a surface, `distance_` along from the eye. What is
 // seen at a slant counts as at most 2^10 times longer.
-static inline Vector picture_color(const Scene *scene, uint kind, uint index, const Material *material,
-                                   const Patch *patch, const Ray *ray, real distance_, mask wanted)
+static inline Vector picture_color(const Scene *scene, uint kind, const Material *material,
+                                   PicturePoint point, const Patch *patch, const Ray *ray, real distance_,
+                                   mask wanted)
 {
-    PicturePoint point = picture_point(scene, kind, index, material, patch, ray);
     real cosine = real_max(fabs(vector_dot(patch->normal, ray->direction)), (real)(0x1p-10f));
     real width = distance_ * (real)(scene->header->sample.x);
     RealLanes u = {point.u}, v = {point.v}, footprint = {real_divide(width * point.density, cosine)};

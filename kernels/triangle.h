@@ -10,17 +10,33 @@
 
 #include "plane.h"
 
+// A triangle's three vertices, or what belongs to them. Lanes may have triangles of their own.
+typedef struct {
+    Vector a, b, c;
+} Corners;
+
+static inline Corners corners_of(scalar4 a, scalar4 b, scalar4 c)
+{
+    return (Corners){vector_of(a), vector_of(b), vector_of(c)};
+}
+
+static inline Corners corners_select(mask condition, Corners yes, Corners no)
+{
+    return (Corners){vector_select(condition, yes.a, no.a), vector_select(condition, yes.b, no.b),
+                     vector_select(condition, yes.c, no.c)};
+}
+
 typedef struct {
     real u, v, w;     // edge functions opposite a, b, c; all of one sign inside, edges included
     real determinant; // their sum
     Vector a, b, c;   // the vertices, from the ray's start
 } TriangleEdges;
 
-static inline TriangleEdges triangle_edges(const Triangle *triangle, const Ray *ray)
+static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
 {
-    Vector a = vector_subtract(vector_of(triangle->a), ray->origin);
-    Vector b = vector_subtract(vector_of(triangle->b), ray->origin);
-    Vector c = vector_subtract(vector_of(triangle->c), ray->origin);
+    Vector a = vector_subtract(corners.a, ray->origin);
+    Vector b = vector_subtract(corners.b, ray->origin);
+    Vector c = vector_subtract(corners.c, ray->origin);
     real ax = vector_dot(a, ray->across_u), ay = vector_dot(a, ray->across_v);
     real bx = vector_dot(b, ray->across_u), by = vector_dot(b, ray->across_v);
     real cx = vector_dot(c, ray->across_u), cy = vector_dot(c, ray->across_v);
@@ -105,7 +121,7 @@ static inline real triangle_distance_held(const TriangleEdges *edges, const Ray 
 
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
-    TriangleEdges edges = triangle_edges(triangle, ray);
+    TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
     const real zero = (real)(0);
     mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
     mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
@@ -134,35 +150,42 @@ typedef struct {
     real a, b, c;
 } TriangleWeights;
 
-static inline TriangleWeights triangle_weights(const Triangle *triangle, const Ray *ray)
+static inline TriangleWeights triangle_weights(Corners corners, const Ray *ray)
 {
-    TriangleEdges edges = triangle_edges(triangle, ray);
+    TriangleEdges edges = triangle_edges(corners, ray);
     mask degenerate = edges.determinant == (real)(0);
     real inverse = real_divide((real)(1), lanes_select(degenerate, (real)(1), edges.determinant));
     return (TriangleWeights){edges.u * inverse, edges.v * inverse, edges.w * inverse};
 }
 
-static inline Vector triangle_blend(TriangleWeights weights, Vector a, Vector b, Vector c)
+static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
 {
-    return vector_fma(a, weights.a, vector_fma(b, weights.b, vector_scale(c, weights.c)));
+    return vector_fma(corners.a, weights.a,
+                      vector_fma(corners.b, weights.b, vector_scale(corners.c, weights.c)));
 }
 
-static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
+// Where the ray meets the triangle, its normal of any length.
+static inline Patch triangle_crossing_patch(Corners corners, Vector normal, TriangleWeights weights,
+                                            const Ray *ray, real t)
 {
-    Vector a = vector_of(triangle->a), b = vector_of(triangle->b), c = vector_of(triangle->c);
-    Vector normal = vector_normalize(triangle_normal(triangle));
-    real size = real_max(real_max(vector_magnitude(a), vector_magnitude(b)), vector_magnitude(c));
-    Patch patch = patch_make(triangle_blend(triangle_weights(triangle, ray), a, b, c), normal, size);
+    real size = real_max(real_max(vector_magnitude(corners.a), vector_magnitude(corners.b)),
+                         vector_magnitude(corners.c));
+    Patch patch = patch_make(triangle_blend(weights, corners), vector_normalize(normal), size);
     if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
     return patch;
 }
 
-// Bends the shading normal between the vertices' own.
-static inline void triangle_smooth(const Triangle *triangle, const TriangleNormals *normals, const Ray *ray,
-                                   Patch *patch)
+static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
 {
-    Vector normal = triangle_blend(triangle_weights(triangle, ray), vector_of(normals->a),
-                                   vector_of(normals->b), vector_of(normals->c));
+    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
+    return triangle_crossing_patch(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray,
+                                   t);
+}
+
+// Bends the shading normal between the vertices' own; where these are all 0 the triangle is flat.
+static inline void triangle_smooth(Corners normals, TriangleWeights weights, Patch *patch)
+{
+    Vector normal = triangle_blend(weights, normals);
     mask vanishes = vector_dot(normal, normal) == (real)(0);
     patch->shading_normal = vector_select(vanishes, patch->normal, vector_normalize(normal));
 }

@@ -10,15 +10,28 @@ typedef struct {
     real a, b, c;
 } TriangleWeights;
 
-static inline mask triangle_crossing(const Triangle *triangle, const Ray *ray, real *t,
-                                     TriangleWeights *weights)
+typedef struct {
+    Vector a, b, c;
+} Corners;
+
+static inline Corners corners_of(scalar4 a, scalar4 b, scalar4 c)
 {
-    Vector a = vector_of(triangle->a);
-    Vector ab = vector_subtract(vector_of(triangle->b), a), ac = vector_subtract(vector_of(triangle->c), a);
+    return (Corners){vector_of(a), vector_of(b), vector_of(c)};
+}
+
+static inline Corners corners_select(mask condition, Corners yes, Corners no)
+{
+    return (Corners){vector_select(condition, yes.a, no.a), vector_select(condition, yes.b, no.b),
+                     vector_select(condition, yes.c, no.c)};
+}
+
+static inline mask triangle_crossing(Corners corners, const Ray *ray, real *t, TriangleWeights *weights)
+{
+    Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a);
     Vector p = vector_cross(ray->direction, ac);
     real determinant = vector_dot(ab, p);
     real inverse = (real)(1) / determinant;
-    Vector f = vector_subtract(ray->origin, a);
+    Vector f = vector_subtract(ray->origin, corners.a);
     real u = vector_dot(f, p) * inverse;
     Vector q = vector_cross(f, ab);
     real v = vector_dot(ray->direction, q) * inverse;
@@ -30,36 +43,50 @@ static inline mask triangle_crossing(const Triangle *triangle, const Ray *ray, r
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
     TriangleWeights weights;
-    mask hit = RAY_ACTIVE(ray) & triangle_crossing(triangle, ray, t, &weights);
+    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
+    mask hit = RAY_ACTIVE(ray) & triangle_crossing(corners, ray, t, &weights);
     return hit & (*t > ray->near);
 }
 
-static inline TriangleWeights triangle_weights(const Triangle *triangle, const Ray *ray)
+static inline TriangleWeights triangle_weights(Corners corners, const Ray *ray)
 {
     TriangleWeights weights;
     real t;
-    triangle_crossing(triangle, ray, &t, &weights);
+    triangle_crossing(corners, ray, &t, &weights);
     return weights;
 }
 
-static inline Vector triangle_blend(TriangleWeights weights, Vector a, Vector b, Vector c)
+static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
 {
-    return vector_fma(a, weights.a, vector_fma(b, weights.b, vector_scale(c, weights.c)));
+    return vector_fma(corners.a, weights.a,
+                      vector_fma(corners.b, weights.b, vector_scale(corners.c, weights.c)));
+}
+
+static inline Vector triangle_normal(const Triangle *triangle)
+{
+    Vector a = vector_of(triangle->a);
+    Vector ab = vector_subtract(vector_of(triangle->b), a), ac = vector_subtract(vector_of(triangle->c), a);
+    return vector_cross(ab, ac);
+}
+
+static inline Patch triangle_crossing_patch(Corners corners, Vector normal, TriangleWeights weights,
+                                            const Ray *ray, real t)
+{
+    return patch_make(ray_point(ray, t), vector_normalize(normal), TEXTBOOK_SIZE);
 }
 
 static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
 {
-    Vector a = vector_of(triangle->a);
-    Vector ab = vector_subtract(vector_of(triangle->b), a), ac = vector_subtract(vector_of(triangle->c), a);
-    return patch_make(ray_point(ray, t), vector_normalize(vector_cross(ab, ac)), TEXTBOOK_SIZE);
+    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
+    return triangle_crossing_patch(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray,
+                                   t);
 }
 
-static inline void triangle_smooth(const Triangle *triangle, const TriangleNormals *normals, const Ray *ray,
-                                   Patch *patch)
+static inline void triangle_smooth(Corners normals, TriangleWeights weights, Patch *patch)
 {
-    patch->shading_normal =
-        vector_normalize(triangle_blend(triangle_weights(triangle, ray), vector_of(normals->a),
-                                        vector_of(normals->b), vector_of(normals->c)));
+    mask flat = vector_dot(normals.a, normals.a) == (real)(0);
+    Vector normal = vector_normalize(triangle_blend(weights, normals));
+    patch->shading_normal = vector_select(flat, patch->normal, normal);
 }
 
 #endif
