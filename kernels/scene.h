@@ -183,7 +183,7 @@ static inline void waiting_fetch(const Scene *scene, uint first, uint what)
     if (what == BVH_NODE)
         memory_fetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
     else if (HAS_TRIANGLES && (what & 0xff) == KIND_TRIANGLES)
-        memory_fetch((global const char *)&scene->triangles[first], 2 * sizeof(Triangle));
+        memory_fetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
     else if (HAS_SPHERES && (what & 0xff) == KIND_SPHERES)
         memory_fetch((global const char *)&scene->spheres[first], sizeof(Sphere));
 }

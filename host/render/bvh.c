@@ -351,8 +351,11 @@ void bvh_build(Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, size_t count
     bvh->node_count = builder.node_count;
     bvh->depth = builder.depth;
     bvh->order = memory_allocate(count + 1, sizeof *bvh->order);
-    for (size_t i = 0; i < count; i++)
+    bvh->kinds = memory_allocate(count + 1, 1);
+    for (size_t i = 0; i < count; i++) {
         bvh->order[i] = builder.references[i].index;
+        bvh->kinds[i] = builder.references[i].kind;
+    }
     free(builder.references);
     boxes_fit(bvh, boxes);
 }
@@ -361,5 +364,6 @@ void bvh_free(Bvh *bvh)
 {
     free(bvh->nodes);
     free(bvh->order);
+    free(bvh->kinds);
     *bvh = (Bvh){0};
 }

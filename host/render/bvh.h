@@ -24,6 +24,7 @@ typedef struct {
     BvhNodeBuild *nodes; // the root first; a tree of one leaf has an empty second child (low > high)
     size_t node_count;
     uint32_t *order; // the primitives, leaf by leaf
+    uint8_t *kinds;  // theirs, in this order
     size_t primitive_count;
     unsigned depth; // inner nodes on the longest way down
 } Bvh;
