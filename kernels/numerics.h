@@ -110,14 +110,9 @@ static inline real product_difference(real a, real b, real c, real d)
     return fma(a, b, -cd) + rest;
 }
 
-// The unevaluated sum high + low, |low| at most half an ulp of high: about 2 x 24 or 2 x 53 bits.
-// Sums and products follow Joldes, Muller, Popescu, Tight and rigorous error bounds for basic building blocks
-// of double-word arithmetic, ACM TOMS 44(2), 2017: the sum is algorithm 6, the product algorithm 11, with
-// error bounds of 3 u^2 and 5 u^2.
-typedef struct {
-    real high, low;
-} Pair;
-
+// Sums and products of pairs follow Joldes, Muller, Popescu, Tight and rigorous error bounds for basic
+// building blocks of double-word arithmetic, ACM TOMS 44(2), 2017: the sum is algorithm 6, the product
+// algorithm 11, with error bounds of 3 u^2 and 5 u^2.
 static inline Pair pair_of(real value)
 {
     return (Pair){value, (real)(0)};
@@ -127,21 +122,6 @@ static inline Pair pair_fast_sum(real large, real small_)
 {
     real sum = large + small_;
     return (Pair){sum, small_ - (sum - large)};
-}
-
-// a + b without error (Knuth, The Art of Computer Programming 2, 4.2.2, theorem B).
-static inline Pair pair_sum(real a, real b)
-{
-    real sum = a + b;
-    real of_b = sum - a;
-    return (Pair){sum, (a - (sum - of_b)) + (b - of_b)};
-}
-
-// a b without error.
-static inline Pair pair_product(real a, real b)
-{
-    real product = a * b;
-    return (Pair){product, fma(a, b, -product)};
 }
 
 static inline Pair pair_negate(Pair a)

@@ -8,7 +8,7 @@
 #ifndef PERTURB_H
 #define PERTURB_H
 
-#include "lanes.h"
+#include "pair.h"
 
 #if IS_DOUBLE
 #define MANTISSA        ((integer)(0xfffffffffffffL))

@@ -75,14 +75,14 @@ static inline scalar4 texel_color(const Scene *scene, uint index)
 
 static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
 {
-    return fma(b - a, (scalar4)(part), a);
+    return (fma)(b - a, (scalar4)(part), a);
 }
 
 // Texels stand for their centers; between centers colors change linearly. `level`: x its first texel, y
 // width, z height.
 static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, bool repeats_upward)
 {
-    scalar x = fma(u, (scalar)level.y, (scalar)(-0.5f)), y = fma(1 - v, (scalar)level.z, (scalar)(-0.5f));
+    scalar x = (fma)(u, (scalar)level.y, (scalar)(-0.5f)), y = (fma)(1 - v, (scalar)level.z, (scalar)(-0.5f));
     scalar left = floor(x), top = floor(y);
     uint column_0 = texel_repeated(left, level.y), column_1 = texel_repeated(left + 1, level.y);
     uint row_0 = repeats_upward ? texel_repeated(top, level.z) : texel_held(top, level.z);

@@ -177,7 +177,8 @@ static void balls_check(bool wide, bool from_eye)
     Text prelude = {0};
     text_appendf(&prelude,
                  "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 0\n#define IS_DOUBLE %d\n"
-                 "#define REPAIRS_DIVIDE 0\n#define IS_COUNTING 0\n#define PERTURB 0\n#define PERTURB_SEED "
+                 "#define REPAIRS_DIVIDE 0\n#define HAS_FMA 1\n#define IS_COUNTING 0\n#define PERTURB "
+                 "0\n#define PERTURB_SEED "
                  "0u\n#define PERTURB_SCALE 1\n",
                  wide);
     features_write_prelude(&prelude, FEATURE_ALL);

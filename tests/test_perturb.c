@@ -1,5 +1,6 @@
-// At `strict` a device's own quotients and roots, wrong by what the specification allows, are repaired to the
-// correctly rounded ones.
+// What devices have otherwise: at `strict` their quotients and roots, wrong by what the specification allows,
+// are repaired to the correctly rounded ones; and the fma of those that have none in hardware is fma to the
+// bit.
 #include "host/base/array.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
@@ -13,7 +14,7 @@
 
 enum { OPERAND_COUNT = 1 << 20 };
 
-static const char kernel_text[] = "#include \"numerics.h\"\n"
+static const char repair_text[] = "#include \"numerics.h\"\n"
                                   "kernel void repair(global const float *a, global const float *b,\n"
                                   "                   global float *quotients, global float *roots)\n"
                                   "{\n"
@@ -22,22 +23,33 @@ static const char kernel_text[] = "#include \"numerics.h\"\n"
                                   "    roots[i] = real_sqrt(fabs(a[i]));\n"
                                   "}\n";
 
-static cl_program program_make(uint32_t seed)
-{
-    char prelude[256];
-    snprintf(prelude, sizeof prelude,
-             "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 1\n#define IS_DOUBLE 0\n"
-             "#define REPAIRS_DIVIDE 1\n#define PERTURB 1\n#define PERTURB_SCALE 1\n"
-             "#define PERTURB_SEED %uu\n",
-             seed);
-    return probe_program(kernel_text, prelude);
-}
+static const char fma_text[] =
+    "#include \"numerics.h\"\n"
+    "kernel void multiply_add(global const float *a, global const float *b,\n"
+    "                         global const float *c, global float *sums,\n"
+    "                         global float *errors)\n"
+    "{\n"
+    "    size_t i = get_global_id(0) * LANES;\n"
+    "    RealLanes sum = {fma(real_load(a + i), real_load(b + i), real_load(c + i))};\n"
+    "    RealLanes error = {pair_product(real_load(a + i), real_load(b + i)).low};\n"
+    "    for (uint lane = 0; lane < LANES; lane++) {\n"
+    "        sums[i + lane] = sum.each[lane];\n"
+    "        errors[i + lane] = error.each[lane];\n"
+    "    }\n"
+    "}\n";
 
 // Runs the kernel on a and b; what comes back belongs to the caller.
 static void repair(uint32_t seed, const float *a, const float *b, float *quotients, float *roots)
 {
     const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT;
-    cl_program program = program_make(seed);
+    char prelude[256];
+    snprintf(
+        prelude, sizeof prelude,
+        "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 1\n#define IS_DOUBLE 0\n#define HAS_FMA 1\n"
+        "#define REPAIRS_DIVIDE 1\n#define PERTURB 1\n#define PERTURB_SCALE 1\n"
+        "#define PERTURB_SEED %uu\n",
+        seed);
+    cl_program program = probe_program(repair_text, prelude);
     cl_int status;
     cl_kernel kernel = clCreateKernel(program, "repair", &status);
     cl_check(status, "clCreateKernel");
@@ -110,8 +122,106 @@ static void wrong_quotients_and_roots_are_repaired(void **state)
         free(numbers[i]);
 }
 
+// Runs the kernel on a, b and c; what comes back belongs to the caller.
+static void multiply_add(unsigned lanes, const float *a, const float *b, const float *c, float *sums,
+                         float *errors)
+{
+    const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT / lanes;
+    char prelude[256];
+    snprintf(
+        prelude, sizeof prelude,
+        "#define LANES %u\n#define IS_FAST 0\n#define IS_STRICT 1\n#define IS_DOUBLE 0\n#define HAS_FMA 0\n"
+        "#define REPAIRS_DIVIDE 0\n#define PERTURB 0\n#define PERTURB_SCALE 1\n#define PERTURB_SEED 0u\n",
+        lanes);
+    cl_program program = probe_program(fma_text, prelude);
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program, "multiply_add", &status);
+    cl_check(status, "clCreateKernel");
+    cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
+                        buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),
+                        buffer_create(&probe_compute, size, c, CL_MEM_READ_ONLY),
+                        buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY),
+                        buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY)};
+    for (cl_uint i = 0; i < 5; i++)
+        kernel_argument(kernel, i, sizeof(cl_mem), &buffers[i]);
+    kernel_launch(&probe_compute, kernel, 1, &count, NULL);
+    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[3], CL_TRUE, 0, size, sums, 0, NULL, NULL));
+    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[4], CL_TRUE, 0, size, errors, 0, NULL, NULL));
+    for (size_t i = 0; i < 5; i++)
+        cl_must(clReleaseMemObject(buffers[i]));
+    cl_must(clReleaseKernel(kernel));
+    cl_must(clReleaseProgram(program));
+}
+
+// Of a quarter c is any; of a quarter within a few ulp of the product; of a quarter some 24 bits larger or
+// smaller than it, where it decides how the other is rounded; of a quarter a power of two, or something of
+// that is 0 or infinite. Factors have few bits as often as many, so that sums lie in the middle between
+// floats.
+static void terms_make(float *a, float *b, float *c)
+{
+    static const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, FLT_MAX, -FLT_MAX, INFINITY, -INFINITY};
+    enum { SPECIAL_COUNT = sizeof special / sizeof *special };
+    Random random = {39};
+    for (size_t i = 0; i < OPERAND_COUNT; i++) {
+        float *factors[] = {&a[i], &b[i]};
+        for (size_t k = 0; k < 2; k++) {
+            double mantissa =
+                whole(&random, i / 4 % 2 ? 24 : 5 + (int)(i / 8 % 16), random_between(&random, 0, 1) < 0.5);
+            int scale = (int)floor(random_between(&random, -50, 62));
+            *factors[k] =
+                (float)copysign(ldexp(mantissa, scale - ilogb(mantissa)), random_between(&random, -1, 1));
+        }
+        float product = a[i] * b[i], ulp = fabsf(nextafterf(product, INFINITY) - product);
+        float mantissa = (float)ldexp(whole(&random, 24, random_between(&random, 0, 1) < 0.5), -23);
+        float sign = random_between(&random, 0, 1) < 0.5 ? -1.0F : 1.0F;
+        if (i % 4 == 0) c[i] = sign * ldexpf(mantissa, (int)floor(random_between(&random, -126, 127)));
+        if (i % 4 == 1) c[i] = -product + ulp * (float)floor(random_between(&random, -4, 5));
+        if (i % 4 == 2)
+            c[i] = sign * ldexpf(mantissa, ilogbf(product) + (int)floor(random_between(&random, -28, 29)));
+        if (i % 4 == 3)
+            c[i] = sign * ldexpf(1, ilogbf(product) + (int)floor(random_between(&random, -28, 29)));
+        if (i % 64 == 63) {
+            *factors[i / 64 % 2] = special[i / 128 % SPECIAL_COUNT];
+            if (i / 2048 % 2) c[i] = special[i / 4096 % SPECIAL_COUNT];
+        }
+    }
+}
+
+static bool same(float a, float b)
+{
+    return isnan(a) ? isnan(b) : a == b && signbit(a) == signbit(b);
+}
+
+static void fma_in_software_is_exact(void **state)
+{
+    (void)state;
+    float *numbers[5];
+    for (size_t i = 0; i < 5; i++)
+        numbers[i] = memory_allocate(OPERAND_COUNT, sizeof(float));
+    float *a = numbers[0], *b = numbers[1], *c = numbers[2], *sums = numbers[3], *errors = numbers[4];
+    terms_make(a, b, c);
+    for (unsigned lanes = 1; lanes <= 16; lanes *= 4) {
+        multiply_add(lanes, a, b, c, sums, errors);
+        for (size_t i = 0; i < OPERAND_COUNT; i++) {
+            float product = a[i] * b[i], sum = fmaf(a[i], b[i], c[i]);
+            if (isinf(product) && isfinite(a[i]) && isfinite(b[i])) continue;
+            if (!same(sums[i], sum))
+                fail_msg("%u lanes: %a * %a + %a is %a, not %a", lanes, (double)a[i], (double)b[i],
+                         (double)c[i], (double)sum, (double)sums[i]);
+            if (isfinite(product) && errors[i] != fmaf(a[i], b[i], -product))
+                fail_msg("%u lanes: %a * %a leaves %a out, not %a", lanes, (double)a[i], (double)b[i],
+                         (double)fmaf(a[i], b[i], -product), (double)errors[i]);
+        }
+    }
+    for (size_t i = 0; i < 5; i++)
+        free(numbers[i]);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_quotients_and_roots_are_repaired)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(wrong_quotients_and_roots_are_repaired),
+        cmocka_unit_test(fma_in_software_is_exact),
+    };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -125,14 +125,18 @@ static void prelude_write(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
     uint32_t seed = renderer->settings.perturb_seed, scale = renderer->settings.perturb_scale;
+    const Device *device = renderer->compute->device;
     // errors are repaired, as on a device that makes them
-    bool correct = renderer->compute->device->correctly_rounded && seed == 0;
+    bool correct = device->correctly_rounded && seed == 0;
+    // of doubles it is asked for; Intel's runtime for CPUs does not tell of it
+    bool has_fma = renderer->report.wide || device->fma_in_hardware || device->native_float_width > 1;
     Text *text = &renderer->prelude;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
+    text_appendf(text, "#define HAS_FMA %d\n", has_fma);
     text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
     text_appendf(text, "#define PERTURB %d\n", seed != 0);
     text_appendf(text, "#define PERTURB_SEED %uu\n", seed);
