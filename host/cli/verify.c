@@ -59,12 +59,13 @@ typedef struct {
     uint32_t lanes;                       // the last one's
 } Prober;
 
-// With every feature built in, so that one program serves all scenes; lean, with what a scene needs, and the
-// rays sent on from hits.
+// With every feature built in, so that one program serves all scenes; lean, with what a scene needs, and, of
+// explicit rays, what becomes of them there.
 static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hierarchy, uint32_t width,
                                      uint32_t height)
 {
     bool picture = width > 0;
+    const FeatureSet lean_features = picture ? 0 : FEATURE_REFLECTION | FEATURE_TRANSMISSION;
     RenderSettings settings = {
         .width = picture ? width : 1,
         .height = picture ? height : 1,
@@ -79,7 +80,7 @@ static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hi
         .no_cache = prober->options->common.no_cache,
         .perturb_seed = prober->options->common.perturb_seed,
         .perturb_scale = prober->options->common.perturb_scale,
-        .extra_features = prober->options->lean ? FEATURE_REFLECTION | FEATURE_TRANSMISSION : FEATURE_ALL,
+        .extra_features = prober->options->lean ? lean_features : FEATURE_ALL,
     };
     MessageList messages = {0};
     Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
@@ -176,6 +177,7 @@ typedef struct {
     Json *json; // or NULL: lines
     char tier;
     size_t held, failed;
+    double start; // of the case
 } Report;
 
 static void result_tell(const VerifyResult *result, const Report *report)
@@ -205,7 +207,7 @@ static void hash_add_json(Json *json, const char *key, uint64_t hash)
     json_text(json, key, digits);
 }
 
-static void result_add_json(Json *json, const VerifyResult *result)
+static void result_add_json(Json *json, const VerifyResult *result, double seconds)
 {
     json_begin_object(json, NULL);
     json_text(json, "name", result->name);
@@ -224,6 +226,7 @@ static void result_add_json(Json *json, const VerifyResult *result)
     json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
     if (result->bound > 0) json_text(json, "unit", result->unit);
     hash_add_json(json, "hash", result->hash);
+    json_number(json, "seconds", seconds);
     json_end(json);
 }
 
@@ -235,9 +238,10 @@ static void result_take(void *context, const VerifyResult *result)
     else
         report->failed++;
     if (report->json)
-        result_add_json(report->json, result);
+        result_add_json(report->json, result, clock_seconds() - report->start);
     else
         result_tell(result, report);
+    report->start = clock_seconds();
 }
 
 // Runs all cases at one precision; returns how many failed.
@@ -256,7 +260,8 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
                 "their "
                 "like; rays have exact answers\n",
                 verify_oracle_bits());
-    Report report = {.json = json, .tier = (char)('A' + tier)};
+    double start = clock_seconds();
+    Report report = {.json = json, .tier = (char)('A' + tier), .start = start};
     const char *name = precision_names[precision];
     if (json) {
         json_begin_object(json, NULL);
@@ -266,7 +271,6 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     } else {
         printf("%s\n", name);
     }
-    double start = clock_seconds();
     verify_run(&renderer, tier, options->cases.count > 0 ? &options->cases : NULL, result_take, &report);
     double seconds = clock_seconds() - start;
     if (json) {
