@@ -119,7 +119,7 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
     Beam beam;
     beam.near = leasts.each[BEAM_NEAR];
     // where one does look there, the beam is all of space, unless it is a single ray
-    const scalar everywhere = LANES > 1 && beam.near < 0 ? LARGEST / 2 : 0;
+    const scalar everywhere = LANES > 1 && beam.near < 0 ? LARGEST * 0.5f : 0;
     beam.x = beam_axis(&leasts, 0, signs & 1, everywhere);
     beam.y = beam_axis(&leasts, 1, signs & 2, everywhere);
     beam.z = beam_axis(&leasts, 2, signs & 4, everywhere);

@@ -24,7 +24,7 @@ static inline real spot_strength(const Light *light, Vector from_light)
 }
 
 // The ray to a light at a place runs from 0 to 1, unnormalized, and ends a rounding before the light.
-static inline LightRay light_ray(const Light *light, uint index, const Surface *surface)
+static inline LightRay light_ray(const Light *light, const Surface *surface)
 {
     LightRay to_light;
     Vector start = surface_leave(surface, false);
@@ -41,7 +41,6 @@ static inline LightRay light_ray(const Light *light, uint index, const Surface *
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
     to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),
                                    (real)(1 - 32 * UNIT_ROUNDOFF), surface->found);
-    ray_take_apex(&to_light.shadow_ray, APEX_FIRST_LIGHT + index);
     return to_light;
 }
 
@@ -66,13 +65,14 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, uin
 {
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
     Light light = scene->lights[index];
-    LightRay to_light = light_ray(&light, index, surface);
+    LightRay to_light = light_ray(&light, surface);
     real facing = vector_dot(surface->shading_normal, to_light.direction);
     mask lit = surface->found & (facing > (real)(0)) & (to_light.strength > (real)(0));
     *shadowed = surface->found & !lit;
     if (!lanes_any(lit)) return black;
 
     to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
+    if (light.kind.x != LIGHT_KIND_DIRECTIONAL) ray_take_apex(&to_light.shadow_ray, APEX_FIRST_LIGHT + index);
     rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
     real passing = light_passing(scene, &to_light.shadow_ray);
     lit = lit & (passing > (real)(0));

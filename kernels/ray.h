@@ -13,9 +13,10 @@ typedef struct {
     real near, far; // hits lie strictly between
     mask active;    // the lanes that carry a ray at all
     real travelled; // from the eye to the origin, for pictures on surfaces
-    // APEX_…: all lanes' lines pass through one point, within u |direction|
+    // APEX_…: all lanes' lines pass through one point, within u |direction|; at `fast`, whose compiler may
+    // take the direction apart, within u of the origin
     uint apex;
-    real apex_slack;
+    real apex_slack; // what balls count as larger by for the direction's sake
     // by ray_make_frame: 1 / direction, huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
@@ -89,7 +90,8 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     return ray;
 }
 
-// What boxes, triangles and the hierarchy ask for: only rays that come near one have it.
+// What boxes, triangles and the hierarchy ask for: rays have it where there are any of those outside the
+// hierarchy, or once they come near the hierarchy.
 static inline void ray_make_frame(Ray *ray)
 {
     Vector d = ray->direction;
@@ -110,12 +112,13 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     return ray;
 }
 
+// Once it is settled which lanes carry a ray: those that do not miss all.
 static inline void ray_take_apex(Ray *ray, uint apex)
 {
     ray->apex = apex;
-    // lanes without a ray miss all
-    ray->apex_slack = lanes_select(ray->active, (real)(128 * UNIT_ROUNDOFF) * (ray->squared * ray->squared),
-                                   (real)(-LARGEST));
+    real slack = (real)(BALL_WAY_SLACK * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
+    if (apex == APEX_EYE) slack = (real)(0); // where rays start
+    ray->apex_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
 }
 
 // The lines that certainly miss a ball, for rays with an apex. A line along d through a point misses a ball

@@ -126,13 +126,17 @@ enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 // A ball around something, as seen from an apex: a point that all rays of a packet pass through, the eye or a
 // light at a place. Each apex has a row of SceneHeader's balls.x of them: that of all that hangs in the
 // hierarchy, then of each shape that does not, kind by kind; planes have none.
+//
+// xyz: from the apex to the center; w: the apex's power, |xyz|^2 - radius^2, lowered by BALL_SLACK u |xyz|^2,
+// or -BALL_LARGEST around the unbounded.
 typedef struct {
-    scalar4
-        center_power; // xyz: from the apex to the center; w: the apex's power, |xyz|^2 - radius^2, lowered
-                      // by what roundings come to (kernels/ray.h), or -BALL_LARGEST around the unbounded
+    scalar4 center_power;
 } Ball;
 
 #define BALL_LARGEST 1e37f
+
+// What balls count as larger by, in units of roundoff: of |xyz|^2, and of the square of a ray's direction.
+enum { BALL_SLACK = 256, BALL_WAY_SLACK = 128 };
 
 enum { APEX_NONE, APEX_EYE, APEX_FIRST_LIGHT };
 

@@ -28,7 +28,7 @@ def is_figure(value):
     return isinstance(value, number) and value > 0
 
 
-assert report["schema"] == 1
+assert report["schema"] == 2
 device = report["device"]
 assert device["name"] and device["driver"] and device["type"] and device["units"] > 0
 for key in "gflops_float", "gflops_double", "gigabytes_per_s":

@@ -1,5 +1,6 @@
-// The balls that rays from the eye or to a light are held against: none that a line meets, or comes nearer to
-// than a shape's test may be off, is passed over, and those that it misses clearly are.
+// The balls that rays from the eye or to a light are held against (test_invariances has whole scenes with and
+// without them, as the hierarchy makes the difference): none that a line meets, or comes nearer to than a
+// shape's test may be off, is passed over, and those that it misses clearly are.
 #include "host/render/balls.h"
 #include "host/render/features.h"
 #include "tests/probe.h"
@@ -31,6 +32,7 @@ typedef struct {
     bool wide;
     double unit_roundoff;
     Random random;
+    double scale; // of all lengths but the eye's directions
     Vector3 apex;
     FlatScene flat; // a light at the apex, and a sphere for each line
     double *lines;  // origin and direction of each
@@ -59,7 +61,8 @@ static double random_power(Random *random, double low, double high)
 static void line_make(Trial *trial, size_t index, bool from_eye)
 {
     Random *random = &trial->random;
-    Vector3 way = vector_scale(vector_normalize(random_in_ball(random)), random_power(random, -2, 4));
+    Vector3 way =
+        vector_scale(vector_normalize(random_in_ball(random)), trial->scale * random_power(random, -2, 4));
     Vector3 origin = from_eye ? (Vector3){0, 0, 0} : vector_rounded(trial, vector_subtract(trial->apex, way));
     Vector3 direction =
         vector_rounded(trial, from_eye ? vector_normalize(way) : vector_subtract(trial->apex, origin));
@@ -67,8 +70,8 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
     memcpy(line, (double[]){origin.x, origin.y, origin.z, direction.x, direction.y, direction.z},
            6 * sizeof *line);
 
-    double along = random_between(random, -1, 1) * random_power(random, -2, 4);
-    double radius = rounded(trial, random_power(random, -3, 3));
+    double along = trial->scale * random_between(random, -1, 1) * random_power(random, -2, 4);
+    double radius = rounded(trial, trial->scale * random_power(random, -3, 3));
     double off =
         random_power(random, trial->wide ? -15 : -8, 1) * (random_between(random, -1, 1) < 0 ? -1 : 1);
     Vector3 across = vector_normalize(vector_cross(direction, random_in_ball(random)));
@@ -86,7 +89,9 @@ static void trial_open(Trial *trial, bool from_eye)
     arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, 1);
     arrays[FLAT_FIRST_SHAPE + KIND_SPHERES] =
         flat_array_make(FLAT_FIRST_SHAPE + KIND_SPHERES, BALLS_PER_APEX);
-    Vector3 apex = vector_scale(random_in_ball(&trial->random), random_power(&trial->random, -2, 4));
+    trial->scale = ldexp(1, (int)random_between(&trial->random, -30, 20));
+    Vector3 apex =
+        vector_scale(random_in_ball(&trial->random), trial->scale * random_power(&trial->random, -2, 4));
     trial->apex = from_eye ? (Vector3){0, 0, 0} : vector_rounded(trial, apex);
     ((FlatLight *)arrays[FLAT_LIGHTS].items)->position =
         (scalar4){trial->apex.x, trial->apex.y, trial->apex.z, 0};
@@ -142,7 +147,7 @@ static long double dot(const long double *a, const long double *b)
 }
 
 // Judges one answer by the line's distance from the center, in long double.
-static void line_judge(Trial *trial, size_t index)
+static void line_judge(Trial *trial, size_t index, bool from_eye)
 {
     const double *line = trial->lines + 6 * index;
     const Sphere *sphere = flat_array_at(&trial->flat.arrays[FLAT_FIRST_SHAPE + KIND_SPHERES], index);
@@ -155,7 +160,7 @@ static void line_judge(Trial *trial, size_t index)
     const long double moment[3] = {f[1] * d[2] - f[2] * d[1], f[2] * d[0] - f[0] * d[2],
                                    f[0] * d[1] - f[1] * d[0]};
     long double distance = sqrtl(dot(moment, moment) / dot(d, d)),
-                reach = sqrtl(dot(v, v)) + sqrtl(dot(d, d));
+                reach = sqrtl(dot(v, v)) + (from_eye ? 0 : sqrtl(dot(d, d)));
     long double u = trial->unit_roundoff, radius = c.w, slack = 64 * u * reach;
     if (distance <= radius + slack) {
         trial->met_count++;
@@ -191,7 +196,7 @@ static void balls_check(bool wide, bool from_eye)
         trial_open(&trial, from_eye);
         trial_run(&trial, program, from_eye ? APEX_EYE : APEX_FIRST_LIGHT);
         for (size_t k = 0; k < BALLS_PER_APEX; k++)
-            line_judge(&trial, k);
+            line_judge(&trial, k, from_eye);
         flat_scene_free(&trial.flat);
     }
     // no answer was left out for being too near to call, but for few

@@ -179,7 +179,7 @@ static void test_baseline(void **state)
     BenchRow row = row_make();
     size_t errors;
     Baseline *baseline =
-        baseline_of("{\"schema\": 1, \"device\": {\"name\": \"d\"}, \"runs\": [" BASELINE_ROW(
+        baseline_of("{\"schema\": 2, \"device\": {\"name\": \"d\"}, \"runs\": [" BASELINE_ROW(
                         "other.yaml", "{\"median\": 1}") "," BASELINE_ROW("scenes/a \\\"b\\\".yaml",
                                                                           "{\"median\": 90}") "]}",
                     &errors);
@@ -202,19 +202,19 @@ static void test_broken_baselines(void **state)
     const char *refused[] = {"",
                              "no json: [",
                              "[1, 2]",
-                             "{\"schema\": 2, \"runs\": []}",
+                             "{\"schema\": 1, \"runs\": []}",
                              "{\"runs\": []}",
                              "\"",
-                             "{\"schema\": 1}",
-                             "{\"schema\": 1, \"runs\": 3}"};
+                             "{\"schema\": 2}",
+                             "{\"schema\": 2, \"runs\": 3}"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         size_t errors;
         assert_null(baseline_of(refused[i], &errors));
         assert_int_equal(errors, 1);
     }
     // rows that say nothing are never found
-    const char *empty[] = {"{\"schema\": 1, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
-                           "{\"schema\": 1, \"runs\": [" BASELINE_ROW("scenes/a \\\"b\\\".yaml",
+    const char *empty[] = {"{\"schema\": 2, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
+                           "{\"schema\": 2, \"runs\": [" BASELINE_ROW("scenes/a \\\"b\\\".yaml",
                                                                       "{\"status\": \"unavailable\"}") "]}"};
     for (size_t i = 0; i < 2; i++) {
         size_t errors;

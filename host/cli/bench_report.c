@@ -198,7 +198,7 @@ static void results_json(Json *json, const BenchReport *report, const BenchRow *
 void bench_print_json(const BenchReport *report)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 1);
+    json_integer(json, "schema", 2);
     json_text(json, "glint", glint_version());
     report_device_json(json, report);
     json_begin_array(json, "runs");

@@ -14,7 +14,7 @@ typedef struct {
 
 // Times of the runs of one variant; zeroed: none yet.
 typedef struct {
-    Series frame;       // seconds from a run's first enqueue to its pixels in the host's memory
+    Series frame;       // seconds from a run's first enqueue until the host has read its last band
     Series event, host; // seconds of a run's launches, by their events and by the host's clock
     const char *doubt;  // why the events are not to be believed, as seen in some launch; NULL: they are
     double run_event, run_host; // sums of the run at work

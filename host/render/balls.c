@@ -8,43 +8,41 @@
 typedef struct {
     Vector3 center;
     double radius; // infinite around what is unbounded
-} Sphere3;
+} Enclosure;
 
-static Vector3 vector_of(scalar4 v)
-{
-    return (Vector3){v.x, v.y, v.z};
-}
-
-static Sphere3 box_sphere(const BvhBox *box)
+// Larger by what the roundings here and of the box itself come to, far from the eye.
+static Enclosure box_enclosure(const BvhBox *box)
 {
     Vector3 low = {box->low[0], box->low[1], box->low[2]}, high = {box->high[0], box->high[1], box->high[2]};
     Vector3 half = vector_scale(vector_subtract(high, low), 0.5);
-    return (Sphere3){vector_add(low, half), vector_length(half)};
+    double roundings = 4 * DBL_EPSILON * (vector_length(low) + vector_length(high));
+    return (Enclosure){vector_add(low, half), vector_length(half) + roundings};
 }
 
-static Sphere3 primitive_sphere(size_t kind, const void *primitive)
+static Enclosure primitive_enclosure(size_t kind, const void *primitive)
 {
     if (kind == KIND_SPHERES) {
         const Sphere *sphere = primitive;
-        return (Sphere3){vector_of(sphere->center_radius), sphere->center_radius.w};
+        return (Enclosure){vector3_of(&sphere->center_radius), sphere->center_radius.w};
     }
     if (kind == KIND_DISCS) {
         const Disc *disc = primitive;
-        return (Sphere3){vector_of(disc->center_radius), disc->center_radius.w};
+        return (Enclosure){vector3_of(&disc->center_radius), disc->center_radius.w};
     }
     if (kind == KIND_TORI) {
         const Torus *torus = primitive;
-        return (Sphere3){vector_of(torus->center_major), torus->center_major.w + torus->axis_minor.w};
+        return (Enclosure){vector3_of(&torus->center_major), torus->center_major.w + torus->axis_minor.w};
     }
     BvhBox box;
-    if (!primitive_box(kind, primitive, &box)) return (Sphere3){.radius = INFINITY};
-    return box_sphere(&box);
+    if (!primitive_box(kind, primitive, &box)) return (Enclosure){.radius = INFINITY};
+    return box_enclosure(&box);
 }
 
-static Ball ball_seen(Sphere3 sphere, Vector3 apex, double roundoff)
+static Ball ball_seen(Enclosure around, Vector3 apex, double roundoff)
 {
-    Vector3 v = vector_subtract(sphere.center, apex);
-    double squared = vector_dot(v, v), power = squared * (1 - 256 * roundoff) - sphere.radius * sphere.radius;
+    Vector3 v = vector_subtract(around.center, apex);
+    double squared = vector_dot(v, v),
+           power = squared * (1 - BALL_SLACK * roundoff) - around.radius * around.radius;
     if (!(fabs(power) <= BALL_LARGEST && squared <= BALL_LARGEST)) return (Ball){{0, 0, 0, -BALL_LARGEST}};
     return (Ball){{v.x, v.y, v.z, power}};
 }
@@ -59,7 +57,7 @@ static Ball hierarchy_ball(const SceneHeader *header, Vector3 apex, double round
     if (count == 0) return (Ball){{0, 0, 0, BALL_LARGEST}};
     scalar4 low = header->bounds_low, high = header->bounds_high;
     const BvhBox bounds = {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
-    return ball_seen(box_sphere(&bounds), apex, roundoff);
+    return ball_seen(box_enclosure(&bounds), apex, roundoff);
 }
 
 // How many of a kind have balls, and where they begin.
@@ -81,12 +79,12 @@ static void row_lay(const FlatScene *flat, Vector3 apex, double roundoff, Ball *
         Plain plain = plain_of(flat, kind);
         for (size_t i = 0; i < plain.count; i++) {
             const void *primitive = flat_array_at(&flat->arrays[FLAT_FIRST_SHAPE + kind], plain.first + i);
-            *row++ = ball_seen(primitive_sphere(kind, primitive), apex, roundoff);
+            *row++ = ball_seen(primitive_enclosure(kind, primitive), apex, roundoff);
         }
     }
 }
 
-// Beyond it the balls would take more memory than what they are around.
+// 16 MiB of floats; a scene that would need more does without.
 enum { BALLS_LARGEST = 1 << 20 };
 
 void balls_lay(FlatScene *flat, bool wide)
@@ -106,5 +104,5 @@ void balls_lay(FlatScene *flat, bool wide)
     Ball *row = flat->arrays[FLAT_BALLS].items;
     row_lay(flat, (Vector3){0, 0, 0}, roundoff, row);
     for (size_t i = 0; i < lights->count; i++)
-        row_lay(flat, vector_of(((const FlatLight *)lights->items)[i].position), roundoff, row += count);
+        row_lay(flat, vector3_of(&((const FlatLight *)lights->items)[i].position), roundoff, row += count);
 }

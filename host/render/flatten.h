@@ -49,6 +49,11 @@ typedef struct {
 void flatten(FlatScene *flat, const Scene *scene, const FlattenSettings *settings);
 void flat_scene_free(FlatScene *flat);
 
+static inline Vector3 vector3_of(const scalar4 *v)
+{
+    return (Vector3){v->x, v->y, v->z};
+}
+
 FlatArray flat_array_make(size_t kind, size_t count);    // zeroed
 FlatArray flat_nodes_make(size_t count, unsigned width); // of `width` children: a power of two, 4 to 16
 void *flat_array_at(const FlatArray *array, size_t index);

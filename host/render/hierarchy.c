@@ -12,11 +12,6 @@ static Vector3 circle_reach(Vector3 unit)
     return (Vector3){hypot(unit.y, unit.z), hypot(unit.x, unit.z), hypot(unit.x, unit.y)};
 }
 
-static Vector3 vector_of(scalar4 v)
-{
-    return (Vector3){v.x, v.y, v.z};
-}
-
 static void box_include(BvhBox *box, Vector3 center, Vector3 reach)
 {
     const double centers[3] = {center.x, center.y, center.z}, reaches[3] = {reach.x, reach.y, reach.z};
@@ -30,7 +25,7 @@ static void box_include(BvhBox *box, Vector3 center, Vector3 reach)
 static bool revolution_box(const Revolution *shape, BvhBox *box)
 {
     if (!(shape->id.y & REVOLUTION_FINITE)) return false;
-    Vector3 base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
+    Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
     double length = shape->range.y, radius = shape->base_radius.w / length;
     double height = shape->range.x / shape->range.z; // in units of the stored axis
     double end_radius = radius + shape->axis_slope.w * height * length;
@@ -48,32 +43,32 @@ bool primitive_box(size_t kind, const void *primitive, BvhBox *box)
     case KIND_SPHERES: {
         const Sphere *sphere = primitive;
         double radius = sphere->center_radius.w;
-        box_include(box, vector_of(sphere->center_radius), (Vector3){radius, radius, radius});
+        box_include(box, vector3_of(&sphere->center_radius), (Vector3){radius, radius, radius});
         return true;
     }
     case KIND_DISCS: {
         const Disc *disc = primitive;
         double radius = disc->center_radius.w;
-        box_include(box, vector_of(disc->center_radius), (Vector3){radius, radius, radius});
+        box_include(box, vector3_of(&disc->center_radius), (Vector3){radius, radius, radius});
         return true;
     }
     case KIND_BOXES:
-        box_include(box, vector_of(((const Box *)primitive)->low), nothing);
-        box_include(box, vector_of(((const Box *)primitive)->high), nothing);
+        box_include(box, vector3_of(&((const Box *)primitive)->low), nothing);
+        box_include(box, vector3_of(&((const Box *)primitive)->high), nothing);
         return true;
     case KIND_CYLINDERS:
     case KIND_CONES:
         return revolution_box(primitive, box);
     case KIND_TRIANGLES:
-        box_include(box, vector_of(((const Triangle *)primitive)->a), nothing);
-        box_include(box, vector_of(((const Triangle *)primitive)->b), nothing);
-        box_include(box, vector_of(((const Triangle *)primitive)->c), nothing);
+        box_include(box, vector3_of(&((const Triangle *)primitive)->a), nothing);
+        box_include(box, vector3_of(&((const Triangle *)primitive)->b), nothing);
+        box_include(box, vector3_of(&((const Triangle *)primitive)->c), nothing);
         return true;
     case KIND_TORI: {
         const Torus *torus = primitive;
         double major = torus->center_major.w, minor = torus->axis_minor.w;
-        Vector3 reach = vector_scale(circle_reach(vector_of(torus->axis_minor)), major);
-        box_include(box, vector_of(torus->center_major), vector_add(reach, (Vector3){minor, minor, minor}));
+        Vector3 reach = vector_scale(circle_reach(vector3_of(&torus->axis_minor)), major);
+        box_include(box, vector3_of(&torus->center_major), vector_add(reach, (Vector3){minor, minor, minor}));
         return true;
     }
     default:

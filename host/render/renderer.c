@@ -185,7 +185,9 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
         report->features |= FEATURE_BVH;
         report->bvh_seconds = clock_seconds() - start;
     }
+    start = clock_seconds();
     balls_lay(&flat, report->wide);
+    report->flatten_seconds += clock_seconds() - start;
     if (!device_has_room(&flat, renderer, messages)) {
         flat_scene_free(&flat);
         free(renderer);
