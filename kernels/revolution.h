@@ -169,7 +169,7 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
                                       const Ray *ray, real t)
 {
     scalar first = shape->base_radius.w;
-    scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
+    scalar widest = fmax(first, (fma)(shape->axis_slope.w, shape->range.x, first));
     Vector way = vector_scale(ray->direction, t);
     real size =
         vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_magnitude(way);
