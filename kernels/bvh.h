@@ -67,7 +67,7 @@ static inline mask box_rays_meet(const BoxRays *rays, const Ray *ray, scalar4 lo
 
 // What rays that all run to the same side have in common along one axis. None is at a plane at p ahead of
 // them before p * least + to_near, or after p * most + to_far. For planes behind them it would be the other
-// way round, but both are below 0 there, where no ray looks.
+// way round, but both are below 0 there, but for the slack, where no ray looks.
 typedef struct {
     scalar least, most; // 1 / direction
     scalar to_near, to_far;

@@ -199,7 +199,9 @@ static inline scalar_integer lanes_smallest(integer value)
 // Where clang names the one instruction of x86 that takes a mask to its bits; what stands in for it below is
 // some ten.
 #if defined(__x86_64__) && defined(__has_builtin)
-#if LANES == 16 && !IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
+#if __clang_major__ >= 18 && __clang_major__ <= 20 && !defined(__EVEX512__)
+// which ask for this of 512 bits
+#elif LANES == 16 && !IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
 #define MASK_BITS __builtin_ia32_cvtd2mask512
 #elif LANES == 8 && IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtq2mask512)
 #define MASK_BITS __builtin_ia32_cvtq2mask512

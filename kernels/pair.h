@@ -4,8 +4,9 @@
 // than some compilers finish. Ours adds the product's two halves to c without error and rounds the sum once,
 // what is left out being rounded to odd before (Boldo, Melquiond, Emulation of a FMA and correctly rounded
 // sums: proved algorithms using rounding to odd, IEEE Transactions on Computers 57(4), 2008; the operands are
-// split between bits here, which overflows nowhere). Bits differ from fma's only where the product is beyond
-// the largest real or so small, below 2^-102, that its lower half is no normal number.
+// split between bits here, which overflows nowhere). Bits differ from fma's only where the product or the sum
+// is within a few ulp of the largest real or beyond it, or the product is so small, below 2^-102, that its
+// lower half is no normal number; below some 2^-80 on a device that takes subnormal numbers for 0.
 #ifndef PAIR_H
 #define PAIR_H
 
@@ -72,9 +73,10 @@ static inline real fma_in_software(real a, real b, real c)
     Pair product = pair_product(a, b);
     Pair lower = pair_sum(c, product.low), upper = pair_sum(product.high, lower.high);
     real once = upper.high + pair_odd(pair_sum(upper.low, lower.low));
-    // has the right sign where the sum is 0, and is right beyond the largest real
+    // has the right sign where the sum is 0, and is a number or infinity beyond the largest real
     real twice = product.high + c;
-    return lanes_select((fabs(twice) <= (real)(LARGEST)) & (once != (real)(0)), once, twice);
+    mask finite = (fabs(twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
+    return lanes_select(finite & (once != (real)(0)), once, twice);
 }
 
 // Of lanes; the device's own remains (fma)(a, b, c).

@@ -124,7 +124,8 @@ static inline void ray_take_apex(Ray *ray, uint apex)
 // The lines that certainly miss a ball, for rays with an apex. A line along d through a point misses a ball
 // around v, seen from there, if (v . d)^2 < p d^2 for the point's power p = v^2 - r^2. The ball counts as
 // larger by 64 u (|v| + |d|): by what a test of the shape in it may be off, by roundings here, and by the
-// line's own way past the apex. That is less than 256 u v^2, which p has been lowered by, and 128 u d^2.
+// line's own way past the apex. That is less than 256 u v^2, which p has been lowered by, and 128 u d^2; rays
+// from the eye start there, and need the former alone.
 static inline mask ray_misses_ball(const Ray *ray, global const Ball *ball)
 {
     global const scalar *center_power = (global const scalar *)ball;

@@ -186,8 +186,8 @@ static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, rea
 static inline void triangle_smooth(Corners normals, TriangleWeights weights, Patch *patch)
 {
     Vector normal = triangle_blend(weights, normals);
-    mask vanishes = vector_dot(normal, normal) == (real)(0);
-    patch->shading_normal = vector_select(vanishes, patch->normal, vector_normalize(normal));
+    mask bends = vector_dot(normal, normal) > (real)(0);
+    patch->shading_normal = vector_select(bends, vector_normalize(normal), patch->normal);
 }
 
 #endif

@@ -89,8 +89,8 @@ static void trial_open(Trial *trial, bool from_eye)
     arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, 1);
     arrays[FLAT_FIRST_SHAPE + KIND_SPHERES] =
         flat_array_make(FLAT_FIRST_SHAPE + KIND_SPHERES, BALLS_PER_APEX);
-    // at smaller ones float's fourth powers of lengths vanish, and nothing is passed over
-    trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 20));
+    // elsewhere float's fourth powers of lengths vanish or are infinite, and nothing is passed over
+    trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 16));
     Vector3 apex =
         vector_scale(random_in_ball(&trial->random), trial->scale * random_power(&trial->random, -2, 4));
     trial->apex = from_eye ? (Vector3){0, 0, 0} : vector_rounded(trial, apex);

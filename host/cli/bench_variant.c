@@ -115,7 +115,7 @@ bool variant_run(Variant *variant, BenchTimes *times)
     renderer_report_restart(variant->renderer);
     const RenderReport *report = renderer_report(variant->renderer);
     size_t scalar = report->wide ? sizeof(double) : sizeof(float);
-    RunContext run = {variant->settings.width * 3 * scalar, 0};
+    RunContext run = {variant->settings.region_width * 3 * scalar, 0};
     if (!renderer_render(variant->renderer, 0, band_read, &run)) return false;
     for (size_t i = 0; times && i < report->launches.count; i++)
         bench_add_launch(times, &report->launches.items[i].time);

@@ -128,7 +128,8 @@ static void prelude_write(Renderer *renderer)
     const Device *device = renderer->compute->device;
     // errors are repaired, as on a device that makes them
     bool correct = device->correctly_rounded && seed == 0;
-    // of doubles it is asked for; Intel's runtime for CPUs does not tell of it
+    // of doubles it is asked for; Intel's runtime for CPUs does not tell of it, but has vectors, which
+    // llvmpipe and Oclgrind do not tell of
     bool has_fma = renderer->report.wide || device->fma_in_hardware || device->native_float_width > 1;
     Text *text = &renderer->prelude;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
