@@ -35,7 +35,10 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global scalar *directions, g
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
-    Tile tile = band_tile(&band);
-    if (lanes_any(tile.inside))
-        tile_describe(&scene, &tile, directions, ts, normals, positions, objects_hit, shadows, shadow_count);
+    for (uint i = 0; i < ITEM_TILES; i++) {
+        Tile tile = band_tile(&band, i);
+        if (lanes_any(tile.inside))
+            tile_describe(&scene, &tile, directions, ts, normals, positions, objects_hit, shadows,
+                          shadow_count);
+    }
 }

@@ -15,10 +15,15 @@ typedef struct {
     uint width;    // of the band
 } Tile;
 
-static inline Tile band_tile(const Band *band)
+// How many tiles a work-item carries.
+#define ITEM_TILES (LANES == 1 ? 1 : ITEM_TILES_LARGEST)
+
+// The work-item's tiles, counted from 0.
+static inline Tile band_tile(const Band *band, uint which)
 {
     Tile tile;
-    integer x = (integer)((scalar_integer)(get_global_id(0) * TILE_WIDTH)) + LANE_X;
+    uint column = (uint)get_global_id(0) * ITEM_TILES + which;
+    integer x = (integer)((scalar_integer)(column * TILE_WIDTH)) + LANE_X;
     integer y = (integer)((scalar_integer)(get_global_id(1) * TILE_HEIGHT)) + LANE_Y;
     tile.inside =
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));

@@ -14,6 +14,8 @@ kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
-    Tile tile = band_tile(&band);
-    if (lanes_any(tile.inside)) tile_sign(&scene, &tile, paths);
+    for (uint i = 0; i < ITEM_TILES; i++) {
+        Tile tile = band_tile(&band, i);
+        if (lanes_any(tile.inside)) tile_sign(&scene, &tile, paths);
+    }
 }

@@ -41,6 +41,8 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar 
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
-    Tile tile = band_tile(&band);
-    if (lanes_any(tile.inside)) tile_render(&scene, &tile, offsets, film, losses, first_sample, last_sample);
+    for (uint i = 0; i < ITEM_TILES; i++) {
+        Tile tile = band_tile(&band, i);
+        if (lanes_any(tile.inside)) tile_render(&scene, &tile, offsets, film, losses, first_sample, last_sample);
+    }
 }

@@ -182,6 +182,10 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define PATH_START  0x811c9dc5u
 #define PATH_FACTOR 0x01000193u
 
+// Neighboring tiles along a row that a work-item of several lanes carries, one after the other. As its own
+// group, which it is on a CPU, it costs PoCL some hundred cycles to start.
+enum { ITEM_TILES_LARGEST = 8 };
+
 // What a counting build counts.
 enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
 

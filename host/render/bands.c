@@ -108,9 +108,10 @@ static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows
 {
     TileShape tile = tile_shape(renderer->report.lanes);
     size_t side = group_side(renderer);
+    size_t item_width = renderer->report.lanes > 1 ? ITEM_TILES_LARGEST * tile.width : tile.width;
     const size_t local[2] = {side, side};
     const size_t global[2] = {
-        rounded_up((renderer->settings.region_width + tile.width - 1) / tile.width, side),
+        rounded_up((renderer->settings.region_width + item_width - 1) / item_width, side),
         rounded_up((rows.row_count + tile.height - 1) / tile.height, side)};
     return renderer_launch(renderer, kind, 2, global, local);
 }
