@@ -64,7 +64,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 
 static inline Patch disc_patch(const Disc *disc, const Ray *ray, real t)
 {
-    return plane_crossing_patch(vector_of(disc->center_radius), vector_of(disc->normal), ray, t);
+    return plane_crossing_patch(vector_of(disc->center_radius), disc->normal, ray, t);
 }
 
 #endif

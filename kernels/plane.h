@@ -37,10 +37,11 @@ static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
     return plane_crossing(vector_of(plane->point), vector_of(plane->normal), ray, t);
 }
 
-// The point where the ray crosses a plane, moved onto it once.
-static inline Patch plane_crossing_patch(Vector point, Vector normal, const Ray *ray, real t)
+// The point where the ray crosses a plane, moved onto it once. The normal's w is one over its length.
+static inline Patch plane_crossing_patch(Vector point, scalar4 normal, const Ray *ray, real t)
 {
-    Vector unit = vector_normalize(normal);
+    Vector unit = IS_COMPENSATED ? vector_normalize(vector_of(normal))
+                                 : vector_scale(vector_of(normal), (real)(normal.w));
     Vector from_point = ray_point_from(ray, point, t);
     from_point = vector_fma(unit, -vector_dot(unit, from_point), from_point);
     Patch patch = patch_make(vector_add(from_point, point), unit,
@@ -51,7 +52,7 @@ static inline Patch plane_crossing_patch(Vector point, Vector normal, const Ray 
 
 static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)
 {
-    return plane_crossing_patch(vector_of(plane->point), vector_of(plane->normal), ray, t);
+    return plane_crossing_patch(vector_of(plane->point), plane->normal, ray, t);
 }
 
 #endif

@@ -33,14 +33,14 @@ enum { ONLY_INSIDE = 8 };
 
 typedef struct {
     scalar4 point;
-    scalar4 normal;
+    scalar4 normal;         // w: 1 / its length
     scalar4 grid_u, grid_v; // checker squares, or pictures, along the plane: u = xyz . p + w
     uint4 id;
 } Plane;
 
 typedef struct {
     scalar4 center_radius;
-    scalar4 normal;
+    scalar4 normal; // w: 1 / its length
     scalar4 grid_u, grid_v;
     uint4 id;
 } Disc;

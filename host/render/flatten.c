@@ -70,6 +70,13 @@ static Vector3 axis_scaled(Vector3 axis)
     return (Vector3){ldexp(axis.x, -exponent), ldexp(axis.y, -exponent), ldexp(axis.z, -exponent)};
 }
 
+// A plane's normal, of any length, and one over that length.
+static scalar4 plane_normal(const Rounding *rounding, Vector3 normal)
+{
+    Vector3 scaled = vector_rounded(rounding, axis_scaled(normal));
+    return scalar4_of(scaled, 1 / vector_length(scaled));
+}
+
 // The first axis of the squares on a plane: the world axis least aligned with the normal, laid into the
 // plane.
 static Vector3 grid_axis(Vector3 unit_normal)
@@ -166,7 +173,7 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
     case SHAPE_PLANE: {
         Plane *plane = target;
         *plane = (Plane){.point = scalar4_of(point_from_eye(rounding, object->as.plane.point), 0),
-                         .normal = scalar4_of(axis_scaled(object->as.plane.normal), 0)};
+                         .normal = plane_normal(rounding, object->as.plane.normal)};
         grid_flatten(rounding, object->as.plane.normal, material, &plane->grid_u, &plane->grid_v);
         break;
     }
@@ -174,7 +181,7 @@ static void object_flatten(const Rounding *rounding, const Object *object, const
         Disc *disc = target;
         *disc = (Disc){.center_radius = scalar4_of(point_from_eye(rounding, object->as.disc.center),
                                                    object->as.disc.radius),
-                       .normal = scalar4_of(axis_scaled(object->as.disc.normal), 0)};
+                       .normal = plane_normal(rounding, object->as.disc.normal)};
         grid_flatten(rounding, object->as.disc.normal, material, &disc->grid_u, &disc->grid_v);
         break;
     }
