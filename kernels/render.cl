@@ -43,6 +43,7 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar 
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     for (uint i = 0; i < ITEM_TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_render(&scene, &tile, offsets, film, losses, first_sample, last_sample);
+        if (lanes_any(tile.inside))
+            tile_render(&scene, &tile, offsets, film, losses, first_sample, last_sample);
     }
 }
