@@ -3,7 +3,8 @@
 // A node's boxes are first held all at once against a beam that has every ray of the packet in it, by
 // interval arithmetic (Boulos, Wald, Shirley, Geometric and arithmetic culling methods for entire ray
 // packets, University of Utah, UUCS-06-010, 2006; there one box after the other): a lane there is a box.
-// Those that the beam meets are held against the rays, one box after the other: a lane there is a ray.
+// Those that the beam meets are held against the rays: one box after the other, a lane there is a ray; or,
+// where fewer rays are left than boxes, one ray after the other against all boxes.
 //
 // A hit may lie outside its primitive's box, for any shape: each test is off by a few u times the distance
 // between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
@@ -17,11 +18,13 @@
 
 #include "ray.h"
 
-// The rays of a packet. A plane's distance is plane * inverse + to_plane, give or take `around`.
+// The rays of a packet. A plane is between plane * inverse + to_near and plane * inverse + to_far.
 typedef struct {
     Vector inverse; // 1 / direction, bounded
-    Vector to_plane, around;
+    Vector to_near, to_far;
+    real near;
     real slack;
+    integer signs; // bit i: the direction is negative along axis i
 } BoxRays;
 
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
@@ -35,12 +38,19 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),
                       real_min(real_max(ray->inverse.y, -largest), largest),
                       real_min(real_max(ray->inverse.z, -largest), largest)};
+    Vector to_plane = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
+    Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
+    const integer zero = (integer)(0);
+    Vector d = ray->direction;
     BoxRays rays;
     rays.inverse = inverse;
-    rays.to_plane =
-        (Vector){-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
-    rays.around = (Vector){slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
+    rays.to_near = vector_subtract(to_plane, around);
+    rays.to_far = vector_add(to_plane, around);
+    rays.near = ray->near;
     rays.slack = slack;
+    rays.signs = lanes_select(d.x < (real)(0), (integer)(1), zero) |
+                 lanes_select(d.y < (real)(0), (integer)(2), zero) |
+                 lanes_select(d.z < (real)(0), (integer)(4), zero);
     return rays;
 }
 
@@ -49,19 +59,20 @@ typedef struct {
 } BoxSpan;
 
 // Where rays are between two planes across an axis.
-static inline BoxSpan box_rays_between(scalar low, scalar high, real inverse, real to_plane, real around)
+static inline BoxSpan box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
 {
-    real at_low = fma((real)(low), inverse, to_plane), at_high = fma((real)(high), inverse, to_plane);
-    return (BoxSpan){real_min(at_low, at_high) - around, real_max(at_low, at_high) + around};
+    return (BoxSpan){real_min(fma((real)(low), inverse, to_near), fma((real)(high), inverse, to_near)),
+                     real_max(fma((real)(low), inverse, to_far), fma((real)(high), inverse, to_far))};
 }
 
-// Which rays meet a box between ray->near and `limit`.
-static inline mask box_rays_meet(const BoxRays *rays, const Ray *ray, scalar4 low, scalar4 high, real limit)
+// Which rays meet a box between `near` and `limit`.
+static inline mask box_rays_meet(const BoxRays *rays, scalar4 low, scalar4 high, real limit)
 {
-    BoxSpan x = box_rays_between(low.x, high.x, rays->inverse.x, rays->to_plane.x, rays->around.x);
-    BoxSpan y = box_rays_between(low.y, high.y, rays->inverse.y, rays->to_plane.y, rays->around.y);
-    BoxSpan z = box_rays_between(low.z, high.z, rays->inverse.z, rays->to_plane.z, rays->around.z);
-    return real_max(real_max(x.enter, y.enter), real_max(z.enter, ray->near)) <=
+    Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
+    BoxSpan x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
+    BoxSpan y = box_rays_between(low.y, high.y, inverse.y, to_near.y, to_far.y);
+    BoxSpan z = box_rays_between(low.z, high.z, inverse.z, to_near.z, to_far.z);
+    return real_max(real_max(x.enter, y.enter), real_max(z.enter, rays->near)) <=
            real_min(real_min(x.leave, y.leave), real_min(z.leave, limit));
 }
 
@@ -76,8 +87,8 @@ typedef struct {
 
 typedef struct {
     BeamAxis x, y, z;
-    scalar near, limit;     // all that the rays look for lies between
-    Vector to_near, to_far; // BoxRays' to_plane, with `around`
+    scalar near, limit; // all that the rays look for lies between
+    bool parted;        // no beam: the rays run to different sides, and only the limit is known of them
 } Beam;
 
 enum { BEAM_LEAST, BEAM_MOST = 3, BEAM_START = 6, BEAM_END = 9, BEAM_NEAR = 12, BEAM_LIMIT };
@@ -112,7 +123,7 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
     beam_axis_gather(&leasts, 0, members, ray->origin.x, rays->inverse.x, rays->slack, signs & 1);
     beam_axis_gather(&leasts, 1, members, ray->origin.y, rays->inverse.y, rays->slack, signs & 2);
     beam_axis_gather(&leasts, 2, members, ray->origin.z, rays->inverse.z, rays->slack, signs & 4);
-    leasts.all[BEAM_NEAR] = lanes_select(members, ray->near, (real)(LARGEST));
+    leasts.all[BEAM_NEAR] = lanes_select(members, rays->near, (real)(LARGEST));
     for (uint i = BEAM_LIMIT; i < LEASTS; i++)
         leasts.all[i] = lanes_select(members, -limit, (real)(LARGEST));
     leasts_find(&leasts);
@@ -124,19 +135,32 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
     beam.y = beam_axis(&leasts, 1, signs & 2, everywhere);
     beam.z = beam_axis(&leasts, 2, signs & 4, everywhere);
     beam.limit = -leasts.each[BEAM_LIMIT];
-    beam.to_near = vector_subtract(rays->to_plane, rays->around);
-    beam.to_far = vector_add(rays->to_plane, rays->around);
+    beam.parted = false;
     return beam;
+}
+
+static inline Beam beam_parted(mask members, real limit)
+{
+    Beam beam;
+    beam.near = -LARGEST;
+    beam.limit = lanes_largest(members, limit);
+    beam.parted = true;
+    return beam;
+}
+
+static inline real boxes_planes(global const scalar *boxes, uint which)
+{
+    return real_load(boxes + which * BVH_WIDTH);
 }
 
 static inline real beam_axis_enter(const BeamAxis *axis, global const scalar *boxes)
 {
-    return fma(real_load(boxes + axis->near * BVH_WIDTH), (real)(axis->least), (real)(axis->to_near));
+    return fma(boxes_planes(boxes, axis->near), (real)(axis->least), (real)(axis->to_near));
 }
 
 static inline real beam_axis_leave(const BeamAxis *axis, global const scalar *boxes)
 {
-    return fma(real_load(boxes + axis->far * BVH_WIDTH), (real)(axis->most), (real)(axis->to_far));
+    return fma(boxes_planes(boxes, axis->far), (real)(axis->most), (real)(axis->to_far));
 }
 
 // The boxes, as many as there are lanes, that the beam meets, and the distance before which no ray is in
@@ -156,18 +180,62 @@ static inline real box_plane(global const scalar *box, uint which)
 }
 
 // The beam's rays that meet one box.
-static inline mask beam_rays_meet(const Beam *beam, const BoxRays *rays, const Ray *ray,
-                                  global const scalar *box, real limit)
+static inline mask beam_rays_meet(const Beam *beam, const BoxRays *rays, global const scalar *box, real limit)
 {
-    Vector inverse = rays->inverse;
-    real near_x = fma(box_plane(box, beam->x.near), inverse.x, beam->to_near.x);
-    real near_y = fma(box_plane(box, beam->y.near), inverse.y, beam->to_near.y);
-    real near_z = fma(box_plane(box, beam->z.near), inverse.z, beam->to_near.z);
-    real far_x = fma(box_plane(box, beam->x.far), inverse.x, beam->to_far.x);
-    real far_y = fma(box_plane(box, beam->y.far), inverse.y, beam->to_far.y);
-    real far_z = fma(box_plane(box, beam->z.far), inverse.z, beam->to_far.z);
-    return real_max(real_max(near_x, near_y), real_max(near_z, ray->near)) <=
+    Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
+    real near_x = fma(box_plane(box, beam->x.near), inverse.x, to_near.x);
+    real near_y = fma(box_plane(box, beam->y.near), inverse.y, to_near.y);
+    real near_z = fma(box_plane(box, beam->z.near), inverse.z, to_near.z);
+    real far_x = fma(box_plane(box, beam->x.far), inverse.x, to_far.x);
+    real far_y = fma(box_plane(box, beam->y.far), inverse.y, to_far.y);
+    real far_z = fma(box_plane(box, beam->z.far), inverse.z, to_far.z);
+    return real_max(real_max(near_x, near_y), real_max(near_z, rays->near)) <=
            real_min(real_min(far_x, far_y), real_min(far_z, limit));
+}
+
+// The rays once more, where they are first read one by one: of what is read so the compiler would keep
+// nothing in registers.
+typedef struct {
+    BoxRays rays;
+    bool is_laid;
+} LaidRays;
+
+// The boxes, as many as there are lanes, that one ray meets, and where.
+static inline mask laid_ray_meets(const BoxRays *rays, uint lane, global const scalar *boxes, scalar limit,
+                                  real *near)
+{
+    uint signs = (uint)integer_of_lane(&rays->signs, lane);
+    uint x = signs & 1 ? BVH_HIGH : BVH_LOW, y = signs & 2 ? BVH_HIGH : BVH_LOW,
+         z = signs & 4 ? BVH_HIGH : BVH_LOW, other = BVH_LOW + BVH_HIGH;
+    real inverse_x = real_of_lane(&rays->inverse.x, lane);
+    real inverse_y = real_of_lane(&rays->inverse.y, lane);
+    real inverse_z = real_of_lane(&rays->inverse.z, lane);
+    real near_x = fma(boxes_planes(boxes, x), inverse_x, real_of_lane(&rays->to_near.x, lane));
+    real near_y = fma(boxes_planes(boxes, 1 + y), inverse_y, real_of_lane(&rays->to_near.y, lane));
+    real near_z = fma(boxes_planes(boxes, 2 + z), inverse_z, real_of_lane(&rays->to_near.z, lane));
+    real far_x = fma(boxes_planes(boxes, other - x), inverse_x, real_of_lane(&rays->to_far.x, lane));
+    real far_y = fma(boxes_planes(boxes, 1 + other - y), inverse_y, real_of_lane(&rays->to_far.y, lane));
+    real far_z = fma(boxes_planes(boxes, 2 + other - z), inverse_z, real_of_lane(&rays->to_far.z, lane));
+    *near = real_max(real_max(near_x, near_y), real_max(near_z, real_of_lane(&rays->near, lane)));
+    return *near <= real_min(real_min(far_x, far_y), real_min(far_z, (real)(limit)));
+}
+
+// Of each box the lanes, among some, whose rays meet it, as bits, and where the first of them does.
+static inline integer laid_rays_meet(LaidRays *laid, const BoxRays *rays, uint lanes,
+                                     global const scalar *boxes, real limit, real *near)
+{
+    if (!laid->is_laid) *laid = (LaidRays){*rays, true};
+    RealLanes limits = {limit};
+    integer met_by = (integer)(0);
+    *near = (real)(LARGEST);
+    for (; lanes != 0; lanes &= lanes - 1) {
+        uint lane = bit_lowest(lanes);
+        real its_near;
+        mask its = laid_ray_meets(&laid->rays, lane, boxes, limits.each[lane], &its_near);
+        met_by = lanes_select(its, met_by | (integer)((scalar_integer)1 << lane), met_by);
+        *near = lanes_select(its & (its_near < *near), its_near, *near);
+    }
+    return met_by;
 }
 
 #endif

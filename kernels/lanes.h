@@ -241,6 +241,17 @@ static inline bool lanes_all(mask condition)
     return !lanes_any(!condition);
 }
 
+// One lane's number, in all lanes; of lanes in memory.
+static inline real real_of_lane(const real *lanes, uint lane)
+{
+    return (real)(((const scalar *)lanes)[lane]);
+}
+
+static inline scalar_integer integer_of_lane(const integer *lanes, uint lane)
+{
+    return ((const scalar_integer *)lanes)[lane];
+}
+
 // Comparisons in place of fmin and fmax: no promise about NaN is needed, and they are one instruction.
 static inline real real_min(real a, real b)
 {

@@ -172,6 +172,7 @@ static inline real search_limit(const Search *search)
 typedef struct {
     uint first, what;
     scalar near;
+    uint lanes; // whose rays meet it, as bits
 } Waiting;
 
 // Each node leaves at most all but one of its children waiting.
@@ -188,11 +189,16 @@ static inline void waiting_fetch(const Scene *scene, uint first, uint what)
         memory_fetch((global const char *)&scene->spheres[first], sizeof(Sphere));
 }
 
+// Up to so many lanes are held against a node's boxes one by one at once, which takes no longer than the beam
+// and what it lets pass; and up to twice as many are not worth a beam of their own.
+#define FEW_LANES (LANES >> 2)
+
 // Puts a node's children that rays meet on the stack, the nearest last; where anything may block them, the
-// farthest: what lies around a ray's start, mostly the surface it left, blocks it least.
-static inline uint node_open(const Scene *scene, uint index, const Beam *beam, const BoxRays *rays,
-                             const Ray *ray, real limit, scalar beam_limit, bool any, Waiting *waiting,
-                             uint count)
+// farthest: what lies around a ray's start, mostly the surface it left, blocks it least. `lanes` are those
+// that meet the node and still look.
+static inline uint node_open(const Scene *scene, uint index, uint lanes, const Beam *beam,
+                             const BoxRays *rays, LaidRays *laid, real limit, scalar beam_limit, bool any,
+                             Waiting *waiting, uint count)
 {
     global const BvhNode *node = &scene->nodes[index];
     const uint bottom = count;
@@ -200,11 +206,25 @@ static inline uint node_open(const Scene *scene, uint index, const Beam *beam, c
     for (uint part = 0; part < BVH_WIDTH; part += LANES) {
         global const scalar *boxes = (global const scalar *)node->planes + part;
         RealLanes nears;
-        uint met = lanes_bits(beam_meets(beam, boxes, beam_limit, &nears.all));
+        IntegerLanes met_by;
+        uint met = 0;
+        // a single ray is its own beam
+        bool one_by_one = LANES > 1 && (beam->parted || popcount(lanes) <= FEW_LANES);
+        if (!one_by_one) {
+            met = lanes_bits(beam_meets(beam, boxes, beam_limit, &nears.all));
+            one_by_one = LANES > 1 && popcount(met) > popcount(lanes);
+        }
+        if (one_by_one) {
+            met_by.all = laid_rays_meet(laid, rays, lanes, boxes, limit, &nears.all);
+            met = lanes_bits(met_by.all != (integer)(0));
+        }
         for (; met != 0; met &= met - 1) {
-            uint child = bit_lowest(met);
-            // a single ray is its own beam
-            if (LANES > 1 && !lanes_any(beam_rays_meet(beam, rays, ray, boxes + child, limit))) continue;
+            uint child = bit_lowest(met), by = 1;
+            if (one_by_one)
+                by = (uint)met_by.each[child];
+            else if (LANES > 1)
+                by = lanes_bits(beam_rays_meet(beam, rays, boxes + child, limit));
+            if (by == 0) continue;
             scalar near = nears.each[child];
             uint place = count++;
             for (; place > bottom; place--) {
@@ -212,7 +232,7 @@ static inline uint node_open(const Scene *scene, uint index, const Beam *beam, c
                 if (any ? below.near <= near : below.near >= near) break;
                 waiting[place] = below;
             }
-            waiting[place] = (Waiting){firsts[part + child], whats[part + child], near};
+            waiting[place] = (Waiting){firsts[part + child], whats[part + child], near, by};
             waiting_fetch(scene, firsts[part + child], whats[part + child]);
         }
     }
@@ -220,30 +240,34 @@ static inline uint node_open(const Scene *scene, uint index, const Beam *beam, c
 }
 
 // Down the tree; a packet visits what any of its lanes meets.
-static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const BoxRays *rays,
-                              const Beam *beam)
+static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const Beam *beam,
+                              const BoxRays *rays, LaidRays *laid)
 {
-    Waiting waiting[WAITING_LARGEST];
-    waiting[0] = (Waiting){0, BVH_NODE, beam->near};
-    uint count = 1;
     real limit = search_limit(search);
     scalar beam_limit = beam->limit;
+    uint open = lanes_bits(search->open);
+    Waiting waiting[WAITING_LARGEST];
+    waiting[0] = (Waiting){0, BVH_NODE, beam->near, open};
+    uint count = 1;
     while (count > 0) {
         Waiting next = waiting[--count];
-        if (next.near > beam_limit) continue;
+        uint lanes = next.lanes & open;
+        if (next.near > beam_limit || lanes == 0) continue;
         if (next.what == BVH_NODE) {
-            count =
-                node_open(scene, next.first, beam, rays, ray, limit, beam_limit, search->any, waiting, count);
+            count = node_open(scene, next.first, lanes, beam, rays, laid, limit, beam_limit, search->any,
+                              waiting, count);
         } else {
             search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8), 0);
-            if (!lanes_any(search->open)) return;
+            open = lanes_bits(search->open);
+            if (open == 0) return;
             limit = search_limit(search);
             beam_limit = lanes_largest(search->open, limit);
         }
     }
 }
 
-// Rays of one packet mostly run to the same sides; where they do not, those that do go together.
+// Rays of one packet mostly run to the same sides; where they do not, those that do go together, and all
+// those with few to go with after them.
 static inline void search_hierarchy(Search *search, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
@@ -251,22 +275,33 @@ static inline void search_hierarchy(Search *search, const Scene *scene, Ray *ray
     if (balls && balls_missed(balls, 1, ray)) return;
     ray_make_frame(ray);
     BoxRays rays = box_rays(ray, header->bounds);
-    mask looking = box_rays_meet(&rays, ray, header->bounds_low, header->bounds_high, search_limit(search));
+    mask looking = box_rays_meet(&rays, header->bounds_low, header->bounds_high, search_limit(search));
     if (!lanes_any(looking)) return;
-    const integer zero = (integer)(0), others_signs = (integer)(8);
-    Vector d = ray->direction;
-    integer signs = lanes_select(d.x < (real)(0), (integer)(1), zero) |
-                    lanes_select(d.y < (real)(0), (integer)(2), zero) |
-                    lanes_select(d.z < (real)(0), (integer)(4), zero);
+    mask parted = mask_none();
+    LaidRays laid;
+    laid.is_laid = false;
+    const integer others_signs = (integer)(8);
     do {
-        scalar_integer first = lanes_smallest(lanes_select(looking, signs, others_signs));
-        mask members = looking & (signs == (integer)(first)), others = search->open & !members;
-        looking = looking & !members;
+        mask members = parted;
+        Beam beam;
+        if (lanes_any(looking)) {
+            scalar_integer first = lanes_smallest(lanes_select(looking, rays.signs, others_signs));
+            members = looking & (rays.signs == (integer)(first));
+            looking = looking & !members;
+            if (LANES > 1 && popcount(lanes_bits(members)) <= 2 * FEW_LANES) {
+                parted = parted | members;
+                continue;
+            }
+            beam = beam_make(&rays, ray, members, (uint)first, search_limit(search));
+        } else {
+            parted = mask_none();
+            beam = beam_parted(members, search_limit(search));
+        }
+        mask others = search->open & !members;
         search->open = search->open & members;
-        Beam beam = beam_make(&rays, ray, members, (uint)first, search_limit(search));
-        search_bvh(search, scene, ray, &rays, &beam);
+        search_bvh(search, scene, ray, &beam, &rays, &laid);
         search->open = search->open | others;
-    } while (lanes_any(looking));
+    } while (lanes_any(looking | parted));
 }
 
 // Tests what does not hang in the hierarchy.
