@@ -224,8 +224,8 @@ static void few_boxes_make_a_tree(void **state)
 
 // On and off
 
-static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const ProbeRay *rays, size_t count,
-                  ProbeHit *hits)
+static void trace_lanes(const Scene *scene, Precision precision, BvhChoice bvh, uint32_t lanes,
+                        const ProbeRay *rays, size_t count, ProbeHit *hits)
 {
     const RenderSettings settings = {.width = 1,
                                      .height = 1,
@@ -233,12 +233,19 @@ static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const 
                                      .region_height = 1,
                                      .sample_count = 1,
                                      .precision = precision,
+                                     .lanes = lanes,
                                      .bvh = bvh,
                                      .extra_features = FEATURE_ALL};
     Renderer *renderer = probe_renderer(scene, &settings);
     assert_non_null(renderer);
     renderer_trace(renderer, rays, count, hits);
     renderer_close(renderer);
+}
+
+static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const ProbeRay *rays, size_t count,
+                  ProbeHit *hits)
+{
+    trace_lanes(scene, precision, bvh, 0, rays, count, hits);
 }
 
 static Object random_object(ShapeKind kind, double size)
@@ -416,6 +423,78 @@ static void no_hit_depends_on_the_tree(void **state)
     scene_free(&scene);
 }
 
+enum { PACKET = 16, PACKETS = 1000 };
+
+// In each packet nearly all rays look one way, all to the same sides, or half of them, or each its own way:
+// the walk goes by a beam, by two and what is left over, or ray by ray. Each ray begins to look where it
+// likes: behind its start, there, or ahead of it.
+static void rays_behind_fill(ProbeRay *rays, const Scene *scene)
+{
+    static const double nears[] = {-30, -4, -1e-3, 0, 1};
+    for (size_t packet = 0; packet < PACKETS; packet++) {
+        Vector3 origin = random_in_cube(8), target = telling_point(scene);
+        Vector3 ahead = vector_normalize(vector_subtract(target, origin));
+        bool looks_behind = random_bits() & 1; // each of its rays, at what lies there
+        if (looks_behind) ahead = vector_scale(ahead, -1);
+        for (size_t lane = 0; lane < PACKET; lane++) {
+            bool goes_along = packet % 3 == 0 || (packet % 3 == 1 && lane % 2 == 0);
+            Vector3 direction = random_direction();
+            if (goes_along) direction = vector_add(ahead, vector_scale(direction, 0.03));
+            ProbeRay *ray = &rays[packet * PACKET + lane];
+            *ray = ray_of(vector_add(origin, random_in_cube(0.1)), direction);
+            ray->tmin = nears[random_bits() % (looks_behind ? 3 : sizeof nears / sizeof *nears)];
+            if (random_bits() & 1) ray->tmax = ray->tmin + random_between(1, 20);
+        }
+    }
+}
+
+static size_t hits_differ(const ProbeRay *rays, const ProbeHit *hits, const ProbeHit *expected,
+                          const char *what)
+{
+    size_t different = 0;
+    for (size_t i = 0; i < PACKETS * PACKET; i++) {
+        bool hit = expected[i].object != UINT32_MAX;
+        bool same = hits[i].object == expected[i].object &&
+                    (!hit || memcmp(&hits[i].t, &expected[i].t, sizeof hits[i].t) == 0) &&
+                    hits[i].light == expected[i].light;
+        if (same || different++ >= 5) continue;
+        print_error("%s, ray %zu between %g and %g: object %d at %.9g, light %g; expected %d at %.9g, %g\n",
+                    what, i, rays[i].tmin, rays[i].tmax, (int)hits[i].object, hits[i].t, hits[i].light,
+                    (int)expected[i].object, expected[i].t, expected[i].light);
+    }
+    return different;
+}
+
+static void rays_may_look_behind_their_start(void **state)
+{
+    (void)state;
+    static const uint32_t lane_counts[] = {1, 4, 8, 16};
+    random_state = 7;
+    Scene scene = random_scene(4000);
+    const uint32_t plane = (uint32_t)scene.objects.count - 1;
+    enum { COUNT = PACKETS * PACKET };
+    ProbeRay *rays = memory_allocate(COUNT, sizeof *rays);
+    ProbeHit *expected = memory_allocate(COUNT, sizeof *expected),
+             *hits = memory_allocate(COUNT, sizeof *hits);
+    rays_behind_fill(rays, &scene);
+    size_t different = 0, behind = 0;
+    trace(&scene, PRECISION_SINGLE, BVH_OFF, rays, COUNT, expected);
+    for (size_t i = 0; i < COUNT; i++)
+        behind += expected[i].object < plane && expected[i].t < 0;
+    for (size_t i = 0; i < sizeof lane_counts / sizeof *lane_counts; i++) {
+        char what[40];
+        snprintf(what, sizeof what, "%u lanes", lane_counts[i]);
+        trace_lanes(&scene, PRECISION_SINGLE, BVH_ON, lane_counts[i], rays, COUNT, hits);
+        different += hits_differ(rays, hits, expected, what);
+    }
+    assert_true(behind > COUNT / 32);
+    assert_int_equal(different, 0);
+    free(rays);
+    free(expected);
+    free(hits);
+    scene_free(&scene);
+}
+
 // Closed meshes
 
 enum { LEVELS = 5, CLOSED_TRIANGLES = 20 << (2 * LEVELS), CLOSED_VERTICES = CLOSED_TRIANGLES / 2 + 2 };
@@ -538,9 +617,8 @@ static void closed_meshes_do_not_leak(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_boxes_make_a_tree),
-        cmocka_unit_test(few_boxes_make_a_tree),
-        cmocka_unit_test(no_hit_depends_on_the_tree),
+        cmocka_unit_test(any_boxes_make_a_tree),      cmocka_unit_test(few_boxes_make_a_tree),
+        cmocka_unit_test(no_hit_depends_on_the_tree), cmocka_unit_test(rays_may_look_behind_their_start),
         cmocka_unit_test(closed_meshes_do_not_leak),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
