@@ -138,12 +138,13 @@ static inline void object_fetch(const Scene *scene, uint kind, uint4 id)
         memory_fetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
-// Tests shapes first .. last - 1 of one kind; `balls`, where there are any, are theirs.
-static inline void search_shapes(Search *search, const Scene *scene, const Ray *ray, uint kind, uint first,
-                                 uint last, global const Ball *balls)
-{
-#define SEARCH_SHAPES(feature, Type, name, names)                                                            \
-    if (HAS_##feature && kind == KIND_##feature) {                                                           \
+// Tests shapes first .. last - 1 of one kind; `balls`, where there are any, are theirs. Each kind has a
+// function of its own: of one for all, Mesa would compile every kind's test at each call, as it inlines
+// before it knows which kind is asked for.
+#define SEARCH_OF_SHAPE(feature, Type, name, names)                                                          \
+    static inline void search_##names(Search *search, const Scene *scene, const Ray *ray, uint first,        \
+                                      uint last, global const Ball *balls)                                   \
+    {                                                                                                        \
         for (uint i = first; i < last; i++) {                                                                \
             if (balls) i += balls_missed(balls + (i - first), last - i, ray);                                \
             if (i == last) break;                                                                            \
@@ -153,11 +154,19 @@ static inline void search_shapes(Search *search, const Scene *scene, const Ray *
             if (!lanes_any(found)) continue;                                                                 \
             search_take(search, scene, found, t, shape.id.x);                                                \
             if (!search->any)                                                                                \
-                object_fetch(scene, kind, shape.id);                                                         \
+                object_fetch(scene, KIND_##feature, shape.id);                                               \
             else if (!lanes_any(search->open))                                                               \
                 break;                                                                                       \
         }                                                                                                    \
     }
+SHAPE_LIST(SEARCH_OF_SHAPE)
+
+// The same of whichever kind it is.
+static inline void search_shapes(Search *search, const Scene *scene, const Ray *ray, uint kind, uint first,
+                                 uint last)
+{
+#define SEARCH_SHAPES(feature, Type, name, names)                                                            \
+    if (HAS_##feature && kind == KIND_##feature) search_##names(search, scene, ray, first, last, 0);
     SHAPE_LIST(SEARCH_SHAPES)
 }
 
@@ -257,7 +266,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
             count = node_open(scene, next.first, lanes, beam, rays, laid, limit, beam_limit, search->any,
                               waiting, count);
         } else {
-            search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8), 0);
+            search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8));
             open = lanes_bits(search->open);
             if (open == 0) return;
             limit = search_limit(search);
@@ -318,7 +327,7 @@ static inline void search_plainly(Search *search, const Scene *scene, Ray *ray)
     if (HAS_##feature && lanes_any(search->open)) {                                                          \
         uint first = bounded_counts[KIND_##feature], last = counts[KIND_##feature];                          \
         bool has_balls = balls && KIND_##feature != KIND_PLANES;                                             \
-        search_shapes(search, scene, ray, KIND_##feature, first, last, has_balls ? balls : 0);               \
+        search_##names(search, scene, ray, first, last, has_balls ? balls : 0);                              \
         if (has_balls) balls += last - first;                                                                \
     }
     SHAPE_LIST(SEARCH_PLAINLY)
