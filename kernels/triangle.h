@@ -119,29 +119,69 @@ static inline real triangle_distance_held(const TriangleEdges *edges, const Ray 
         (Roots){real_min(real_min(a_t, b_t), c_t) - off, real_max(real_max(a_t, b_t), c_t) + off}, t);
 }
 
+// What plain products with the normal tell: each is off by at most 2 u of its factors' lengths and u of
+// itself.
+typedef struct {
+    real along, height; // with the direction, and with the way from the start to the plane
+    mask behind;        // the plane lies behind the start
+    mask settled; // height / along is exact enough: both are more than a quarter of their factors' lengths
+} TriangleView;
+
+static inline TriangleView triangle_view(const Triangle *triangle, Vector way, const Ray *ray)
+{
+    Vector normal = triangle_normal(triangle);
+    real normal_squared =
+        (real)(triangle->a.w * triangle->a.w + triangle->b.w * triangle->b.w + triangle->c.w * triangle->c.w);
+    const real quarter = (real)(0x1p-4f), error = (real)(16 * UNIT_ROUNDOFF * UNIT_ROUNDOFF);
+    TriangleView view;
+    view.along = vector_dot(normal, ray->direction);
+    view.height = vector_dot(normal, way);
+    real height_squared = view.height * view.height, largest = normal_squared * vector_dot(way, way);
+    mask faced = view.along * view.along > quarter * normal_squared * ray->squared;
+    view.behind = faced & (view.along * view.height < (real)(0)) & (height_squared > error * largest);
+    view.settled = faced & (height_squared > quarter * largest);
+    return view;
+}
+
+// Of any triangle.
+static inline real triangle_distance_careful(const Triangle *triangle, const TriangleEdges *edges,
+                                             const Ray *ray, mask hit)
+{
+    // in the triangle's own plane any place of it will do
+    real otherwise = vector_dot(edges->a, ray->along);
+    real distance_ = triangle_plane_distance(triangle, ray, otherwise);
+    mask held = hit;
+    // At other angles, of a sine of 1/4 or more since the normal's square is 3 at most, the distance is
+    // within 5 u over that sine, a third of what boxes allow, and by plain products within 28 u, less than
+    // half. A needle's normal may be worse than that in double.
+    if (!IS_DOUBLE) {
+        real facing = vector_dot(triangle_normal(triangle), ray->direction);
+        held = held & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
+    }
+    if (lanes_any(held))
+        distance_ = lanes_select(held, triangle_distance_held(edges, ray, distance_), distance_);
+    return distance_;
+}
+
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
     TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
     const real zero = (real)(0);
     mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
     mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
-    mask hit = RAY_ACTIVE(ray) & (all_positive | all_negative) & (edges.determinant != zero);
+    // both where all are 0
+    mask hit = RAY_ACTIVE(ray) & (all_positive ^ all_negative);
     if (!lanes_any(hit)) return hit;
-
-    // in the triangle's own plane any place of it will do
-    real otherwise = vector_dot(edges.a, ray->along);
-    real distance_ = triangle_plane_distance(triangle, ray, otherwise);
-    mask held = hit;
-    // At other angles, of a sine of 1/4 or more since the normal's square is 3 at most, the distance is
-    // within 5 u over that sine, a third of what boxes allow. A needle's normal may be worse than that in
-    // double.
-    if (!IS_DOUBLE) {
-        real facing = vector_dot(triangle_normal(triangle), ray->direction);
-        held = held & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
+    mask careful = hit;
+    if (!IS_COMPENSATED) {
+        TriangleView view = triangle_view(triangle, edges.a, ray);
+        hit = hit & !(view.behind & (ray->near >= zero));
+        if (!lanes_any(hit)) return hit;
+        careful = hit & !view.settled;
+        *t = real_divide(view.height, lanes_select(view.settled, view.along, (real)(1)));
     }
-    if (lanes_any(held))
-        distance_ = lanes_select(held, triangle_distance_held(&edges, ray, distance_), distance_);
-    *t = distance_;
+    if (lanes_any(careful))
+        *t = lanes_select(careful, triangle_distance_careful(triangle, &edges, ray, careful), *t);
     return hit & (*t > ray->near);
 }
 
