@@ -61,6 +61,7 @@ static OUT_OF_LINE MetTriangles triangles_met(const Scene *scene, integer object
     Vector normal = nothing;
     Corners corners = {nothing, nothing, nothing}, normals = corners, uvs = corners;
     real density = (real)(scene->materials[material].mirror_glass.w);
+    bool smooth = false;
     for (;;) {
         scalar_integer object = lanes_smallest(objects);
         if (object == INT_MAX) break;
@@ -73,6 +74,7 @@ static OUT_OF_LINE MetTriangles triangles_met(const Scene *scene, integer object
         corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), corners);
         normal = vector_select(same, triangle_normal(&triangle), normal);
         if (triangle.id.y > 0) {
+            smooth = true;
             TriangleNormals own = scene->triangle_normals[triangle.id.y - 1];
             normals = corners_select(same, corners_of(own.a, own.b, own.c), normals);
         }
@@ -84,9 +86,11 @@ static OUT_OF_LINE MetTriangles triangles_met(const Scene *scene, integer object
     }
     TriangleWeights weights = triangle_weights(corners, ray);
     met.patch = triangle_crossing_patch(corners, normal, weights, ray, t);
-    triangle_smooth(normals, weights, &met.patch);
-    Vector uv = triangle_blend(weights, uvs);
-    met.point = (PicturePoint){uv.x, uv.y, density};
+    if (smooth) triangle_smooth(normals, weights, &met.patch);
+    if (HAS_IMAGES) {
+        Vector uv = triangle_blend(weights, uvs);
+        met.point = (PicturePoint){uv.x, uv.y, density};
+    }
     return met;
 }
 
