@@ -21,8 +21,9 @@ enum {
     THREAD_RANGE_SMALLEST = 8192
 };
 
-// Costs relative to each other: one step down the tree, one primitive tested.
-static const float step_cost = 1.0f, test_cost = 1.0f;
+// Costs of the binary tree relative to each other: one step down, one primitive tested. (What the wide nodes
+// made of it cost is bvh_widen's.)
+static const float binary_step_cost = 1.0f, binary_test_cost = 1.0f;
 
 typedef float Float4 __attribute__((vector_size(16)));
 typedef int32_t Int4 __attribute__((vector_size(16)));
@@ -215,8 +216,8 @@ static size_t range_cut(Builder *builder, Range range, unsigned depth)
     if (!halve && count > 1) {
         Split split = split_find(builder, range, &map);
         float area = box_half_area(bounds);
-        bool pays =
-            split.found && split.cost * test_cost + step_cost * area < (float)count * test_cost * area;
+        bool pays = split.found && split.cost * binary_test_cost + binary_step_cost * area <
+                                       (float)count * binary_test_cost * area;
         if (pays || (split.found && count > BVH_LEAF_LARGEST)) {
             size_t middle = range_partition(builder, range, &map, &split);
             if (middle > range.begin && middle < range.end) return middle;

@@ -10,7 +10,10 @@
 // Costs relative to each other: a node's boxes held against a beam all at once, one of them met and its turn
 // come, one primitive tested. (Found by trying: a test costs less than its arithmetic, which fills the
 // processor's waiting.)
-static const double node_cost = 1, box_cost = 1, test_cost = 0.4;
+static const double wide_node_cost = 1, wide_box_cost = 1, wide_test_cost = 0.4;
+
+// What takes one place where it might take several costs something even where its area is nothing.
+static const float tie_cost = 0x1p-40f;
 
 // The least cost where a subtree may take 1 .. width places in the wide node above it; entry 0 is unused. In
 // one place it is a wide node of its own, or a leaf.
@@ -48,7 +51,7 @@ static double box_half_area(const BvhBox *box)
 
 static float leaf_cost(const Widening *widening, double half_area, uint32_t count)
 {
-    return (float)(half_area * widening->scale * (box_cost + test_cost * count));
+    return (float)(half_area * widening->scale * (wide_box_cost + wide_test_cost * count));
 }
 
 static Subtree child_subtree(const Widening *widening, const BvhChild *child)
@@ -105,12 +108,11 @@ static void costs_find(Widening *widening)
             subtree.costs[places] = first.costs[share] + second.costs[places - share];
         }
         double half_area = node_half_area(node);
-        // a node costs something even where its area is nothing
         float as_node = subtree.costs[widening->width] +
-                        (float)(half_area * widening->scale * (node_cost + box_cost)) + 0x1p-24f;
+                        (float)(half_area * widening->scale * (wide_node_cost + wide_box_cost));
         float as_leaf = leaf_cost(widening, half_area, subtree.count) - subtree.leaves_cost;
         subtree.is_leaf = subtree.count > 0 && as_leaf < as_node;
-        subtree.costs[1] = subtree.is_leaf ? as_leaf : as_node;
+        subtree.costs[1] = (subtree.is_leaf ? as_leaf : as_node) + tie_cost;
         for (unsigned places = 2; places <= widening->width; places++)
             subtree.costs[places] = fminf(subtree.costs[places], subtree.costs[1]);
         widening->subtrees[i] = subtree;
@@ -164,7 +166,7 @@ void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
     *wide = (BvhWide){
         .nodes = memory_allocate(bvh->node_count, sizeof *wide->nodes),
         .node_count = 1,
-        .leaves = memory_allocate(bvh->node_count, sizeof *wide->leaves),
+        .leaves = memory_allocate((bvh->node_count + 1) / 2, sizeof *wide->leaves), // none within another
     };
     roots[0] = 0;
     for (size_t i = 0; i < wide->node_count; i++) {
