@@ -5,7 +5,7 @@
 #
 # rusticl on llvmpipe (Mesa 22.3) has no fused multiply-add, and its compiler inlines the one that the kernels have in its
 # place everywhere. There the scene is taken apart, one kind of shape at a time under all lights, a few seconds each; whole
-# at 1 lane, which takes the compiler most of a minute, with GLINT_LONG_TESTS=1.
+# at 1 lane, which takes the compiler 17 seconds and 1.8 GB, with GLINT_LONG_TESTS=1.
 . "$(dirname "$0")/support.bash"
 
 scene=tests/scenes/every_shape.yaml
