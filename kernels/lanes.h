@@ -1,4 +1,4 @@
-// All that knows the width: how many rays one work-item carries (LANES), in which precision.
+// All that knows the width: how many rays one work-item carries at once (LANES), in which precision.
 //
 // Above this file code reads like the scalar algorithm, with a mask where it would branch. A mask is what a
 // comparison gives: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
@@ -72,7 +72,7 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) natural; // wraps around
 #define natural_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
 #define integer_from_natural LANES_AS(INTEGER_BASE)
 
-// The tile of neighboring pixels that one work-item carries, and each lane's place in it.
+// The tile of neighboring pixels that one work-item carries at once, and each lane's place in it.
 #if LANES == 1
 #define TILE_WIDTH  1
 #define TILE_HEIGHT 1

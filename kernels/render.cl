@@ -1,4 +1,4 @@
-// The picture: each work-item traces the rays of one tile of pixels.
+// The picture: each work-item traces the rays of one tile of pixels after the other.
 #define SIGNS_PATHS 0
 #include "film.h"
 #include "path.h"

@@ -12,7 +12,7 @@ const char common_options_help[] =
     "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
     "else a CPU)\n"
     "      --precision P     fast, single, strict or double (default: single)\n"
-    "      --lanes N         rays a work-item carries: 1, 4, 8 or 16 (default: the device's own)\n"
+    "      --lanes N         rays a work-item carries at once: 1, 4, 8 or 16 (default: the device's own)\n"
     "      --bvh B           auto, on or off: rays through a hierarchy; the picture is the same (default: "
     "auto)\n"
     "      --no-cache        build the kernels anew and keep nothing\n"

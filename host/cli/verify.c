@@ -37,7 +37,7 @@ static const char help_text[] =
     "else a "
     "CPU)\n"
     "      --precision P     fast, single, strict or double (default: all that the device has)\n"
-    "      --lanes N         rays a work-item carries: 1, 4, 8 or 16 (default: the device's own)\n"
+    "      --lanes N         rays a work-item carries at once: 1, 4, 8 or 16 (default: the device's own)\n"
     "      --no-cache        build the kernels anew and keep nothing\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n"

@@ -9,7 +9,7 @@ _glint_render() {
         '--region[pixels of the whole picture to render]:X,Y,W,H:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
-        '--lanes[pixels a work-item carries]:lanes:(1 4 8 16)' \
+        '--lanes[pixels a work-item carries at once]:lanes:(1 4 8 16)' \
         '--bvh[use a hierarchy]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
         '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow ray path color' \
@@ -30,7 +30,7 @@ _glint_trace() {
         '(-o --output)'{-o,--output}'[where the CSV goes]:file:_files' \
         '--device[device to trace on]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
-        '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
+        '--lanes[rays a work-item carries at once]:lanes:(1 4 8 16)' \
         '--bvh[use a hierarchy]:choice:(auto on off)' \
         '--no-cache[build the kernel anew]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
@@ -57,7 +57,7 @@ _glint_verify() {
     _arguments \
         '--device[device to verify]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
-        '--lanes[rays a work-item carries]:lanes:(1 4 8 16)' \
+        '--lanes[rays a work-item carries at once]:lanes:(1 4 8 16)' \
         '--no-cache[build the kernels anew]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--lean[build small kernels, for a slow compiler]' \
@@ -77,7 +77,7 @@ _glint_diff() {
 _glint_bench() {
     _arguments \
         '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
-        '--lanes[pixels a work-item carries]:list:_sequence compadd - 1 4 8 16' \
+        '--lanes[pixels a work-item carries at once]:list:_sequence compadd - 1 4 8 16' \
         '--bvh[use a hierarchy]:list:_sequence compadd - auto on off' \
         '--size[width and height in pixels]:WxH:' \
         '--seconds[end the runs after so long]:seconds:' \
@@ -95,7 +95,7 @@ _glint_accuracy() {
     _arguments \
         '--reference[linear colors to compare with]:picture:_files -g "*.(exr|npy)"' \
         '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
-        '--lanes[pixels a work-item carries]:list:_sequence compadd - 1 4 8 16' \
+        '--lanes[pixels a work-item carries at once]:list:_sequence compadd - 1 4 8 16' \
         '--bvh[use a hierarchy]:list:_sequence compadd - auto on off' \
         '--samples[rays for each pixel]:list:' \
         '--bounces[reflections and refractions at most]:number:' \
