@@ -4,7 +4,8 @@
 // interval arithmetic (Boulos, Wald, Shirley, Geometric and arithmetic culling methods for entire ray
 // packets, University of Utah, UUCS-06-010, 2006; there one box after the other): a lane there is a box.
 // Those that the beam meets are held against the rays: one box after the other, a lane there is a ray; or,
-// where fewer rays are left than boxes, one ray after the other against all boxes.
+// where fewer rays are left than boxes, one ray after the other against all boxes. A few rays do so without a
+// beam.
 //
 // A hit may lie outside its primitive's box, for any shape: each test is off by a few u times the distance
 // between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
@@ -139,6 +140,7 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
     return beam;
 }
 
+// With near, limit and parted alone.
 static inline Beam beam_parted(mask members, real limit)
 {
     Beam beam;

@@ -177,11 +177,13 @@ static inline real search_limit(const Search *search)
     return lanes_select(search->open, real_min(search->hit.t, (real)(LARGEST / 2)), (real)(-LARGEST));
 }
 
-// A child on its way to be visited, and where the beam meets its box at the earliest.
+// A child on its way to be visited, and where the beam, or the first of its rays, meets its box. Kept small:
+// a GPU may set room for all of them aside for each thread.
 typedef struct {
-    uint first, what;
+    uint first;
+    ushort what;
+    ushort lanes; // whose rays meet it, as bits
     scalar near;
-    uint lanes; // whose rays meet it, as bits
 } Waiting;
 
 // Each node leaves at most all but one of its children waiting.
@@ -241,7 +243,7 @@ static inline uint node_open(const Scene *scene, uint index, uint lanes, const B
                 if (any ? below.near <= near : below.near >= near) break;
                 waiting[place] = below;
             }
-            waiting[place] = (Waiting){firsts[part + child], whats[part + child], near, by};
+            waiting[place] = (Waiting){firsts[part + child], (ushort)whats[part + child], (ushort)by, near};
             waiting_fetch(scene, firsts[part + child], whats[part + child]);
         }
     }
@@ -256,7 +258,7 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
     scalar beam_limit = beam->limit;
     uint open = lanes_bits(search->open);
     Waiting waiting[WAITING_LARGEST];
-    waiting[0] = (Waiting){0, BVH_NODE, beam->near, open};
+    waiting[0] = (Waiting){0, BVH_NODE, (ushort)open, beam->near};
     uint count = 1;
     while (count > 0) {
         Waiting next = waiting[--count];

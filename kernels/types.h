@@ -117,7 +117,7 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
     uint4 first[BVH_QUARTER]; // the child's node or first primitive
-    uint4 what[BVH_QUARTER];  // BVH_NODE or count << 8 | kind
+    uint4 what[BVH_QUARTER];  // BVH_NODE or count << 8 | kind, 16 bits
 } BvhNode;
 #endif
 

@@ -75,7 +75,7 @@ static void compare(const Trial *trial, size_t index, const ProbeHit *hit, Preci
     Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
     double distance = vector_length(vector_subtract(origin, trial->center)) + trial->reach;
     // An endless plane may be met far beyond the reach.
-    if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
+    if (expected->found) distance = fmax(distance, fabs((double)expected->t) * vector_length(direction));
     double scale = u * (owed->compensated ? trial->reach : distance);
     // Flat shapes have no compensated edges.
     double band = fmax(owed->band * scale, 4 * u * distance);
@@ -111,6 +111,8 @@ static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size
         SpecimenRay given = specimen_ray(&aims[i % aim_count], random);
         ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
                                 : reference_ray_rounded(given.origin, given.direction);
+        // one in three looks behind its start, too
+        if (i % 3 == 2) ray.tmin = -0x1p10;
         trial->rays[i] = (ProbeRay){
             {(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
             {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},

@@ -8,9 +8,10 @@
 #include <stdlib.h>
 
 enum {
-    FIRST_LAUNCH_SAMPLES = 1 << 17,  // before any time is known
-    BAND_BYTES_LARGEST = 4 << 20,    // of one film
-    SAMPLES_OF_LAUNCH_LARGEST = 1024 // per pixel
+    FIRST_LAUNCH_SAMPLES = 1 << 17,   // before any time is known
+    BAND_BYTES_LARGEST = 4 << 20,     // of one film
+    SAMPLES_OF_LAUNCH_LARGEST = 1024, // per pixel
+    GROUPS_OF_UNIT_LEAST = 4
 };
 
 typedef struct {
@@ -30,6 +31,14 @@ static TileShape tile_shape(uint32_t lanes)
     default:
         return (TileShape){1, 1};
     }
+}
+
+// The pixels of all tiles that a work-item carries, as ITEM_TILES in kernels/film.h has it.
+static TileShape item_shape(uint32_t lanes)
+{
+    TileShape shape = tile_shape(lanes);
+    if (lanes > 1) shape.width *= ITEM_TILES_LARGEST;
+    return shape;
 }
 
 // Work-items along each side of a group. Neighboring pixels meet the same objects. But a work-item that
@@ -106,13 +115,12 @@ typedef struct {
 
 static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows)
 {
-    TileShape tile = tile_shape(renderer->report.lanes);
+    TileShape item = item_shape(renderer->report.lanes);
     size_t side = group_side(renderer);
-    size_t item_width = renderer->report.lanes > 1 ? ITEM_TILES_LARGEST * tile.width : tile.width;
     const size_t local[2] = {side, side};
     const size_t global[2] = {
-        rounded_up((renderer->settings.region_width + item_width - 1) / item_width, side),
-        rounded_up((rows.row_count + tile.height - 1) / tile.height, side)};
+        rounded_up((renderer->settings.region_width + item.width - 1) / item.width, side),
+        rounded_up((rows.row_count + item.height - 1) / item.height, side)};
     return renderer_launch(renderer, kind, 2, global, local);
 }
 
@@ -239,15 +247,24 @@ static uint32_t rows_step(const Renderer *renderer)
     return tile_shape(renderer->report.lanes).height * (uint32_t)group_side(renderer);
 }
 
+// As many as give each of the device's units several groups: the last to end would else be waited for.
+static uint32_t rows_least(const Renderer *renderer)
+{
+    uint32_t group_width = item_shape(renderer->report.lanes).width * (uint32_t)group_side(renderer);
+    uint32_t of_row = (renderer->settings.region_width + group_width - 1) / group_width;
+    uint32_t wanted = GROUPS_OF_UNIT_LEAST * renderer->compute->device->compute_units;
+    return (wanted + of_row - 1) / of_row * rows_step(renderer);
+}
+
 static uint32_t pace_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
     uint64_t rows = pace_samples(pace) / row_samples;
-    uint32_t step = rows_step(renderer);
-    if (rows < step) rows = step;
-    rows -= rows % step;
+    uint32_t least = rows_least(renderer);
+    if (rows < least) rows = least;
+    rows -= rows % rows_step(renderer);
     return rows < most ? (uint32_t)rows : most;
 }
 

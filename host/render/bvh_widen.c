@@ -12,7 +12,8 @@
 // processor's waiting.)
 static const double wide_node_cost = 1, wide_box_cost = 1, wide_test_cost = 0.4;
 
-// What takes one place where it might take several costs something even where its area is nothing.
+// What takes one place where it might take several costs something even where its area is nothing: this
+// decides ties, and vanishes beside other costs, which are of the order of 1.
 static const float tie_cost = 0x1p-40f;
 
 // The least cost where a subtree may take 1 .. width places in the wide node above it; entry 0 is unused. In
