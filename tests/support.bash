@@ -9,7 +9,7 @@ unset GLINT_DEVICE
 
 scratch=$(mktemp -d) || exit 1
 trap 'rm -rf "$scratch"' EXIT
-shared_cache=${XDG_CACHE_HOME:-$scratch} # of all tests that run one after the other
+shared_cache=${XDG_CACHE_HOME:-$scratch} # of all tests of a run
 export XDG_CACHE_HOME=$scratch/cache TMPDIR=$scratch
 mkdir "$XDG_CACHE_HOME"
 
@@ -42,7 +42,7 @@ skip_all() {
     exit 77
 }
 # python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: python3 (or $PYTHON), else a
-# virtual environment that tests of one run share, in which pip installs what is missing (by the module's own name
+# virtual environment that the tests of a run share, in which pip installs what is missing (by the module's own name
 # where no requirement is given). Skips the test where that cannot be done; once pip had no network, no test asks it for
 # ten minutes.
 python_with() {
