@@ -49,8 +49,8 @@ const char *device_wish(const char *option);
 // Whether kernels can be built and run there; if not, *why (may be NULL) says what is missing.
 bool device_usable(const Device *device, const char **why);
 
-// Pixels that one work-item carries at once unless the user says otherwise: on a CPU the native vector width of
-// float, or of double where `wide`, cut to 1, 4, 8 or 16; elsewhere 1.
+// Pixels that one work-item carries at once unless the user says otherwise: on a CPU the native vector width
+// of float, or of double where `wide`, cut to 1, 4, 8 or 16; elsewhere 1.
 unsigned device_lanes(const Device *device, bool wide);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
