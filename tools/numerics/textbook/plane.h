@@ -19,7 +19,8 @@ static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
 
 static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)
 {
-    return patch_make(ray_point(ray, t), vector_normalize(vector_of(plane->normal)), TEXTBOOK_SIZE);
+    Vector unit = vector_scale(vector_of(plane->normal), (real)(plane->normal.w));
+    return patch_make(ray_point(ray, t), unit, TEXTBOOK_SIZE);
 }
 
 #endif
