@@ -42,7 +42,7 @@ static TileShape item_shape(uint32_t lanes)
 }
 
 // Work-items along each side of a group. Neighboring pixels meet the same objects. But a work-item that
-// carries a whole tile of them makes a group of its own: PoCL lays out the private variables of a group's
+// carries whole tiles of them makes a group of its own: PoCL lays out the private variables of a group's
 // items side by side, and those of 64, each with room for the rays that wait behind glass, are more than a
 // cache holds.
 static size_t group_side(const Renderer *renderer)
