@@ -1,9 +1,6 @@
 #!/bin/bash
 # The golden pictures come out bit for bit (tests/golden/README.md).
 . "$(dirname "$0")/support.bash"
-# LeakSanitizer's own tracer crashes in the threads' local storage after PoCL compiled one of these kernels; it need not
-# look there.
-export LSAN_OPTIONS="use_tls=0:${LSAN_OPTIONS-}"
 for scene in tests/golden/*.yaml; do
     name=$(basename "$scene" .yaml)
     check "$name renders" "$GLINT" render "$scene" --size 96x54 --precision strict --quiet -o "$scratch/$name.npy"
