@@ -34,16 +34,6 @@ static inline Pair pair_product(real a, real b)
     return (Pair){product, fma(a, b, -product)};
 }
 
-#elif IS_FAST
-
-// Whose sums of errors the compiler rearranges in any case.
-#define fma mad
-
-static inline Pair pair_product(real a, real b)
-{
-    return (Pair){a * b, (real)(0)};
-}
-
 #else
 
 // By halves of 12 bits, whose products are exact (Dekker, A floating-point technique for extending the
@@ -57,6 +47,13 @@ static inline Pair pair_product(real a, real b)
     real missing = ((product - a_high * b_high) - a_low * b_high) - a_high * b_low;
     return (Pair){product, a_low * b_low - missing};
 }
+
+#if IS_FAST
+
+// What has to be exact is made of pair_product here.
+#define fma mad
+
+#else
 
 // The sum's higher half; where the lower is not 0, of the two reals around the sum the one whose last bit is
 // 1: a step away from 0, or to it, leads there.
@@ -81,6 +78,8 @@ static inline real fma_in_software(real a, real b, real c)
 
 // Of lanes; the device's own remains (fma)(a, b, c).
 #define fma(a, b, c) fma_in_software(a, b, c)
+
+#endif
 
 #endif
 

@@ -53,7 +53,9 @@ static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, 
 // The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4
 // u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
 // intersection, Ray Tracing Gems, 2019, chapter 7). Within 0.4 radii of the surface c cancels, and both roots
-// with it: up to 21 ulp at 1.1 radii, 3.5 from c rounded once. The compensated form rounds each number once.
+// with it: up to 21 ulp at 1.1 radii, 3.5 from c rounded once. There b^2 - a c
+// tells hit from miss, too: by l, whose square is off by u r^2, the horizon of a ground sphere would be torn.
+// The compensated form rounds each number once.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -83,15 +85,17 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
         real half_chord_squared = fma(radius, radius, -vector_dot(l, l));
         discriminant = ray->squared * half_chord_squared;
-        hit = hit & (half_chord_squared >= (real)(0));
-        mask beside = hit & (fabs(c) < (real)(0.5f) * squared_distance);
+        mask meets = half_chord_squared >= (real)(0),
+             beside = hit & (fabs(c) < (real)(0.5f) * squared_distance);
         if (RARELY(lanes_any(beside))) {
             PairVector to_center = pair_vector_difference(center, ray->origin);
             SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
             b = lanes_select(beside, exact.b, b);
             c = lanes_select(beside, exact.c, c);
             discriminant = lanes_select(beside, sphere_discriminant_beside(exact, ray), discriminant);
+            meets = lanes_select(beside, discriminant >= (real)(0), meets);
         }
+        hit = hit & meets;
     }
     *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & ONLY_INSIDE);
     return hit & (*t > ray->near);

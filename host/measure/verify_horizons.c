@@ -18,11 +18,13 @@ static uint32_t column_horizon(VerifyRun *run, const VerifyPicture *picture, uin
 // exactly.
 void verify_ground_horizon(VerifyRun *run)
 {
-    static const double fovs[] = {60, 0.5};
+    static const struct {
+        double fov, rise; // in degrees; of the way ahead
+    } views[] = {{60, 0}, {0.5, 0}, {0.02, -0.0014142}};
     Scene scene = verify_scene("objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
-    const Vector3 eye = {0, 1, 0}, ahead = {0, 1, 1};
-    for (size_t k = 0; k < sizeof fovs / sizeof *fovs; k++) {
-        scene.camera = verify_camera(eye, ahead, fovs[k]);
+    const Vector3 eye = {0, 1, 0};
+    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+        scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
         VerifyPicture picture = verify_render(run, &scene, false, 128, 512);
         LongVector center = exact_from_eye(run, scene.objects.items[0].as.sphere.center, eye);
         for (uint32_t column = 0; column < picture.width; column++) {
