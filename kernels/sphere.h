@@ -53,9 +53,9 @@ static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, 
 // The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4
 // u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
 // intersection, Ray Tracing Gems, 2019, chapter 7). Within 0.4 radii of the surface c cancels, and both roots
-// with it: up to 21 ulp at 1.1 radii, 3.5 from c rounded once. There b^2 - a c
-// tells hit from miss, too: by l, whose square is off by u r^2, the horizon of a ground sphere would be torn.
-// The compensated form rounds each number once.
+// with it: up to 21 ulp at 1.1 radii, 3.5 from c rounded once. There b^2 - a c tells hit from miss, too: by
+// l, whose square is off by u r^2, the horizon of a ground sphere would be torn. The compensated form rounds
+// each number once.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
