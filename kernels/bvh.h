@@ -25,7 +25,7 @@ typedef struct {
     Vector to_near, to_far;
     real near;
     real slack;
-    integer signs; // bit i: the direction is negative along axis i
+    uint negative_x, negative_y, negative_z; // the lanes whose direction is so along an axis, as bits
 } BoxRays;
 
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
@@ -41,7 +41,6 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
                       real_min(real_max(ray->inverse.z, -largest), largest)};
     Vector to_plane = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
     Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
-    const integer zero = (integer)(0);
     Vector d = ray->direction;
     BoxRays rays;
     rays.inverse = inverse;
@@ -49,10 +48,17 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
     rays.to_far = vector_add(to_plane, around);
     rays.near = ray->near;
     rays.slack = slack;
-    rays.signs = lanes_select(d.x < (real)(0), (integer)(1), zero) |
-                 lanes_select(d.y < (real)(0), (integer)(2), zero) |
-                 lanes_select(d.z < (real)(0), (integer)(4), zero);
+    rays.negative_x = lanes_bits(d.x < (real)(0));
+    rays.negative_y = lanes_bits(d.y < (real)(0));
+    rays.negative_z = lanes_bits(d.z < (real)(0));
     return rays;
+}
+
+// Those of some lanes whose directions have the signs of the first one's.
+static inline uint box_rays_alike(const BoxRays *rays, uint lanes)
+{
+    uint x = rays->negative_x, y = rays->negative_y, z = rays->negative_z, first = lanes & -lanes;
+    return lanes & (x & first ? x : ~x) & (y & first ? y : ~y) & (z & first ? z : ~z);
 }
 
 typedef struct {
@@ -117,13 +123,16 @@ static inline BeamAxis beam_axis(const Leasts *leasts, uint axis, bool negative,
                       axis + (negative ? BVH_LOW : BVH_HIGH)};
 }
 
-// Bit i of `signs`: the members' directions are negative along axis i.
-static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, uint signs, real limit)
+// Of lanes whose directions have the same signs.
+static inline Beam beam_make(const BoxRays *rays, const Ray *ray, uint lanes, real limit)
 {
+    mask members = mask_of_bits(lanes);
+    bool negative_x = lanes & rays->negative_x, negative_y = lanes & rays->negative_y,
+         negative_z = lanes & rays->negative_z;
     Leasts leasts;
-    beam_axis_gather(&leasts, 0, members, ray->origin.x, rays->inverse.x, rays->slack, signs & 1);
-    beam_axis_gather(&leasts, 1, members, ray->origin.y, rays->inverse.y, rays->slack, signs & 2);
-    beam_axis_gather(&leasts, 2, members, ray->origin.z, rays->inverse.z, rays->slack, signs & 4);
+    beam_axis_gather(&leasts, 0, members, ray->origin.x, rays->inverse.x, rays->slack, negative_x);
+    beam_axis_gather(&leasts, 1, members, ray->origin.y, rays->inverse.y, rays->slack, negative_y);
+    beam_axis_gather(&leasts, 2, members, ray->origin.z, rays->inverse.z, rays->slack, negative_z);
     leasts.all[BEAM_NEAR] = lanes_select(members, rays->near, (real)(LARGEST));
     for (uint i = BEAM_LIMIT; i < LEASTS; i++)
         leasts.all[i] = lanes_select(members, -limit, (real)(LARGEST));
@@ -132,20 +141,20 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, mask members, 
     beam.near = leasts.each[BEAM_NEAR];
     // where one does look there, the beam is all of space, unless it is a single ray
     const scalar everywhere = LANES > 1 && beam.near < 0 ? LARGEST * 0.5f : 0;
-    beam.x = beam_axis(&leasts, 0, signs & 1, everywhere);
-    beam.y = beam_axis(&leasts, 1, signs & 2, everywhere);
-    beam.z = beam_axis(&leasts, 2, signs & 4, everywhere);
+    beam.x = beam_axis(&leasts, 0, negative_x, everywhere);
+    beam.y = beam_axis(&leasts, 1, negative_y, everywhere);
+    beam.z = beam_axis(&leasts, 2, negative_z, everywhere);
     beam.limit = -leasts.each[BEAM_LIMIT];
     beam.parted = false;
     return beam;
 }
 
 // With near, limit and parted alone.
-static inline Beam beam_parted(mask members, real limit)
+static inline Beam beam_parted(uint lanes, real limit)
 {
     Beam beam;
     beam.near = -LARGEST;
-    beam.limit = lanes_largest(members, limit);
+    beam.limit = lanes_largest(mask_of_bits(lanes), limit);
     beam.parted = true;
     return beam;
 }
@@ -206,9 +215,9 @@ typedef struct {
 static inline mask laid_ray_meets(const BoxRays *rays, uint lane, global const scalar *boxes, scalar limit,
                                   real *near)
 {
-    uint signs = (uint)integer_of_lane(&rays->signs, lane);
-    uint x = signs & 1 ? BVH_HIGH : BVH_LOW, y = signs & 2 ? BVH_HIGH : BVH_LOW,
-         z = signs & 4 ? BVH_HIGH : BVH_LOW, other = BVH_LOW + BVH_HIGH;
+    uint x = rays->negative_x >> lane & 1 ? BVH_HIGH : BVH_LOW,
+         y = rays->negative_y >> lane & 1 ? BVH_HIGH : BVH_LOW,
+         z = rays->negative_z >> lane & 1 ? BVH_HIGH : BVH_LOW, other = BVH_LOW + BVH_HIGH;
     real inverse_x = real_of_lane(&rays->inverse.x, lane);
     real inverse_y = real_of_lane(&rays->inverse.y, lane);
     real inverse_z = real_of_lane(&rays->inverse.z, lane);

@@ -230,6 +230,15 @@ static inline uint lanes_bits(mask condition)
 #endif
 }
 
+static inline mask mask_of_bits(uint bits)
+{
+#if LANES == 1
+    return bits != 0;
+#else
+    return ((integer)((scalar_integer)bits) & LANE_BIT) != (integer)(0);
+#endif
+}
+
 // The place of the lowest bit that is set; not of 0.
 static inline uint bit_lowest(uint bits)
 {
@@ -245,11 +254,6 @@ static inline bool lanes_all(mask condition)
 static inline real real_of_lane(const real *lanes, uint lane)
 {
     return (real)(((const scalar *)lanes)[lane]);
-}
-
-static inline scalar_integer integer_of_lane(const integer *lanes, uint lane)
-{
-    return ((const scalar_integer *)lanes)[lane];
 }
 
 // Comparisons in place of fmin and fmax: no promise about NaN is needed, and they are one instruction.

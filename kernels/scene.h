@@ -250,13 +250,12 @@ static inline uint node_open(const Scene *scene, uint index, uint lanes, const B
     return count;
 }
 
-// Down the tree; a packet visits what any of its lanes meets.
-static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, const Beam *beam,
+// Down the tree; a packet visits what any of its open lanes meets.
+static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, uint open, const Beam *beam,
                               const BoxRays *rays, LaidRays *laid)
 {
     real limit = search_limit(search);
     scalar beam_limit = beam->limit;
-    uint open = lanes_bits(search->open);
     Waiting waiting[WAITING_LARGEST];
     waiting[0] = (Waiting){0, BVH_NODE, (ushort)open, beam->near};
     uint count = 1;
@@ -287,32 +286,29 @@ static inline void search_hierarchy(Search *search, const Scene *scene, Ray *ray
     ray_make_frame(ray);
     BoxRays rays = box_rays(ray, header->bounds);
     mask looking = box_rays_meet(&rays, header->bounds_low, header->bounds_high, search_limit(search));
-    if (!lanes_any(looking)) return;
-    mask parted = mask_none();
+    uint left = lanes_bits(looking & search->open), parted = 0;
     LaidRays laid;
     laid.is_laid = false;
-    const integer others_signs = (integer)(8);
-    do {
-        mask members = parted;
+    while ((left | parted) != 0) {
+        uint lanes = parted;
         Beam beam;
-        if (lanes_any(looking)) {
-            scalar_integer first = lanes_smallest(lanes_select(looking, rays.signs, others_signs));
-            members = looking & (rays.signs == (integer)(first));
-            looking = looking & !members;
-            if (LANES > 1 && popcount(lanes_bits(members)) <= 2 * FEW_LANES) {
-                parted = parted | members;
+        if (left != 0) {
+            lanes = box_rays_alike(&rays, left);
+            left &= ~lanes;
+            if (LANES > 1 && popcount(lanes) <= 2 * FEW_LANES) {
+                parted |= lanes;
                 continue;
             }
-            beam = beam_make(&rays, ray, members, (uint)first, search_limit(search));
+            beam = beam_make(&rays, ray, lanes, search_limit(search));
         } else {
-            parted = mask_none();
-            beam = beam_parted(members, search_limit(search));
+            parted = 0;
+            beam = beam_parted(lanes, search_limit(search));
         }
-        mask others = search->open & !members;
+        mask members = mask_of_bits(lanes), others = search->open & !members;
         search->open = search->open & members;
-        search_bvh(search, scene, ray, &beam, &rays, &laid);
+        search_bvh(search, scene, ray, lanes, &beam, &rays, &laid);
         search->open = search->open | others;
-    } while (lanes_any(looking | parted));
+    }
 }
 
 // Tests what does not hang in the hierarchy.
