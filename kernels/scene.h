@@ -256,23 +256,23 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 {
     real limit = search_limit(search);
     scalar beam_limit = beam->limit;
-    Waiting waiting[WAITING_LARGEST];
-    waiting[0] = (Waiting){0, BVH_NODE, (ushort)open, beam->near};
-    uint count = 1;
-    while (count > 0) {
-        Waiting next = waiting[--count];
+    Waiting waiting[WAITING_LARGEST], next = {0, BVH_NODE, (ushort)open, beam->near};
+    for (uint count = 0;; next = waiting[--count]) {
         uint lanes = next.lanes & open;
-        if (next.near > beam_limit || lanes == 0) continue;
-        if (next.what == BVH_NODE) {
-            count = node_open(scene, next.first, lanes, beam, rays, laid, limit, beam_limit, search->any,
-                              waiting, count);
-        } else {
-            search_shapes(search, scene, ray, next.what & 0xff, next.first, next.first + (next.what >> 8));
-            open = lanes_bits(search->open);
-            if (open == 0) return;
-            limit = search_limit(search);
-            beam_limit = lanes_largest(search->open, limit);
+        if (next.near <= beam_limit && lanes != 0) {
+            if (next.what == BVH_NODE) {
+                count = node_open(scene, next.first, lanes, beam, rays, laid, limit, beam_limit, search->any,
+                                  waiting, count);
+            } else {
+                search_shapes(search, scene, ray, next.what & 0xff, next.first,
+                              next.first + (next.what >> 8));
+                open = lanes_bits(search->open);
+                if (open == 0) return;
+                limit = search_limit(search);
+                beam_limit = lanes_largest(search->open, limit);
+            }
         }
+        if (count == 0) return;
     }
 }
 
