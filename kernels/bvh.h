@@ -98,22 +98,27 @@ typedef struct {
     bool parted;        // no beam: the rays run to different sides, and only the limit is known of them
 } Beam;
 
-enum { BEAM_LEAST, BEAM_MOST = 3, BEAM_START = 6, BEAM_END = 9, BEAM_NEAR = 12, BEAM_LIMIT };
+// What a beam is made of: of the rays' inverses, nears and limits, and of their origins.
+enum { BEAM_LEAST, BEAM_MOST = 3, BEAM_NEAR = 6, BEAM_LIMIT };
+enum { BEAM_START, BEAM_END = 3 };
+typedef struct {
+    Leasts ways, origins;
+} BeamLeasts;
 
-static inline void beam_axis_gather(Leasts *leasts, uint axis, mask members, real origin, real inverse,
+static inline void beam_axis_gather(BeamLeasts *leasts, uint axis, mask members, real origin, real inverse,
                                     real slack, bool negative)
 {
     const real none = (real)(LARGEST), side = (real)(negative ? -1 : 1);
-    leasts->all[BEAM_LEAST + axis] = lanes_select(members, fabs(inverse), none);
-    leasts->all[BEAM_MOST + axis] = lanes_select(members, -fabs(inverse), none);
-    leasts->all[BEAM_START + axis] = lanes_select(members, fma(origin, -side, -slack), none);
-    leasts->all[BEAM_END + axis] = lanes_select(members, fma(origin, side, -slack), none);
+    leasts->ways.all[BEAM_LEAST + axis] = lanes_select(members, fabs(inverse), none);
+    leasts->ways.all[BEAM_MOST + axis] = lanes_select(members, -fabs(inverse), none);
+    leasts->origins.all[BEAM_START + axis] = lanes_select(members, fma(origin, -side, -slack), none);
+    leasts->origins.all[BEAM_END + axis] = lanes_select(members, fma(origin, side, -slack), none);
 }
 
-static inline BeamAxis beam_axis(const Leasts *leasts, uint axis, bool negative, scalar everywhere)
+static inline BeamAxis beam_axis(const BeamLeasts *leasts, uint axis, bool negative, scalar everywhere)
 {
-    scalar least = leasts->each[BEAM_LEAST + axis], most = -leasts->each[BEAM_MOST + axis];
-    scalar start = leasts->each[BEAM_START + axis], end = leasts->each[BEAM_END + axis];
+    scalar least = leasts->ways.each[BEAM_LEAST + axis], most = -leasts->ways.each[BEAM_MOST + axis];
+    scalar start = leasts->origins.each[BEAM_START + axis], end = leasts->origins.each[BEAM_END + axis];
     const scalar side = negative ? -1 : 1;
     return (BeamAxis){side * least,
                       side * most,
@@ -126,25 +131,28 @@ static inline BeamAxis beam_axis(const Leasts *leasts, uint axis, bool negative,
 // Of lanes whose directions have the same signs.
 static inline Beam beam_make(const BoxRays *rays, const Ray *ray, uint lanes, real limit)
 {
+    const real none = (real)(LARGEST);
     mask members = mask_of_bits(lanes);
     bool negative_x = lanes & rays->negative_x, negative_y = lanes & rays->negative_y,
          negative_z = lanes & rays->negative_z;
-    Leasts leasts;
+    BeamLeasts leasts;
     beam_axis_gather(&leasts, 0, members, ray->origin.x, rays->inverse.x, rays->slack, negative_x);
     beam_axis_gather(&leasts, 1, members, ray->origin.y, rays->inverse.y, rays->slack, negative_y);
     beam_axis_gather(&leasts, 2, members, ray->origin.z, rays->inverse.z, rays->slack, negative_z);
-    leasts.all[BEAM_NEAR] = lanes_select(members, rays->near, (real)(LARGEST));
-    for (uint i = BEAM_LIMIT; i < LEASTS; i++)
-        leasts.all[i] = lanes_select(members, -limit, (real)(LARGEST));
-    leasts_find(&leasts);
+    leasts.ways.all[BEAM_NEAR] = lanes_select(members, rays->near, none);
+    leasts.ways.all[BEAM_LIMIT] = lanes_select(members, -limit, none);
+    for (uint i = BEAM_END + 3; i < LEASTS; i++)
+        leasts.origins.all[i] = none;
+    leasts_find(&leasts.ways);
+    leasts_find(&leasts.origins);
     Beam beam;
-    beam.near = leasts.each[BEAM_NEAR];
+    beam.near = leasts.ways.each[BEAM_NEAR];
     // where one does look there, the beam is all of space, unless it is a single ray
     const scalar everywhere = LANES > 1 && beam.near < 0 ? LARGEST * 0.5f : 0;
     beam.x = beam_axis(&leasts, 0, negative_x, everywhere);
     beam.y = beam_axis(&leasts, 1, negative_y, everywhere);
     beam.z = beam_axis(&leasts, 2, negative_z, everywhere);
-    beam.limit = -leasts.each[BEAM_LIMIT];
+    beam.limit = -leasts.ways.each[BEAM_LIMIT];
     beam.parted = false;
     return beam;
 }

@@ -267,8 +267,8 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
-// 16 reals, and the smallest lane of each: `all` becomes `each`.
-enum { LEASTS = 16 };
+// 8 reals, and the smallest lane of each: `all` becomes `each`.
+enum { LEASTS = 8 };
 typedef union {
     real all[LEASTS];
     scalar each[LEASTS];
@@ -282,16 +282,21 @@ static inline real real_min_of_pairs(real a, real b)
 #endif
 
 // Two reals whose lanes were compared in pairs fill one, so that all of them take little longer than one
-// alone.
+// alone. Written out, they stay in registers.
 static inline void leasts_find(Leasts *leasts)
 {
 #if LANES > 1
-#pragma unroll
-    for (uint count = LEASTS >> 1; count * LANES >= LEASTS; count >>= 1) {
-#pragma unroll
-        for (uint i = 0; i < count; i++)
-            leasts->all[i] = real_min_of_pairs(leasts->all[2 * i], leasts->all[2 * i + 1]);
-    }
+    real *all = leasts->all;
+    real first = real_min_of_pairs(all[0], all[1]), second = real_min_of_pairs(all[2], all[3]);
+    real third = real_min_of_pairs(all[4], all[5]), fourth = real_min_of_pairs(all[6], all[7]);
+    all[0] = real_min_of_pairs(first, second);
+    all[1] = real_min_of_pairs(third, fourth);
+#if LANES > 4
+    all[0] = real_min_of_pairs(all[0], all[1]);
+#endif
+#if LANES > 8
+    all[0] = real_min_of_pairs(all[0], all[0]);
+#endif
 #endif
 }
 
