@@ -7,6 +7,11 @@
 
 #pragma OPENCL FP_CONTRACT OFF
 
+// Relaxed maths let a compiler rearrange sums, and so find that they lose nothing: one that hears does not.
+#if IS_FAST && defined(__clang__) && __clang_major__ >= 12
+#pragma clang fp reassociate(off)
+#endif
+
 #if IS_DOUBLE
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 typedef double scalar;

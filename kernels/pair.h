@@ -50,7 +50,8 @@ static inline Pair pair_product(real a, real b)
 
 #if IS_FAST
 
-// What has to be exact is made of pair_product here.
+// Of products only pair_product's are exact here: a product_difference is a plain difference.
+#undef fma
 #define fma mad
 
 #else
@@ -77,6 +78,7 @@ static inline real fma_in_software(real a, real b, real c)
 }
 
 // Of lanes; the device's own remains (fma)(a, b, c).
+#undef fma
 #define fma(a, b, c) fma_in_software(a, b, c)
 
 #endif

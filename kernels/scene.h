@@ -250,7 +250,7 @@ static inline uint node_open(const Scene *scene, uint index, uint lanes, const B
     return count;
 }
 
-// Down the tree; a packet visits what any of its open lanes meets.
+// Down the tree; a packet visits what any of its open lanes meets. `open`: these, as bits.
 static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, uint open, const Beam *beam,
                               const BoxRays *rays, LaidRays *laid)
 {

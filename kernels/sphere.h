@@ -54,8 +54,8 @@ static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, 
 // u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
 // intersection, Ray Tracing Gems, 2019, chapter 7). Within 0.4 radii of the surface c cancels, and both roots
 // with it: up to 21 ulp at 1.1 radii, 3.5 from c rounded once. There b^2 - a c tells hit from miss, too: by
-// l, whose square is off by u r^2, the horizon of a ground sphere would be torn. The compensated form rounds
-// each number once.
+// l, whose square is off by some 3 u r^2, the horizon of a ground sphere would be torn. The compensated form
+// rounds each number once.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -117,7 +117,7 @@ static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, r
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 
-// At `fast` the compiler's rearranging undoes what makes c, and so t next to the surface, exact.
+// At `fast` a compiler that rearranges undoes what makes c, and so t next to the surface, exact.
 static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);

@@ -48,7 +48,7 @@ static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings 
 }
 
 // A program of a test's own kernels, which may include the shipped ones.
-static inline cl_program probe_program(const char *text, const char *prelude)
+static inline cl_program probe_program(const char *text, const char *prelude, const char *options)
 {
     size_t file_count = 0;
     while (kernel_files[file_count].name)
@@ -62,7 +62,7 @@ static inline cl_program probe_program(const char *text, const char *prelude)
     cl_int status;
     cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
     cl_check(status, "clCreateProgramWithSource");
-    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, "-cl-std=CL1.2", NULL, NULL));
+    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, options, NULL, NULL));
     free(composed);
     free(files);
     return program;

@@ -188,7 +188,7 @@ static void balls_check(bool wide, bool from_eye)
                  "0u\n#define PERTURB_SCALE 1\n",
                  wide);
     features_write_prelude(&prelude, FEATURE_ALL);
-    cl_program program = probe_program(kernel_text, text_c(&prelude));
+    cl_program program = probe_program(kernel_text, text_c(&prelude), "-cl-std=CL1.2");
     text_free(&prelude);
     Trial trial = {.wide = wide, .unit_roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2, .random = {7}};
     trial.lines = memory_allocate((size_t)BALLS_PER_APEX * 6, sizeof *trial.lines);

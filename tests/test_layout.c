@@ -177,7 +177,7 @@ static cl_program program_make(bool wide)
     kernels_write(&text);
     const char *prelude =
         wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
-    cl_program program = probe_program(text_c(&text), prelude);
+    cl_program program = probe_program(text_c(&text), prelude, "-cl-std=CL1.2");
     text_free(&text);
     return program;
 }

@@ -19,7 +19,8 @@ static uint32_t column_horizon(VerifyRun *run, const VerifyPicture *picture, uin
 void verify_ground_horizon(VerifyRun *run)
 {
     static const struct {
-        double fov, rise; // in degrees; of the way ahead
+        double fov;  // in degrees
+        double rise; // slope of the way ahead; the horizon's is -sqrt(2e-6)
     } views[] = {{60, 0}, {0.5, 0}, {0.02, -0.0014142}};
     Scene scene = verify_scene("objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
     const Vector3 eye = {0, 1, 0};
