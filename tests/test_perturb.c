@@ -193,6 +193,7 @@ static bool same(float a, float b)
     return isnan(a) ? isnan(b) : a == b && signbit(a) == signbit(b);
 }
 
+// At `fast` the products' errors alone: a sum is the device's mad there.
 static void fma_in_software_is_exact(void **state)
 {
     (void)state;
@@ -211,6 +212,7 @@ static void fma_in_software_is_exact(void **state)
             if (!fast && !same(sums[i], sum))
                 fail_msg("%u lanes: %a * %a + %a is %a, not %a", lanes, (double)a[i], (double)b[i],
                          (double)c[i], (double)sum, (double)sums[i]);
+            // relaxed maths promise no infinity, and nothing below normal numbers, where the error of this is
             if (fast && (!isfinite(product) || fabsf(product) < 0x1p-80F)) continue;
             if (isfinite(product) && errors[i] != fmaf(a[i], b[i], -product))
                 fail_msg("%u lanes: %a * %a leaves %a out, not %a", lanes, (double)a[i], (double)b[i],
