@@ -13,64 +13,114 @@ typedef struct {
     real a, b, c, discriminant;
     Vector q, m;
     real g, h;
+    mask exact; // each of these is rounded about once
 } RevolutionQuadric;
 
-static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
+static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *shape, bool sloped,
+                                                           const Ray *ray)
 {
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     Vector d = ray->direction;
     real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
-    real length_ = (real)(shape->range.y);
-    RevolutionQuadric quadric;
-    if (IS_COMPENSATED) {
-        PairVector f = pair_vector_difference(ray->origin, base);
-        PairVector m = pair_vector_cross(f, axis);
-        PairVector q = pair_vector_cross(pair_vector_of(d), axis);
-        PairVector moment = pair_vector_cross(f, d);
-        Pair g = pair_of(radius), h = pair_of((real)(0));
-        PairVector v;
-        if (sloped) {
-            g = pair_add(g, pair_scale(pair_vector_dot_vector(f, axis), slope));
-            h = pair_scale(pair_vector_dot_vector(pair_vector_of(d), axis), slope);
-            v = (PairVector){pair_product_difference(g, q.x, h, m.x), pair_product_difference(g, q.y, h, m.y),
-                             pair_product_difference(g, q.z, h, m.z)};
-        } else {
-            v = (PairVector){pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};
-        }
-        Pair turn = pair_vector_dot_vector(moment, axis);
-        Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
-        quadric.a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h)).high;
-        quadric.b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h)).high;
-        quadric.c = pair_subtract(pair_vector_dot(m, m), pair_multiply(g, g)).high;
-        quadric.discriminant =
-            pair_subtract(pair_vector_dot(v, v), pair_multiply(squared_axis, pair_multiply(turn, turn))).high;
-        quadric.q = pair_vector_high(q);
-        quadric.m = pair_vector_high(m);
-        quadric.g = g.high;
-        quadric.h = h.high;
+    PairVector f = pair_vector_difference(ray->origin, base);
+    PairVector m = pair_vector_cross(f, axis);
+    PairVector q = pair_vector_cross(pair_vector_of(d), axis);
+    PairVector moment = pair_vector_cross(f, d);
+    Pair g = pair_of(radius), h = pair_of((real)(0));
+    PairVector v;
+    if (sloped) {
+        g = pair_add(g, pair_scale(pair_vector_dot_vector(f, axis), slope));
+        h = pair_scale(pair_vector_dot_vector(pair_vector_of(d), axis), slope);
+        v = (PairVector){pair_product_difference(g, q.x, h, m.x), pair_product_difference(g, q.y, h, m.y),
+                         pair_product_difference(g, q.z, h, m.z)};
     } else {
-        Vector f = vector_subtract(ray->origin, base);
-        Vector m = vector_cross(f, axis);
-        Vector q = vector_cross(d, axis);
-        real g = radius, h = (real)(0), reach;
-        if (sloped) {
-            g = fma(slope, vector_dot(f, axis), radius);
-            h = slope * vector_dot(d, axis);
-            Vector v = {product_difference(g, q.x, h, m.x), product_difference(g, q.y, h, m.y),
-                        product_difference(g, q.z, h, m.z)};
-            reach = vector_length(v);
-        } else {
-            reach = radius * vector_length(q);
-        }
-        real turn = length_ * fabs(vector_dot(vector_cross(f, d), axis));
-        quadric.a = fma(-h, h, vector_dot(q, q));
-        quadric.b = fma(-g, h, vector_dot(m, q));
-        quadric.c = fma(-g, g, vector_dot(m, m));
-        quadric.discriminant = (reach - turn) * (reach + turn);
-        quadric.q = q;
-        quadric.m = m;
-        quadric.g = g;
-        quadric.h = h;
+        v = (PairVector){pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};
+    }
+    Pair turn = pair_vector_dot_vector(moment, axis);
+    Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
+    RevolutionQuadric quadric;
+    quadric.a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h)).high;
+    quadric.b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h)).high;
+    quadric.c = pair_subtract(pair_vector_dot(m, m), pair_multiply(g, g)).high;
+    quadric.discriminant =
+        pair_subtract(pair_vector_dot(v, v), pair_multiply(squared_axis, pair_multiply(turn, turn))).high;
+    quadric.q = pair_vector_high(q);
+    quadric.m = pair_vector_high(m);
+    quadric.g = g.high;
+    quadric.h = h.high;
+    quadric.exact = mask_all();
+    return quadric;
+}
+
+static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *shape, bool sloped,
+                                                           const Ray *ray)
+{
+    Vector axis = vector_of(shape->axis_slope), d = ray->direction;
+    real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
+    Vector f = vector_subtract(ray->origin, vector_of(shape->base_radius));
+    Vector m = vector_cross(f, axis);
+    Vector q = vector_cross(d, axis);
+    real g = radius, h = (real)(0), reach;
+    if (sloped) {
+        g = fma(slope, vector_dot(f, axis), radius);
+        h = slope * vector_dot(d, axis);
+        Vector v = {product_difference(g, q.x, h, m.x), product_difference(g, q.y, h, m.y),
+                    product_difference(g, q.z, h, m.z)};
+        reach = vector_length(v);
+    } else {
+        reach = radius * vector_length(q);
+    }
+    real turn = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
+    RevolutionQuadric quadric;
+    quadric.a = fma(-h, h, vector_dot(q, q));
+    quadric.b = fma(-g, h, vector_dot(m, q));
+    quadric.c = fma(-g, g, vector_dot(m, m));
+    quadric.discriminant = (reach - turn) * (reach + turn);
+    quadric.q = q;
+    quadric.m = m;
+    quadric.g = g;
+    quadric.h = h;
+    quadric.exact = mask_none();
+    return quadric;
+}
+
+// For lanes that start beside the side. One that leaves it outward has no crossing ahead, and needs none.
+static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
+                                                  bool sloped, const Ray *ray, mask beside)
+{
+    // a and c well beyond their roundings; the sign of b does not matter where it is within its own
+    real reach = vector_length(vector_subtract(ray->origin, vector_of(shape->base_radius)));
+    real least_c = (real)(32 * UNIT_ROUNDOFF * shape->range.y) * reach * vector_length(quadric->m);
+    real least_a = (real)(0x1p-10f) * vector_dot(quadric->q, quadric->q);
+    mask leaves = beside & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
+                  (ray->near >= (real)(0));
+    quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
+    beside = beside & !leaves;
+    if (!lanes_any(beside)) return;
+    RevolutionQuadric exact = revolution_quadric_exactly(shape, sloped, ray);
+    quadric->a = lanes_select(beside, exact.a, quadric->a);
+    quadric->b = lanes_select(beside, exact.b, quadric->b);
+    quadric->c = lanes_select(beside, exact.c, quadric->c);
+    quadric->discriminant = lanes_select(beside, exact.discriminant, quadric->discriminant);
+    quadric->q = vector_select(beside, exact.q, quadric->q);
+    quadric->m = vector_select(beside, exact.m, quadric->m);
+    quadric->g = lanes_select(beside, exact.g, quadric->g);
+    quadric->h = lanes_select(beside, exact.h, quadric->h);
+    quadric->exact = beside;
+}
+
+// Next to the side c cancels, and the discriminant is off by some 6 u r^2, which would tear the horizon of
+// ground that is a cylinder: pairs there at any precision.
+static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
+{
+    if (IS_COMPENSATED) return revolution_quadric_exactly(shape, sloped, ray);
+    RevolutionQuadric quadric = revolution_quadric_plainly(shape, sloped, ray);
+    real size = vector_dot(quadric.m, quadric.m);
+    mask beside = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
+    if (RARELY(lanes_any(beside))) {
+        RevolutionQuadric refined = quadric;
+        revolution_quadric_refine(&refined, shape, sloped, ray, beside);
+        quadric = refined;
     }
     return quadric;
 }
@@ -120,12 +170,12 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
                                  lanes_select(positive_ratio, (real)(LARGEST), (real)(-LARGEST)));
     real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric.c, lanes_select(zero, (real)(1), q)));
     if (sloped && !IS_COMPENSATED) {
-        c_over_q = revolution_polish(&quadric, c_over_q);
+        c_over_q = lanes_select(quadric.exact, c_over_q, revolution_polish(&quadric, c_over_q));
         // where a is nearly 0 a step may lead through infinity, and what lay outside the roots would lie
         // inside
         real polished = revolution_polish(&quadric, q_over_a);
         mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
-        q_over_a = lanes_select(same_side, polished, q_over_a);
+        q_over_a = lanes_select(same_side & !quadric.exact, polished, q_over_a);
     }
     crossings.side = (Roots){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
     crossings.outer = quadric.a < (real)(0);

@@ -362,6 +362,55 @@ static void inside(void **state)
     at_each_precision(inside_at);
 }
 
+// Whether a ray from the eye at (0, 1, 0) meets the surface y = -1e6 + sqrt((1e6 + slope x)^2 - z^2).
+static bool meets_ground(const double *direction, double slope)
+{
+    const long double radius = 1e6L, above = 1e6L + 1;
+    long double x = direction[0], y = direction[1], z = direction[2];
+    long double a = y * y + z * z - slope * slope * x * x, b = above * y - radius * slope * x;
+    return b < 0 && b * b >= a * (above * above - radius * radius);
+}
+
+// Ground that is a cylinder or a cone: in every column the horizon is within a row of the exact one. Next to
+// the side the plain discriminant tears it (S4 has the sphere's).
+static void ground_horizon_at(Precision precision)
+{
+    static const struct {
+        const char *view;
+        double slope;
+    } grounds[] = {
+        {"camera: {position: [0, 1, 0], look_at: [0, 1, 1], fov: 0.5}\n"
+         "objects: [{cylinder: {from: [-1e6, -1e6, 0], to: [1e6, -1e6, 0], radius: 1e6}}]\n",
+         0},
+        {"camera: {position: [0, 1, 0], look_at: [0, 1, 1], fov: 0.5}\n"
+         "objects: [{cone: {from: [-1e6, -1e6, 0], to: [1e6, -1e6, 0], radius: [1.25e6, 0.75e6]}}]\n",
+         -0.25},
+    };
+    const uint32_t side = 256;
+    for (size_t k = 0; k < sizeof grounds / sizeof *grounds; k++) {
+        Scene scene = scene_of(grounds[k].view);
+        Frame frame = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
+        for (uint32_t column = 0; column < side; column++) {
+            uint32_t horizon = 0, exact = 0;
+            while (frame.object[horizon * side + column] == UINT32_MAX)
+                horizon++;
+            while (!meets_ground(frame.ray + 3 * (exact * side + column), grounds[k].slope))
+                exact++;
+            check(near(horizon, exact, 1));
+            for (uint32_t row = horizon; row < side; row++)
+                check(frame.object[row * side + column] == 0);
+        }
+        frame_free(&frame);
+        scene_free(&scene);
+    }
+}
+
+static void ground_horizon(void **state)
+{
+    (void)state;
+    at_each_precision(ground_horizon_at);
+}
+
 static double basis_error(const Camera *camera)
 {
     CameraBasis basis = camera_basis(camera, 200, 100);
@@ -473,6 +522,7 @@ int main(void)
         cmocka_unit_test(highlight),
         cmocka_unit_test(tilted_plane),
         cmocka_unit_test(inside),
+        cmocka_unit_test(ground_horizon),
         cmocka_unit_test(degenerate_cameras),
         cmocka_unit_test(single_pixel_and_extreme_fields),
         cmocka_unit_test(distance_from_origin_changes_nothing),
