@@ -88,10 +88,13 @@ static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *sha
 static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
                                                   bool sloped, const Ray *ray, mask beside)
 {
-    // a and c well beyond their roundings; the sign of b does not matter where it is within its own
+    // a, which is more than 0, and c well beyond their roundings, which grow with the slope; the sign of b
+    // does not matter where it is within its own
     real reach = vector_length(vector_subtract(ray->origin, vector_of(shape->base_radius)));
-    real least_c = (real)(32 * UNIT_ROUNDOFF * shape->range.y) * reach * vector_length(quadric->m);
-    real least_a = (real)(0x1p-10f) * vector_dot(quadric->q, quadric->q);
+    scalar steepness = 1 + fabs(shape->axis_slope.w);
+    real least_c =
+        (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * reach * vector_length(quadric->m);
+    real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
     mask leaves = beside & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
                   (ray->near >= (real)(0));
     quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
@@ -109,7 +112,7 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
     quadric->exact = beside;
 }
 
-// Next to the side c cancels, and the discriminant is off by some 6 u r^2, which would tear the horizon of
+// Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would tear the horizon of
 // ground that is a cylinder: pairs there at any precision.
 static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
 {

@@ -51,16 +51,19 @@ python_with() {
     local import="import $(IFS=,; echo "${modules[*]}")" offline=$shared_cache/glint-tests/offline
     "$python" -c "$import" 2>/dev/null && return
     command -v "$python" >/dev/null || skip_all "there is no $python"
+    # one test after the other: they run beside each other
+    mkdir -p "$shared_cache" && local lock && exec {lock}>"$shared_cache/glint-tests.lock" && flock "$lock"
     [ -x "$folder/bin/pip" ] || "$python" -m venv --clear "$folder" >"$log" 2>&1 ||
         skip_all "${modules[*]}: not here, and no virtual environment can be made: $(tail -n 1 "$log")"
     python=$folder/bin/python
-    "$python" -c "$import" 2>/dev/null && return
+    "$python" -c "$import" 2>/dev/null && exec {lock}>&- && return
     [ ! "$(find "$offline" -mmin -10 2>/dev/null)" ] || skip_all "${modules[*]}: not here, and pip had no network"
     timeout 300 "$python" -m pip install -q --no-input "${@#*=}" >"$log" 2>&1
     local status=$?
     if [ $status = 124 ] || grep -qi 'connection broken' "$log"; then touch "$offline"; fi
     [ $status = 0 ] && "$python" -c "$import" 2>"$log" ||
         skip_all "${modules[*]}: not here, and pip cannot install them: $(tail -n 1 "$log")"
+    exec {lock}>&-
 }
 is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
 

@@ -392,9 +392,9 @@ static void ground_horizon_at(Precision precision)
         Frame frame = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
         for (uint32_t column = 0; column < side; column++) {
             uint32_t horizon = 0, exact = 0;
-            while (frame.object[horizon * side + column] == UINT32_MAX)
+            while (horizon < side && frame.object[horizon * side + column] == UINT32_MAX)
                 horizon++;
-            while (!meets_ground(frame.ray + 3 * (exact * side + column), grounds[k].slope))
+            while (exact < side && !meets_ground(frame.ray + 3 * (exact * side + column), grounds[k].slope))
                 exact++;
             check(near(horizon, exact, 1));
             for (uint32_t row = horizon; row < side; row++)

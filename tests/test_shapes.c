@@ -2,6 +2,7 @@
 #include "tests/probe.h"
 #include "tests/reference.h"
 #include "tests/specimen.h"
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -101,14 +102,31 @@ static void compare(const Trial *trial, size_t index, const ProbeHit *hit, Preci
     if (vector_dot(normal, direction) > 0) tally->wrong++;
 }
 
-// Rays and what they should hit; `wide`: taken in double, else what a float holds of them.
+// A ray from next to where one meets the scene, off it to either side by a hundredth to a hundred thousandth
+// of the reach, to anywhere.
+static SpecimenRay move_beside(const SpecimenRay *given, const Scene *scene, double reach, Random *random)
+{
+    ReferenceRay ray = reference_ray(given->origin, given->direction);
+    ReferenceHit hit = reference_hit(scene, &ray);
+    if (!hit.found) return *given;
+    Quad3 p = reference_point(&ray, hit.t);
+    double side = random_between(random, -1, 1) < 0 ? -1 : 1;
+    double height = side * reach * pow(10, random_between(random, -5, -2));
+    Vector3 normal = {(double)hit.normal.x, (double)hit.normal.y, (double)hit.normal.z};
+    Vector3 place = {(double)p.x, (double)p.y, (double)p.z};
+    return (SpecimenRay){vector_add(place, vector_scale(normal, height)), random_in_ball(random)};
+}
+
+// Rays and what they should hit; `wide`: taken in double, else what a float holds of them; `beside`: from
+// next to the surface.
 static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size_t aim_count, bool wide,
-                    Random *random)
+                    bool beside, Random *random)
 {
     for (size_t i = 0; !wide && i < scene->objects.count; i++)
         scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
     for (size_t i = 0; i < RAYS_PER_SPECIMEN; i++) {
         SpecimenRay given = specimen_ray(&aims[i % aim_count], random);
+        if (beside) given = move_beside(&given, scene, trial->reach, random);
         ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
                                 : reference_ray_rounded(given.origin, given.direction);
         // one in three looks behind its start, too
@@ -142,8 +160,8 @@ static void hold_at(const Trial *trial, const Scene *scene, Precision precision,
     assert_true(right);
 }
 
-static void hold(const Specimen *specimens, size_t count, Vector3 center, double reach, const char *what,
-                 Random *random)
+static void hold(const Specimen *specimens, size_t count, Vector3 center, double reach, bool beside,
+                 const char *what, Random *random)
 {
     static Trial trial;
     Object objects[CROWD];
@@ -154,7 +172,7 @@ static void hold(const Specimen *specimens, size_t count, Vector3 center, double
     for (int wide = 0; wide < 2; wide++) {
         for (size_t i = 0; i < count; i++)
             objects[i] = specimens[i].object;
-        prepare(&trial, &scene, specimens, count, wide, random);
+        prepare(&trial, &scene, specimens, count, wide, beside, random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
             if (wide != (precision == PRECISION_DOUBLE)) continue;
             hold_at(&trial, &scene, precision, 1, what);
@@ -169,7 +187,7 @@ static void hits_each_shape(void **state)
     Random random = {kind};
     for (int i = 0; i < SPECIMENS_OF_A_KIND; i++) {
         Specimen specimen = specimen_make(kind, &random);
-        hold(&specimen, 1, specimen.center, specimen.reach, specimen_names[kind], &random);
+        hold(&specimen, 1, specimen.center, specimen.reach, false, specimen_names[kind], &random);
     }
 }
 
@@ -184,7 +202,28 @@ static void hits_the_nearest_of_a_crowd(void **state)
             specimens[i] = specimen_make((SpecimenKind)(i % SPECIMEN_COUNT), &random);
             reach = fmax(reach, vector_length(specimens[i].center) + specimens[i].reach);
         }
-        hold(specimens, CROWD, (Vector3){0, 0, 0}, reach, "crowd", &random);
+        hold(specimens, CROWD, (Vector3){0, 0, 0}, reach, false, "crowd", &random);
+    }
+}
+
+// A cone of 32 times the slope; its axis ends on a float still.
+static void make_steep(Specimen *cone)
+{
+    cone->object.as.cone.slope *= 32;
+    cone->object.as.cone.axis = vector_scale(cone->object.as.cone.axis, 0x1p-5);
+}
+
+// There c cancels, and some rays are taken to leave without being looked at closely.
+static void hits_from_beside_the_side(void **state)
+{
+    (void)state;
+    Random random = {SPECIMEN_COUNT + 2};
+    for (SpecimenKind kind = SPECIMEN_CYLINDER_CAPPED; kind <= SPECIMEN_CONE_INFINITE; kind++) {
+        for (int i = 0; i < SPECIMENS_OF_A_KIND; i++) {
+            Specimen specimen = specimen_make(kind, &random);
+            if (i == 0 && specimen.object.kind == SHAPE_CONE) make_steep(&specimen);
+            hold(&specimen, 1, specimen.center, specimen.reach, true, specimen_names[kind], &random);
+        }
     }
 }
 
@@ -209,7 +248,7 @@ static void gives_the_same_bits_at_every_width(void **state)
     }
     Material material;
     Scene scene = scene_of(objects, SPECIMEN_COUNT, &material);
-    prepare(&trial, &scene, specimens, SPECIMEN_COUNT, false, &random);
+    prepare(&trial, &scene, specimens, SPECIMEN_COUNT, false, false, &random);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         for (size_t width = 0; width < sizeof lane_counts / sizeof *lane_counts; width++) {
             ProbeHit *seen = hits[width > 0];
@@ -226,12 +265,13 @@ static void gives_the_same_bits_at_every_width(void **state)
 int main(void)
 {
     SpecimenKind kinds[SPECIMEN_COUNT];
-    struct CMUnitTest tests[SPECIMEN_COUNT + 2];
+    struct CMUnitTest tests[SPECIMEN_COUNT + 3];
     for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
         kinds[kind] = kind;
         tests[kind] = (struct CMUnitTest){specimen_names[kind], hits_each_shape, NULL, NULL, &kinds[kind]};
     }
     tests[SPECIMEN_COUNT] = (struct CMUnitTest)cmocka_unit_test(hits_the_nearest_of_a_crowd);
     tests[SPECIMEN_COUNT + 1] = (struct CMUnitTest)cmocka_unit_test(gives_the_same_bits_at_every_width);
+    tests[SPECIMEN_COUNT + 2] = (struct CMUnitTest)cmocka_unit_test(hits_from_beside_the_side);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }
