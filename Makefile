@@ -123,7 +123,7 @@ bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_py
 	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS)
 	$(if $(SPD),$(peers_python) tools/peers/compare --glint $(BUILD)/glint --runs $(ROUNDS) --size 1024x1024 \
 	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
-	tools/report docs/performance.md
+	tools/report README.md docs/performance.md
 
 # With PyYAML: Debian's, if it is there.
 $(peers_python):

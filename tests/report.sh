@@ -5,22 +5,21 @@
 
 command -v python3 >/dev/null || skip_all "there is no python3"
 
-documents=(docs/accuracy.md docs/performance.md docs/verify.md)
-cp -r docs/measurements "${documents[@]}" "$scratch"
+documents=(README.md docs/accuracy.md docs/performance.md docs/verify.md)
+cp -r --parents docs/measurements "${documents[@]}" "$scratch"
 for document in "${documents[@]}"; do
-    copy=$scratch/$(basename "$document")
-    tools/report "$copy" 2>"$scratch/told"
+    tools/report "$scratch/$document" 2>"$scratch/told"
     check "$document: exit status" [ $? = 0 ]
-    check "$document says what was measured" diff "$document" "$copy"
+    check "$document says what was measured" diff "$document" "$scratch/$document"
     for measured in $(sed -n 's/^<!-- measured: [a-z]* \(.*\) -->$/\1/p' "$document"); do
-        [ -f "docs/$measured" ] || check "$measured is not there, which is told" grep -q "no .*$measured" "$scratch/told"
+        [ -f "$(dirname "$document")/$measured" ] || check "$measured is not there, which is told" grep -q "no .*$measured" "$scratch/told"
     done
 done
 
 # Changed figures are written, as they would be by a new measurement.
-sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/measurements/accuracy.json"
-check "a new measurement" tools/report "$scratch/accuracy.md"
-check "its times are in the document" grep -q '| 12346 (' "$scratch/accuracy.md"
+sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/docs/measurements/accuracy.json"
+check "a new measurement" tools/report "$scratch/docs/accuracy.md"
+check "its times are in the document" grep -q '| 12346 (' "$scratch/docs/accuracy.md"
 
 printf '%s\n' before '<!-- measured: bench none.json -->' within '<!-- end of measured -->' after >"$scratch/absent.md"
 cp "$scratch/absent.md" "$scratch/before.md"
