@@ -1,6 +1,7 @@
 #include "tests/child.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <ftw.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 #include "tests/frame.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

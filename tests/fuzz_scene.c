@@ -4,6 +4,8 @@
 // (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
 #include "host/base/array.h"
 #include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/scene/scene.h"
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/opencl/compose.h"
 #include "host/render/renderer.h"
 #include <stdio.h>

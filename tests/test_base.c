@@ -1,6 +1,8 @@
-// Messages with their place, growing text, words near to one another, and output beside its target.
+// Messages with their place, growing text, words near to one another, hashes, and output beside its target.
 #include "host/base/array.h"
 #include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/hash.h"
 #include "host/base/output.h"
 #include "host/base/text.h"
 
@@ -318,6 +320,16 @@ static void test_fault_removes_the_temporary(void **state)
     unlink("kept");
 }
 
+// Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".
+static void test_hash(void **state)
+{
+    (void)state;
+    assert_true(hash_bytes(HASH_START, "", 0) == UINT64_C(0xcbf29ce484222325));
+    assert_true(hash_bytes(HASH_START, "a", 1) == UINT64_C(0xaf63dc4c8601ec8c));
+    assert_true(hash_bytes(HASH_START, "foobar", 6) == UINT64_C(0x85944171f73967e8));
+    assert_true(hash_bytes(hash_bytes(HASH_START, "foo", 3), "bar", 3) == UINT64_C(0x85944171f73967e8));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -330,6 +342,7 @@ int main(void)
         cmocka_unit_test(test_text_nearest),
         cmocka_unit_test(test_array),
         cmocka_unit_test(test_clock),
+        cmocka_unit_test(test_hash),
         cmocka_unit_test(test_read_failures),
         cmocka_unit_test(test_output_commit),
         cmocka_unit_test(test_output_replaces_what_a_link_leads_to),

@@ -1,6 +1,7 @@
 // The hierarchy: what a tree must be for any boxes, that no hit depends on it, and that closed meshes do not
 // leak. GLINT_LONG_TESTS=1 sends a million rays where this sends some ten thousand.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/render/bvh_widen.h"
 #include "tests/probe.h"
 #include <math.h>

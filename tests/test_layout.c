@@ -1,7 +1,7 @@
 // The structs that host and kernels share lie the same way on both sides: their sizes and the places of their
 // members, as the device's compiler has them in float and in double, and their values after the host's
 // narrowing.
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/render/balls.h"
 #include "host/render/hierarchy.h"
 #include "host/render/textures.h"

@@ -55,16 +55,6 @@ static void test_every_embedded_file_composes(void **state)
     }
 }
 
-// Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".
-static void test_hash(void **state)
-{
-    (void)state;
-    assert_true(hash_bytes(HASH_START, "", 0) == UINT64_C(0xcbf29ce484222325));
-    assert_true(hash_bytes(HASH_START, "a", 1) == UINT64_C(0xaf63dc4c8601ec8c));
-    assert_true(hash_bytes(HASH_START, "foobar", 6) == UINT64_C(0x85944171f73967e8));
-    assert_true(hash_bytes(hash_bytes(HASH_START, "foo", 3), "bar", 3) == UINT64_C(0x85944171f73967e8));
-}
-
 static void test_event_times(void **state)
 {
     (void)state;
@@ -99,7 +89,6 @@ int main(void)
         cmocka_unit_test(test_each_include_once),
         cmocka_unit_test(test_missing_files),
         cmocka_unit_test(test_every_embedded_file_composes),
-        cmocka_unit_test(test_hash),
         cmocka_unit_test(test_event_times),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -2,6 +2,7 @@
 // are repaired to the correctly rounded ones; and the fma of those that have none in hardware is fma to the
 // bit.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
 #include <float.h>

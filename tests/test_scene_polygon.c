@@ -1,5 +1,6 @@
 // Polygons cut into triangles: every point of the polygon lies in exactly one, whatever its form.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/scene/polygon.h"
 
 #include <setjmp.h>

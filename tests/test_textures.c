@@ -1,6 +1,5 @@
 // Pictures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
-#include "host/base/fault.h"
 #include "host/image/image.h"
 #include "tests/frame.h"
 #include "tests/probe.h"

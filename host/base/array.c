@@ -1,5 +1,8 @@
 #include "host/base/array.h"
 
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+
 void *array_grow(void *items, size_t *capacity, size_t needed, size_t size)
 {
     size_t grown = *capacity ? *capacity : 8;

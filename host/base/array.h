@@ -1,7 +1,7 @@
 // Growing arrays: `Item *items; size_t count, capacity;` beside one another in a struct.
 #pragma once
 
-#include "host/base/fault.h"
+#include <stddef.h>
 
 // Room for `extra` more items, doubling. `array` is an lvalue of a struct with items, count, capacity.
 #define array_reserve(array, extra)                                                                          \

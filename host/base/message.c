@@ -1,5 +1,7 @@
 #include "host/base/message.h"
 #include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <stdarg.h>

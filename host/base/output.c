@@ -1,5 +1,7 @@
 #include "host/base/output.h"
 #include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,5 +1,6 @@
 // glint accuracy: speed against error, for each way of rendering.
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/cli/accuracy_page.h"
 #include "host/cli/accuracy_report.h"

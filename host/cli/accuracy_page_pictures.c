@@ -1,6 +1,6 @@
 #include "host/cli/accuracy_page_parts.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/cli/html.h"
 #include "host/image/transfer.h"
 #include "host/measure/heatmap.h"

@@ -1,5 +1,6 @@
 // glint bench: how fast this device renders scenes, in each way of computing them.
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/cli/bench_report.h"
 #include "host/cli/commands.h"
 #include "host/cli/variants.h"

@@ -1,7 +1,7 @@
 #include "host/cli/bench_variant.h"
 
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/cli/progress.h"
 #include "host/measure/work.h"
 #include <string.h>

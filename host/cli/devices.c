@@ -1,6 +1,7 @@
 // glint devices: every device of every platform, with what matters for tracing.
 #include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"

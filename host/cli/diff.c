@@ -1,6 +1,7 @@
 // glint diff: how far apart two pictures are.
 #include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/measure/flip.h"

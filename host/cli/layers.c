@@ -1,6 +1,6 @@
 #include "host/cli/layers.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/progress.h"
 #include "host/image/image.h"

@@ -1,7 +1,7 @@
 #include "host/cli/picture.h"
 
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/version.h"
 #include <pthread.h>

@@ -1,6 +1,7 @@
 // glint trace: explicit rays, their hits as CSV.
 #include "host/base/array.h"
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"

@@ -1,7 +1,7 @@
 #include "host/cli/variants.h"
 
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

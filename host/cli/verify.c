@@ -3,6 +3,7 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/base/memory.h"
 #include "host/cli/bench_json.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"

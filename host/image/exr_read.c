@@ -1,7 +1,7 @@
 // OpenEXR in, through the C core: the first part's full resolution, rows or tiles, halves or floats.
 #include "host/image/codec.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <openexr.h>
 #include <stdlib.h>

@@ -3,6 +3,7 @@
 #include "host/image/codec.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <errno.h>

@@ -3,6 +3,7 @@
 #include "host/image/transfer.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <errno.h>
 #include <png.h>

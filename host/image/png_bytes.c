@@ -1,6 +1,7 @@
 #include "host/image/png_bytes.h"
 
 #include "host/base/array.h"
+#include "host/base/fault.h"
 #include <png.h>
 
 void png_bytes_append(Text *png, const uint8_t *pixels, uint32_t width, uint32_t height,

@@ -2,7 +2,7 @@
 #include "host/image/codec.h"
 #include "host/image/transfer.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <ctype.h>
 #include <stdlib.h>

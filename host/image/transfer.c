@@ -1,7 +1,7 @@
 // IEC 61966-2-1:1999, the sRGB curve. The curve only rises, so a display value is found by comparing with the
 // thresholds between neighboring display values, which are worked out once; no rounding error is left in it.
 #include "host/image/transfer.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <math.h>
 #include <pthread.h>

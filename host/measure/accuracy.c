@@ -1,6 +1,6 @@
 #include "host/measure/accuracy.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/measure/percentile.h"
 #include <float.h>
 #include <math.h>

@@ -1,5 +1,4 @@
 // What follows from the variants' errors and times together.
-#include "host/base/fault.h"
 #include "host/measure/accuracy.h"
 #include <stdlib.h>
 

@@ -1,6 +1,7 @@
 #include "host/measure/baseline.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <libfyaml.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 #include "host/measure/flip.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/measure/srgb.h"
 #include <math.h>
 #include <stdlib.h>

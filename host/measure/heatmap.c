@@ -1,6 +1,6 @@
 #include "host/measure/heatmap.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/image/image.h"
 #include <math.h>
 #include <stdio.h>

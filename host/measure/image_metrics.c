@@ -1,6 +1,6 @@
 #include "host/measure/image_metrics.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/measure/flip.h"
 #include "host/measure/percentile.h"
 #include "host/measure/srgb.h"

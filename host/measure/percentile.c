@@ -1,6 +1,6 @@
 #include "host/measure/percentile.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>

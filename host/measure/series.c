@@ -1,6 +1,7 @@
 #include "host/measure/series.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,6 +1,8 @@
 #include "host/measure/verify.h"
 
 #include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/measure/verify_exact.h"
 #include "host/measure/verify_tables.h"

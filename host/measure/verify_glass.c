@@ -1,5 +1,5 @@
 // Pictures and rays through glass.
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/measure/verify_exact.h"
 #include "host/measure/verify_families.h"
 #include <math.h>

@@ -1,5 +1,4 @@
 // A scene of every shape, scaled, mirrored and turned: the picture may change in the known way only.
-#include "host/base/fault.h"
 #include "host/measure/scene_change.h"
 #include "host/measure/verify_run.h"
 #include <math.h>

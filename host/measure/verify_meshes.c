@@ -1,5 +1,6 @@
 // Checks of triangles, and of the hierarchy, that no table holds.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/measure/verify_exact.h"
 #include "host/measure/verify_families.h"
 #include <math.h>

@@ -1,5 +1,5 @@
 // Checks of refraction and of the camera's frame.
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/measure/verify_run.h"
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 // Pictures of what is far, thin or pointed: each pixel's hit or miss against the exact one for the ray that
 // was traced.
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/measure/percentile.h"
 #include "host/measure/verify_exact.h"
 #include <math.h>

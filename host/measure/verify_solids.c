@@ -1,5 +1,6 @@
 // Checks of spheres and boxes that no table holds.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/measure/verify_families.h"
 #include "host/measure/verify_run.h"
 #include <math.h>

@@ -3,8 +3,9 @@
 #include "host/opencl/cache.h"
 
 #include "host/base/array.h"
+#include "host/base/hash.h"
+#include "host/base/memory.h"
 #include "host/base/output.h"
-#include "host/opencl/compose.h"
 #include <dirent.h>
 #include <fcntl.h>
 #include <inttypes.h>

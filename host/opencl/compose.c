@@ -1,7 +1,7 @@
 // The composed kernel text and its hash.
 #include "host/opencl/compose.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <stdlib.h>
 #include <string.h>
@@ -92,12 +92,4 @@ char *kernel_compose(const EmbeddedFile *files, const char *root, const char *pr
 char *program_text(const char *root, const char *prelude)
 {
     return kernel_compose(kernel_files, root, prelude, NULL);
-}
-
-uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t length)
-{
-    const unsigned char *byte = bytes;
-    for (size_t i = 0; i < length; i++)
-        hash = (hash ^ byte[i]) * UINT64_C(0x100000001b3);
-    return hash;
 }

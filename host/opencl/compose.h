@@ -13,8 +13,3 @@ extern const EmbeddedFile kernel_files[];
 // and line as they are in kernels/. Files are found by the last part of their path; <…> includes stay. NULL
 // if `root` or an include is not in `files`, with *missing (may be NULL) its name, to be freed by the caller.
 char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude, char **missing);
-
-// FNV-1a, 64 bits (Fowler, Noll, Vo; draft-eastlake-fnv). Start with HASH_START, chain by passing the last
-// hash.
-#define HASH_START UINT64_C(0xcbf29ce484222325)
-uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t length);

@@ -3,6 +3,7 @@
 #include "host/opencl/device.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,8 @@
 // Programs: composed, then built or taken from the cache.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
+#include "host/base/hash.h"
+#include "host/base/memory.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include <inttypes.h>

@@ -1,7 +1,6 @@
 // Rendering the region band by band: each launch short enough for a desktop to stay usable and for an
 // interrupt to be heard, memory that of a band.
 #include "host/base/clock.h"
-#include "host/base/fault.h"
 #include "host/render/renderer_state.h"
 #include "host/render/sample_pattern.h"
 #include <math.h>

@@ -1,6 +1,7 @@
 #include "host/render/bvh.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/render/flat_types.h"
 #include <float.h>
 #include <math.h>

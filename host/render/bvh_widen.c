@@ -1,6 +1,7 @@
 #include "host/render/bvh_widen.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>

@@ -1,13 +1,5 @@
 #include "host/render/camera_basis.h"
 
-Vector3 vector_least_aligned_axis(Vector3 direction)
-{
-    double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
-    if (x <= y && x <= z) return (Vector3){1, 0, 0};
-    if (y <= z) return (Vector3){0, 1, 0};
-    return (Vector3){0, 0, 1};
-}
-
 CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
 {
     Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position));

@@ -12,6 +12,3 @@ typedef struct {
 // Where `up` is zero or parallel to the view, the world axis least aligned with the view stands in for it
 // (the first of x, y, z where several are).
 CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height);
-
-// The world axis least aligned with a direction, the first of x, y, z where several are.
-Vector3 vector_least_aligned_axis(Vector3 direction);

@@ -1,6 +1,6 @@
 #include "host/render/hierarchy.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/render/bvh_widen.h"
 #include <math.h>
 #include <stdlib.h>

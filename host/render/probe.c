@@ -1,5 +1,5 @@
 // Explicit rays.
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/render/renderer_state.h"
 #include <stdlib.h>
 

@@ -1,6 +1,6 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/render/balls.h"
 #include "host/render/hierarchy.h"
 #include "host/render/renderer_state.h"

@@ -1,6 +1,6 @@
 #include "host/render/sample_pattern.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>

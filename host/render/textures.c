@@ -1,7 +1,7 @@
 #include "host/render/textures.h"
 
 #include "host/base/array.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/image/image.h"
 #include <math.h>
 #include <stdlib.h>

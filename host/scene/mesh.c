@@ -1,5 +1,5 @@
 #include "host/scene/mesh.h"
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <stdlib.h>
 #include <string.h>

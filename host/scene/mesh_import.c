@@ -1,6 +1,7 @@
 // Mesh files through assimp. Its own joining of vertices and its making of normals stay unused: both go by
 // absolute distances and would bend small meshes.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/number.h"
 #include "host/scene/scene_build.h"

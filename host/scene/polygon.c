@@ -1,6 +1,7 @@
 #include "host/scene/polygon.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include <float.h>
 #include <stdlib.h>
 

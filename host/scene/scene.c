@@ -1,5 +1,6 @@
 #include "host/scene/scene.h"
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/scene/mesh.h"
 #include "host/scene/scene_build.h"

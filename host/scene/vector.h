@@ -53,3 +53,12 @@ static inline bool vector_is_zero(Vector3 a)
 {
     return a.x == 0 && a.y == 0 && a.z == 0;
 }
+
+// The world axis least aligned with a direction, the first of x, y, z where several are.
+static inline Vector3 vector_least_aligned_axis(Vector3 direction)
+{
+    double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
+    if (x <= y && x <= z) return (Vector3){1, 0, 0};
+    if (y <= z) return (Vector3){0, 1, 0};
+    return (Vector3){0, 0, 1};
+}

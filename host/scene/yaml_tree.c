@@ -1,5 +1,6 @@
 #include "host/scene/yaml_tree.h"
 #include "host/base/array.h"
+#include "host/base/fault.h"
 
 #include <libfyaml.h>
 #include <stdlib.h>

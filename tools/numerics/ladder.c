@@ -3,8 +3,8 @@
 // kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --hold it prints what
 // breaks the hard cases' bounds instead.
 #include "host/base/clock.h"
-#include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/base/memory.h"
 #include "host/render/renderer.h"
 #include "tests/reference.h"
 #include "tests/specimen.h"
