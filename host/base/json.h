@@ -1,5 +1,5 @@
 // JSON out, through libfyaml, so that strings are escaped by a library.
-// A zeroed Json is not valid: use json_open. Calls nest: json_begin_object .. json_end.
+// Calls nest: json_begin_object .. json_end.
 // A key is the program's own word, without control characters; a text may be anything (what is not UTF-8 in
 // it becomes U+FFFD).
 #pragma once

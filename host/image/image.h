@@ -1,4 +1,4 @@
-// Pictures: float colours in, files out. Rows run from the top.
+// Pictures: float colors in, files out. Rows run from the top.
 #pragma once
 
 #include "host/base/message.h"
@@ -15,7 +15,7 @@ typedef struct {
 
 typedef struct {
     ImageFormat format;
-    uint32_t width, height, channels; // channels: 3 (colour), 1 for other arrays of NPY
+    uint32_t width, height, channels; // channels: 3 (color), 1 for other arrays of NPY
     Transfer transfer;                // PNG, PPM; ignored by EXR and NPY, which hold linear floats
     unsigned bits;                    // 8 or 16: PNG, PPM
     char npy_type;                    // 'f': float32, 'd': float64, 'u': uint32

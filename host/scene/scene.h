@@ -34,7 +34,7 @@ typedef struct {
     Color color;
     double ambient;   // ka
     Color diffuse;    // kd, per channel
-    double specular;  // ks; the highlight has the light's colour
+    double specular;  // ks; the highlight has the light's color
     double shininess; // Phong's power, >= 0
     double reflection, transmission, ior;
     bool full_shadow; // it takes all light from what lies behind it, transparent or not
@@ -128,7 +128,7 @@ typedef struct {
     size_t triangle_count;
 } Mesh;
 
-// How a format means its colours: linear light, or values a display takes as they are.
+// How a format means its colors: linear light, or values a display takes as they are.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 
 typedef struct {
