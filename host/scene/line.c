@@ -2,8 +2,6 @@
 
 #include <string.h>
 
-enum { WORD_SHOWN = 40 };
-
 bool line_open(Line *line, Report *report)
 {
     const Source *source = report->source;
@@ -53,6 +51,12 @@ Word line_peek(const Line *line)
 bool word_is(Word word, const char *text)
 {
     return word.length == strlen(text) && !memcmp(word.text, text, word.length);
+}
+
+bool word_is_number(Word word)
+{
+    double number;
+    return number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
 }
 
 int word_shown(Word word)

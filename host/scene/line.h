@@ -24,7 +24,8 @@ bool line_next(Line *line, char comment);
 Word line_peek(const Line *line);
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
-int word_shown(Word word); // how many bytes of it a message shows
+bool word_is_number(Word word); // or one that is too large
+int word_shown(Word word);      // how many bytes of it a message shows
 
 // One number, the next word. Reports where it is missing or wrong.
 bool line_number(Line *line, const char *name, const Range *range, double *value);

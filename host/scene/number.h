@@ -21,7 +21,8 @@ typedef struct {
     const char *must; // what a number outside is told
 } Range;
 
-extern const Range range_positive, range_not_negative, range_unit, range_field_of_view, range_pixels;
+extern const Range range_positive, range_not_negative, range_unit, range_byte, range_field_of_view,
+    range_pixels;
 
 // Reads the number called `name`, or reports what is wrong with it. `range` NULL: any.
 bool number_read_field(Report *report, size_t offset, const char *name, const char *text, size_t length,

@@ -6,7 +6,6 @@
 
 #include <string.h>
 
-static const Range range_byte = {0, 255, false, "from 0 to 255"};
 static const Range range_radians = {0, M_PI_2, true, "greater than 0 and less than pi/2"};
 
 // Everything that a block may say.

@@ -334,12 +334,6 @@ static const struct {
     {"c", read_cone}, {"s", read_sphere},     {"p", read_polygon}, {"pp", read_patch},
 };
 
-static bool word_is_number(Word word)
-{
-    double number;
-    return number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
-}
-
 // After a fault the rest of its line is skipped, and lines that may have belonged to it.
 static void element_read(NffReader *reader)
 {

@@ -12,7 +12,6 @@ typedef struct {
     bool has_element, has_ambient, has_camera, has_size;
 } RtReader;
 
-static const Range range_byte = {0, 255, false, "from 0 to 255"};
 static const Range range_axis = {-1, 1, false, "from -1 to 1"};
 
 static bool read_color(Line *line, Color *color)
@@ -49,12 +48,6 @@ static bool element_end(RtReader *reader)
     for (Word word; (word = line_word(&reader->line)).length;)
         report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
     return true;
-}
-
-static bool word_is_number(Word word)
-{
-    double number;
-    return word.length && number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
 }
 
 // Whether specular and shininess follow. With --lenient a number alone is a field of some other meaning.

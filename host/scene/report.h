@@ -3,6 +3,9 @@
 
 #include "host/base/message.h"
 
+// How much of a word of the source a message shows, in bytes.
+enum { WORD_SHOWN = 40 };
+
 typedef struct {
     const Source *source;
     MessageList *messages;

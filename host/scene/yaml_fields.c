@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { WORD_SHOWN = 40, FIELD_LIMIT = 32 };
+enum { FIELD_LIMIT = 32 };
 
 void expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
