@@ -1,5 +1,52 @@
 #include "host/measure/scene_change.h"
 
+enum { VECTORS_LARGEST = 6 };
+
+// The object's places, and what reaches from one to another; returns how many.
+static size_t object_vectors(Object *object, Vector3 *vectors[VECTORS_LARGEST])
+{
+    size_t count = 0;
+    switch (object->kind) {
+    case SHAPE_SPHERE:
+        vectors[count++] = &object->as.sphere.center;
+        break;
+    case SHAPE_PLANE:
+        vectors[count++] = &object->as.plane.point;
+        vectors[count++] = &object->as.plane.normal;
+        break;
+    case SHAPE_DISC:
+        vectors[count++] = &object->as.disc.center;
+        vectors[count++] = &object->as.disc.normal;
+        break;
+    case SHAPE_BOX:
+        vectors[count++] = &object->as.box.min;
+        vectors[count++] = &object->as.box.max;
+        break;
+    case SHAPE_CYLINDER:
+        vectors[count++] = &object->as.cylinder.from;
+        vectors[count++] = &object->as.cylinder.axis;
+        break;
+    case SHAPE_CONE:
+        vectors[count++] = &object->as.cone.from;
+        vectors[count++] = &object->as.cone.axis;
+        break;
+    case SHAPE_TRIANGLE:
+        for (size_t i = 0; i < 3; i++) {
+            vectors[count++] = &object->as.triangle.vertices[i];
+            vectors[count++] = &object->as.triangle.normals[i];
+        }
+        break;
+    case SHAPE_TORUS:
+        vectors[count++] = &object->as.torus.center;
+        vectors[count++] = &object->as.torus.axis;
+        break;
+    case SHAPE_MESH:
+    case SHAPE_COUNT:
+        break;
+    }
+    return count;
+}
+
 // Every vector that is a place or reaches from one to another; scenes with meshes are not for this.
 static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
 {
@@ -11,12 +58,10 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
         change(&scene->lights.items[i].direction, factor);
     }
     for (size_t i = 0; i < scene->objects.count; i++) {
-        Object *object = &scene->objects.items[i];
-        // all shapes but the sphere and the triangle have two vectors, in this order
-        Vector3 *vectors = &object->as.plane.point;
-        size_t count = object->kind == SHAPE_SPHERE ? 1 : object->kind == SHAPE_TRIANGLE ? 6 : 2;
+        Vector3 *vectors[VECTORS_LARGEST];
+        size_t count = object_vectors(&scene->objects.items[i], vectors);
         for (size_t k = 0; k < count; k++)
-            change(&vectors[k], factor);
+            change(vectors[k], factor);
     }
 }
 
