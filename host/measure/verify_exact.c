@@ -294,8 +294,35 @@ static Long outside(Long value, Long low, Long high)
     return value < low ? low - value : value > high ? value - high : 0;
 }
 
-static void box_sheets(Sheets *sheets, LongVector low, LongVector high, LongVector p)
+static void sphere_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
 {
+    LongVector from = long_subtract(p, rounded(run, object->as.sphere.center));
+    Long radius = verify_rounded(run, object->as.sphere.radius);
+    sheet_add(sheets, long_length(from) - radius, long_unit(from), radius);
+    sheets->size = (double)radius;
+}
+
+static void plane_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    LongVector from = long_subtract(p, rounded(run, object->as.plane.point));
+    LongVector normal = long_unit(rounded(run, object->as.plane.normal));
+    sheet_add(sheets, long_dot(from, normal), normal, INFINITY);
+}
+
+static void disc_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    LongVector from = long_subtract(p, rounded(run, object->as.disc.center));
+    LongVector normal = long_unit(rounded(run, object->as.disc.normal));
+    Long height = long_dot(from, normal);
+    LongVector within = long_subtract(from, long_scale(normal, height));
+    sheets->size = verify_rounded(run, object->as.disc.radius);
+    Long beyond = outside(long_length(within), 0, sheets->size);
+    sheet_add(sheets, hypotl(height, beyond), normal, INFINITY);
+}
+
+static void box_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    LongVector low = rounded(run, object->as.box.min), high = rounded(run, object->as.box.max);
     const Long lows[] = {low.x, low.y, low.z}, highs[] = {high.x, high.y, high.z}, at[] = {p.x, p.y, p.z};
     for (size_t axis = 0; axis < 3; axis++) {
         size_t b = (axis + 1) % 3, c = (axis + 2) % 3;
@@ -330,77 +357,80 @@ static void revolution_sheets(Sheets *sheets, LongVector base, LongVector axis, 
     sheets->size = (double)(finite ? hypotl(largest, height / 2) : largest);
 }
 
+static void cylinder_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    LongVector base = rounded(run, object->as.cylinder.from), axis = rounded(run, object->as.cylinder.axis);
+    Long radius = verify_rounded(run, object->as.cylinder.radius);
+    if (object->as.cylinder.finite)
+        axis =
+            long_subtract(rounded(run, vector_add(object->as.cylinder.from, object->as.cylinder.axis)), base);
+    revolution_sheets(sheets, base, axis, (Long[]){radius, radius}, object->as.cylinder.finite,
+                      object->as.cylinder.caps, p);
+}
+
+static void cone_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    LongVector base = rounded(run, object->as.cone.from);
+    LongVector tip = rounded(run, vector_add(object->as.cone.from, object->as.cone.axis));
+    const Long radii[] = {verify_rounded(run, object->as.cone.radius[0]),
+                          verify_rounded(run, object->as.cone.radius[1])};
+    revolution_sheets(sheets, base, long_subtract(tip, base), radii, true, object->as.cone.caps, p);
+}
+
+static void torus_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    Long major = verify_rounded(run, object->as.torus.major);
+    Long minor = verify_rounded(run, object->as.torus.minor);
+    LongVector from = long_subtract(p, rounded(run, object->as.torus.center));
+    LongVector axis = rounded(run, vector_normalize(object->as.torus.axis));
+    LongVector across = long_subtract(from, long_scale(axis, long_dot(from, axis)));
+    LongVector circle = long_subtract(from, long_scale(long_unit(across), major));
+    sheet_add(sheets, long_length(circle) - minor, long_unit(circle), minor);
+    sheets->size = (double)(major + minor);
+}
+
+static void triangle_sheets(Sheets *sheets, const VerifyRun *run, const Object *object, LongVector p)
+{
+    LongVector a = rounded(run, object->as.triangle.vertices[0]);
+    LongVector ab = long_subtract(rounded(run, object->as.triangle.vertices[1]), a);
+    LongVector ac = long_subtract(rounded(run, object->as.triangle.vertices[2]), a);
+    LongVector normal = long_cross(ab, ac), bc = long_subtract(ac, ab);
+    Long longest = fmaxl(long_length(ab), fmaxl(long_length(ac), long_length(bc)));
+    sheets->steadiness = longest * longest / long_length(normal);
+    sheet_add(sheets, long_dot(long_subtract(p, a), long_unit(normal)), long_unit(normal), INFINITY);
+    sheets->size = (double)longest;
+}
+
 static Sheets surface_sheets(const VerifyRun *run, const Object *object, LongVector p)
 {
     Sheets sheets = {.steadiness = 1};
     switch (object->kind) {
-    case SHAPE_SPHERE: {
-        LongVector from = long_subtract(p, rounded(run, object->as.sphere.center));
-        Long radius = verify_rounded(run, object->as.sphere.radius);
-        sheet_add(&sheets, long_length(from) - radius, long_unit(from), radius);
-        sheets.size = (double)radius;
+    case SHAPE_SPHERE:
+        sphere_sheets(&sheets, run, object, p);
         break;
-    }
     case SHAPE_PLANE:
-    case SHAPE_DISC: {
-        // a plane has a disc's first members
-        LongVector from = long_subtract(p, rounded(run, object->as.disc.center));
-        LongVector normal = long_unit(rounded(run, object->as.disc.normal));
-        Long height = long_dot(from, normal), beyond = 0;
-        if (object->kind == SHAPE_DISC) {
-            sheets.size = verify_rounded(run, object->as.disc.radius);
-            LongVector within = long_subtract(from, long_scale(normal, height));
-            beyond = outside(long_length(within), 0, sheets.size);
-        }
-        sheet_add(&sheets, hypotl(height, beyond), normal, INFINITY);
+        plane_sheets(&sheets, run, object, p);
         break;
-    }
+    case SHAPE_DISC:
+        disc_sheets(&sheets, run, object, p);
+        break;
     case SHAPE_BOX:
-        box_sheets(&sheets, rounded(run, object->as.box.min), rounded(run, object->as.box.max), p);
+        box_sheets(&sheets, run, object, p);
         break;
-    case SHAPE_CYLINDER: {
-        LongVector base = rounded(run, object->as.cylinder.from), axis;
-        Long radius = verify_rounded(run, object->as.cylinder.radius);
-        axis = rounded(run, object->as.cylinder.axis);
-        if (object->as.cylinder.finite)
-            axis = long_subtract(rounded(run, vector_add(object->as.cylinder.from, object->as.cylinder.axis)),
-                                 base);
-        revolution_sheets(&sheets, base, axis, (Long[]){radius, radius}, object->as.cylinder.finite,
-                          object->as.cylinder.caps, p);
+    case SHAPE_CYLINDER:
+        cylinder_sheets(&sheets, run, object, p);
         break;
-    }
-    case SHAPE_CONE: {
-        LongVector base = rounded(run, object->as.cone.from);
-        LongVector tip = rounded(run, vector_add(object->as.cone.from, object->as.cone.axis));
-        const Long radii[] = {verify_rounded(run, object->as.cone.radius[0]),
-                              verify_rounded(run, object->as.cone.radius[1])};
-        revolution_sheets(&sheets, base, long_subtract(tip, base), radii, true, object->as.cone.caps, p);
+    case SHAPE_CONE:
+        cone_sheets(&sheets, run, object, p);
         break;
-    }
-    case SHAPE_TORUS: {
-        Long major = verify_rounded(run, object->as.torus.major);
-        Long minor = verify_rounded(run, object->as.torus.minor);
-        LongVector from = long_subtract(p, rounded(run, object->as.torus.center));
-        LongVector axis = rounded(run, vector_normalize(object->as.torus.axis));
-        Long height = long_dot(from, axis);
-        LongVector across = long_subtract(from, long_scale(axis, height));
-        LongVector circle = long_subtract(from, long_scale(long_unit(across), major));
-        sheet_add(&sheets, long_length(circle) - minor, long_unit(circle), minor);
-        sheets.size = (double)(major + minor);
+    case SHAPE_TRIANGLE:
+        triangle_sheets(&sheets, run, object, p);
         break;
-    }
-    case SHAPE_TRIANGLE: {
-        LongVector a = rounded(run, object->as.triangle.vertices[0]);
-        LongVector ab = long_subtract(rounded(run, object->as.triangle.vertices[1]), a);
-        LongVector ac = long_subtract(rounded(run, object->as.triangle.vertices[2]), a);
-        LongVector normal = long_cross(ab, ac), bc = long_subtract(ac, ab);
-        Long longest = fmaxl(long_length(ab), fmaxl(long_length(ac), long_length(bc)));
-        sheets.steadiness = longest * longest / long_length(normal);
-        sheet_add(&sheets, long_dot(long_subtract(p, a), long_unit(normal)), long_unit(normal), INFINITY);
-        sheets.size = (double)longest;
+    case SHAPE_TORUS:
+        torus_sheets(&sheets, run, object, p);
         break;
-    }
-    default:
+    case SHAPE_MESH: // the oracle is asked of single shapes
+    case SHAPE_COUNT:
         break;
     }
     return sheets;
