@@ -145,7 +145,7 @@ static bool has_area(Vector3 a, Vector3 b, Vector3 c)
 // One without area shrinks to a point, which no ray meets: the kernels turn vertices, and what was a line
 // could then have an area. One that loses its area in rounding stays: it fills what its neighbors have left
 // open.
-static Triangle triangle_flatten(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
+static Triangle corners_flatten(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
 {
     if (!has_area(a, b, c)) b = c = a;
     Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
@@ -160,59 +160,102 @@ static Triangle triangle_flatten(const Rounding *rounding, Vector3 a, Vector3 b,
         scalar4_of(seen_a, normal.x), scalar4_of(seen_b, normal.y), scalar4_of(seen_c, normal.z), {0}};
 }
 
+static Sphere sphere_flatten(const Rounding *rounding, const Object *object)
+{
+    return (Sphere){
+        .center_radius =
+            scalar4_of(point_from_eye(rounding, object->as.sphere.center), object->as.sphere.radius),
+        .id.y = object->as.sphere.only_inside ? ONLY_INSIDE : 0u,
+    };
+}
+
+static Plane plane_flatten(const Rounding *rounding, const Object *object, const Material *material)
+{
+    const Vector3 normal = object->as.plane.normal;
+    Plane plane = {.point = scalar4_of(point_from_eye(rounding, object->as.plane.point), 0),
+                   .normal = plane_normal(rounding, normal)};
+    grid_flatten(rounding, normal, material, &plane.grid_u, &plane.grid_v);
+    return plane;
+}
+
+static Disc disc_flatten(const Rounding *rounding, const Object *object, const Material *material)
+{
+    const Vector3 normal = object->as.disc.normal;
+    Disc disc = {.center_radius =
+                     scalar4_of(point_from_eye(rounding, object->as.disc.center), object->as.disc.radius),
+                 .normal = plane_normal(rounding, normal)};
+    grid_flatten(rounding, normal, material, &disc.grid_u, &disc.grid_v);
+    return disc;
+}
+
+static Box box_flatten(const Rounding *rounding, const Object *object)
+{
+    return (Box){.low = scalar4_of(point_from_eye(rounding, object->as.box.min), 0),
+                 .high = scalar4_of(point_from_eye(rounding, object->as.box.max), 0)};
+}
+
+static Cylinder cylinder_flatten(const Rounding *rounding, const Object *object)
+{
+    const double radius = object->as.cylinder.radius;
+    Cylinder cylinder =
+        revolution_flatten(rounding, object->as.cylinder.from, object->as.cylinder.axis, radius, radius, 0,
+                           object->as.cylinder.finite, object->as.cylinder.caps);
+    if (object->as.cylinder.only_inside) cylinder.id.y |= ONLY_INSIDE;
+    return cylinder;
+}
+
+static Cone cone_flatten(const Rounding *rounding, const Object *object)
+{
+    const bool finite = object->as.cone.finite;
+    const double *radius = object->as.cone.radius;
+    Cone cone =
+        revolution_flatten(rounding, object->as.cone.from, object->as.cone.axis, finite ? radius[0] : 0,
+                           radius[1], object->as.cone.slope, finite, object->as.cone.caps);
+    if (object->as.cone.only_inside) cone.id.y |= ONLY_INSIDE;
+    return cone;
+}
+
+static Triangle triangle_flatten(const Rounding *rounding, const Object *object)
+{
+    const Vector3 *vertices = object->as.triangle.vertices;
+    return corners_flatten(rounding, vertices[0], vertices[1], vertices[2]);
+}
+
+static Torus torus_flatten(const Rounding *rounding, const Object *object)
+{
+    return (Torus){
+        .center_major = scalar4_of(point_from_eye(rounding, object->as.torus.center), object->as.torus.major),
+        .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
+    };
+}
+
 static void object_flatten(const Rounding *rounding, const Object *object, const Material *material,
                            void *target)
 {
     switch (object->kind) {
     case SHAPE_SPHERE:
-        *(Sphere *)target =
-            (Sphere){.center_radius = scalar4_of(point_from_eye(rounding, object->as.sphere.center),
-                                                 object->as.sphere.radius),
-                     .id.y = object->as.sphere.only_inside ? ONLY_INSIDE : 0u};
+        *(Sphere *)target = sphere_flatten(rounding, object);
         break;
-    case SHAPE_PLANE: {
-        Plane *plane = target;
-        *plane = (Plane){.point = scalar4_of(point_from_eye(rounding, object->as.plane.point), 0),
-                         .normal = plane_normal(rounding, object->as.plane.normal)};
-        grid_flatten(rounding, object->as.plane.normal, material, &plane->grid_u, &plane->grid_v);
+    case SHAPE_PLANE:
+        *(Plane *)target = plane_flatten(rounding, object, material);
         break;
-    }
-    case SHAPE_DISC: {
-        Disc *disc = target;
-        *disc = (Disc){.center_radius = scalar4_of(point_from_eye(rounding, object->as.disc.center),
-                                                   object->as.disc.radius),
-                       .normal = plane_normal(rounding, object->as.disc.normal)};
-        grid_flatten(rounding, object->as.disc.normal, material, &disc->grid_u, &disc->grid_v);
+    case SHAPE_DISC:
+        *(Disc *)target = disc_flatten(rounding, object, material);
         break;
-    }
     case SHAPE_BOX:
-        *(Box *)target = (Box){.low = scalar4_of(point_from_eye(rounding, object->as.box.min), 0),
-                               .high = scalar4_of(point_from_eye(rounding, object->as.box.max), 0)};
+        *(Box *)target = box_flatten(rounding, object);
         break;
     case SHAPE_CYLINDER:
-        *(Cylinder *)target = revolution_flatten(rounding, object->as.cylinder.from, object->as.cylinder.axis,
-                                                 object->as.cylinder.radius, object->as.cylinder.radius, 0,
-                                                 object->as.cylinder.finite, object->as.cylinder.caps);
-        if (object->as.cylinder.only_inside) ((Cylinder *)target)->id.y |= ONLY_INSIDE;
+        *(Cylinder *)target = cylinder_flatten(rounding, object);
         break;
     case SHAPE_CONE:
-        *(Cone *)target = revolution_flatten(rounding, object->as.cone.from, object->as.cone.axis,
-                                             object->as.cone.finite ? object->as.cone.radius[0] : 0,
-                                             object->as.cone.radius[1], object->as.cone.slope,
-                                             object->as.cone.finite, object->as.cone.caps);
-        if (object->as.cone.only_inside) ((Cone *)target)->id.y |= ONLY_INSIDE;
+        *(Cone *)target = cone_flatten(rounding, object);
         break;
-    case SHAPE_TRIANGLE: {
-        const Vector3 *vertices = object->as.triangle.vertices;
-        *(Triangle *)target = triangle_flatten(rounding, vertices[0], vertices[1], vertices[2]);
+    case SHAPE_TRIANGLE:
+        *(Triangle *)target = triangle_flatten(rounding, object);
         break;
-    }
     case SHAPE_TORUS:
-        *(Torus *)target = (Torus){
-            .center_major =
-                scalar4_of(point_from_eye(rounding, object->as.torus.center), object->as.torus.major),
-            .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
-        };
+        *(Torus *)target = torus_flatten(rounding, object);
         break;
     case SHAPE_MESH:
     case SHAPE_COUNT:
@@ -298,8 +341,8 @@ static void mesh_flatten(Filling *filling, const Object *object)
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         const uint32_t *corners = mesh->triangles[i];
         Triangle *triangle = primitive_begin(filling, KIND_TRIANGLES);
-        *triangle = triangle_flatten(filling->rounding, vertices[corners[0]], vertices[corners[1]],
-                                     vertices[corners[2]]);
+        *triangle = corners_flatten(filling->rounding, vertices[corners[0]], vertices[corners[1]],
+                                    vertices[corners[2]]);
         if (normals)
             triangle->id.y =
                 normals_flatten(filling, normals[corners[0]], normals[corners[1]], normals[corners[2]]);
