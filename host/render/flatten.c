@@ -7,22 +7,27 @@
 #include <string.h>
 
 // clang-format off
+// Of a struct whose uint4 members are those from `first` to `last`, and of one that has none.
+#define LAYOUT(Type, first, last)                           \
+    {sizeof(Type), offsetof(Type, first) / sizeof(scalar4), \
+     (offsetof(Type, last) + sizeof((Type *)0)->last - offsetof(Type, first)) / sizeof(uint4)}
+#define LAYOUT_OF_REALS(Type) {sizeof(Type), sizeof(Type) / sizeof(scalar4), 0}
+
 static const FlatLayout layouts[FLAT_COUNT] = {
-    [FLAT_HEADER] = {sizeof(SceneHeader), offsetof(SceneHeader, picture) / sizeof(scalar4), 7},
-#define SHAPE_LAYOUT(feature, Type, name, names) \
-    [FLAT_FIRST_SHAPE + KIND_##feature] = {sizeof(Type), offsetof(Type, id) / sizeof(scalar4), 1},
+    [FLAT_HEADER] = LAYOUT(SceneHeader, picture, bounded_counts),
+#define SHAPE_LAYOUT(feature, Type, name, names) [FLAT_FIRST_SHAPE + KIND_##feature] = LAYOUT(Type, id, id),
     SHAPE_LIST(SHAPE_LAYOUT)
-    [FLAT_TRIANGLE_NORMALS] = {sizeof(TriangleNormals), sizeof(TriangleNormals) / sizeof(scalar4), 0},
-    [FLAT_TRIANGLE_UVS] = {sizeof(TriangleUvs), sizeof(TriangleUvs) / sizeof(scalar4), 0},
+    [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
+    [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
     // as the widest; hierarchy.c makes them as wide as the kernel wants them
     [FLAT_NODES] = {BVH_WIDTH_LARGEST / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
-    [FLAT_BALLS] = {sizeof(Ball), sizeof(Ball) / sizeof(scalar4), 0},
-    [FLAT_OBJECTS] = {sizeof(ObjectEntry), 0, 1},
-    [FLAT_MATERIALS] = {sizeof(FlatMaterial), offsetof(FlatMaterial, opacity) / sizeof(scalar4), 2},
-    [FLAT_LIGHTS] = {sizeof(FlatLight), offsetof(FlatLight, kind) / sizeof(scalar4), 1},
-    [FLAT_TEXTURE_LEVELS] = {sizeof(TextureLevel), 0, 1},
-    [FLAT_TEXELS] = {sizeof(Texel), 0, 1},
+    [FLAT_BALLS] = LAYOUT_OF_REALS(Ball),
+    [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
+    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, opacity, image),
+    [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
+    [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
+    [FLAT_TEXELS] = LAYOUT(Texel, color, color),
 };
 // clang-format on
 
@@ -466,8 +471,8 @@ static void header_flatten(FlatScene *flat, const Scene *scene, const FlattenSet
         .bounces.x = settings->bounce_count,
         .picture = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
     };
-    uint32_t counts[8] = {0};
-    _Static_assert(KIND_COUNT <= 8, "SceneHeader has room for eight counts");
+    uint32_t counts[4 * sizeof header->counts / sizeof *header->counts] = {0};
+    _Static_assert(KIND_COUNT <= sizeof counts / sizeof *counts, "a kind without a place in SceneHeader");
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)flat->arrays[FLAT_FIRST_SHAPE + kind].count;
     memcpy(header->counts, counts, sizeof counts);
