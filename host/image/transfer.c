@@ -2,6 +2,7 @@
 // thresholds between neighboring display values, which are worked out once; no rounding error is left in it.
 #include "host/image/transfer.h"
 #include "host/base/memory.h"
+#include "host/image/srgb.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -24,15 +25,11 @@ static uint32_t float_bits(float value)
     return bits;
 }
 
-static long double srgb_decode(long double display)
-{
-    return display <= 0.04045L ? display / 12.92L : powl((display + 0.055L) / 1.055L, 2.4L);
-}
-
-static float float_at_least(long double value)
+// No threshold lies within a part in 10^12 of a float, so that a double's error does not reach one.
+static float float_at_least(double value)
 {
     float near = (float)value;
-    return near < value ? nextafterf(near, INFINITY) : near;
+    return (double)near < value ? nextafterf(near, INFINITY) : near;
 }
 
 static void curve_prepare(Curve *curve, uint32_t maximum, unsigned bucket_bits)
@@ -41,7 +38,7 @@ static void curve_prepare(Curve *curve, uint32_t maximum, unsigned bucket_bits)
     curve->thresholds = memory_allocate(maximum + 2, sizeof *curve->thresholds);
     curve->thresholds[0] = -INFINITY;
     for (uint32_t k = 1; k <= maximum; k++)
-        curve->thresholds[k] = float_at_least(srgb_decode(((long double)k - 0.5L) / (long double)maximum));
+        curve->thresholds[k] = float_at_least(srgb_decode((k - 0.5) / maximum));
     curve->thresholds[maximum + 1] = INFINITY;
 
     // A float's upper bits, which order positive floats, name its bucket: some per power of two.

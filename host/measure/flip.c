@@ -2,7 +2,7 @@
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
-#include "host/measure/srgb.h"
+#include "host/image/srgb.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/image/image.h"
+#include "host/image/srgb.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,12 +35,6 @@ static void levels_free(LevelList *list)
     for (size_t i = 0; i < list->levels.count; i++)
         free(list->levels.items[i].colors);
     free(list->levels.items);
-}
-
-// IEC 61966-2-1:1999.
-static double linear_of_srgb(double display)
-{
-    return display <= 0.04045 ? display / 12.92 : pow((display + 0.055) / 1.055, 2.4);
 }
 
 // A line of texels divided anew: `part` from 0 to `count` covers the old texels first .. last, the outer ones
@@ -97,7 +92,7 @@ static bool level_fill(Level *level, const Image *image, bool decodes)
         for (size_t channel = 0; channel < 3; channel++) {
             float value = image->values[i * image->channels + (image->channels < 3 ? 0 : channel)];
             if (!isfinite(value)) return false;
-            level->colors[i][channel] = decodes ? (float)linear_of_srgb((double)value) : fmaxf(value, 0);
+            level->colors[i][channel] = decodes ? (float)srgb_decode((double)value) : fmaxf(value, 0);
         }
     }
     return true;
