@@ -32,13 +32,13 @@ static size_t at(size_t x, size_t y)
 
 // Object 0 in the left half, 1 in the right one, nothing from column NOTHING_FROM on; the lower half lies in
 // the shadow of light 0. Gray 0.5, 8 away, seen along z.
-static AccuracyLayers layers_make(void)
+static PictureLayers layers_make(void)
 {
-    AccuracyLayers layers = {
+    PictureLayers layers = {
         .width = WIDTH,
         .height = HEIGHT,
         .light_count = LIGHTS,
-        .colors = array_of(PIXELS, 3 * sizeof(double)),
+        .color = array_of(PIXELS, 3 * sizeof(double)),
         .t = array_of(PIXELS, sizeof(double)),
         .normal = array_of(PIXELS, 3 * sizeof(double)),
         .object = array_of(PIXELS, sizeof(uint32_t)),
@@ -49,7 +49,7 @@ static AccuracyLayers layers_make(void)
         size_t x = i % WIDTH, y = i / WIDTH;
         bool nothing = x >= NOTHING_FROM;
         for (size_t k = 0; k < 3; k++)
-            layers.colors[3 * i + k] = 0.5;
+            layers.color[3 * i + k] = 0.5;
         layers.t[i] = nothing ? (double)INFINITY : 8;
         layers.normal[3 * i + 2] = nothing ? 0 : 1;
         layers.object[i] = nothing ? UINT32_MAX : x < WIDTH / 2 ? 0 : 1;
@@ -59,7 +59,7 @@ static AccuracyLayers layers_make(void)
     return layers;
 }
 
-static AccuracyErrors compare(const AccuracyLayers *reference, const AccuracyLayers *variant)
+static AccuracyErrors compare(const PictureLayers *reference, const PictureLayers *variant)
 {
     AccuracyEdges edges;
     AccuracyErrors errors;
@@ -72,7 +72,7 @@ static AccuracyErrors compare(const AccuracyLayers *reference, const AccuracyLay
 static void test_edges(void **state)
 {
     (void)state;
-    AccuracyLayers layers = layers_make();
+    PictureLayers layers = layers_make();
     AccuracyEdges edges;
     accuracy_edges_find(&edges, &layers);
     // columns 4 to 7 and 8 to 11
@@ -96,13 +96,13 @@ static void test_edges(void **state)
     assert_int_equal(edges.silhouette_pixels, 8);
     assert_true(edges.silhouette[at(2, 1)] && edges.silhouette[at(1, 2)] && !edges.silhouette[at(2, 2)]);
     accuracy_edges_free(&edges);
-    accuracy_layers_free(&layers);
+    layers_free(&layers);
 }
 
 static void test_equal(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
+    PictureLayers reference = layers_make(), variant = layers_make();
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(accuracy_faults(&errors), 0);
     assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT);
@@ -112,17 +112,17 @@ static void test_equal(void **state)
     assert_true(errors.t_relative.largest == 0 && errors.normal.largest == 0);
     for (size_t kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
         assert_false(errors.worst[kind].found);
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_wrong_objects(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
+    PictureLayers reference = layers_make(), variant = layers_make();
     variant.object[at(5, 0)] = 1;
     variant.object[at(7, 6)] = UINT32_MAX;
-    variant.colors[3 * at(5, 0)] = 0.9;
+    variant.color[3 * at(5, 0)] = 0.9;
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.object.edge, 2);
     assert_int_equal(errors.object.away, 0);
@@ -134,7 +134,7 @@ static void test_wrong_objects(void **state)
 
     // a leak, whose color is less far off
     variant.object[at(1, 1)] = UINT32_MAX;
-    variant.colors[3 * at(1, 1) + 2] = 0.4;
+    variant.color[3 * at(1, 1) + 2] = 0.4;
     // what else is wrong there does not count: it is another object
     variant.shadow[LIGHTS * at(1, 1) + 1] = 1;
     variant.path[at(1, 1)] = 3;
@@ -149,16 +149,16 @@ static void test_wrong_objects(void **state)
     assert_int_equal(accuracy_faults(&errors), CROSSED_OBJECT);
     assert_true(worst->x == 1 && worst->y == 1 && worst->away && worst->variant == (double)UINT32_MAX);
     assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_wrong_shadows(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
+    PictureLayers reference = layers_make(), variant = layers_make();
     variant.shadow[LIGHTS * at(0, 3)] = 1; // at light 0's edge
-    variant.colors[3 * at(0, 3)] = 0;
+    variant.color[3 * at(0, 3)] = 0;
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.shadow.edge, 1);
     assert_int_equal(errors.shadow.away, 0);
@@ -175,35 +175,35 @@ static void test_wrong_shadows(void **state)
     assert_int_equal(accuracy_faults(&errors), CROSSED_SHADOW);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];
     assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_wrong_paths(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
+    PictureLayers reference = layers_make(), variant = layers_make();
     variant.path[at(6, 1)] = 1;
     variant.path[at(1, 1)] = 2;
     variant.path[at(2, 1)] = 2;
-    variant.colors[3 * at(2, 1) + 1] = 0.75;
+    variant.color[3 * at(2, 1) + 1] = 0.75;
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.path.edge, 1);
     assert_int_equal(errors.path.away, 2);
     assert_int_equal(accuracy_faults(&errors), 0);
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 3);
     assert_true(errors.shading.largest == 0 && errors.worst[ACCURACY_PATH].x == 2);
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_shading(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
-    variant.colors[3 * at(0, 0)] += 0.25;
-    variant.colors[3 * at(3, 4) + 2] -= 0.125;
-    variant.colors[3 * at(11, 4)] += 0.375; // the background is no shading
+    PictureLayers reference = layers_make(), variant = layers_make();
+    variant.color[3 * at(0, 0)] += 0.25;
+    variant.color[3 * at(3, 4) + 2] -= 0.125;
+    variant.color[3 * at(11, 4)] += 0.375; // the background is no shading
     AccuracyErrors errors = compare(&reference, &variant);
     const double values = 3.0 * NOTHING_FROM * HEIGHT, squares = 0.25 * 0.25 + 0.125 * 0.125;
     assert_near(errors.shading.largest, 0.25, 0);
@@ -215,14 +215,14 @@ static void test_shading(void **state)
     assert_true(worst[ACCURACY_SHADING].x == 0 && worst[ACCURACY_SHADING].variant == 0.75);
     assert_true(worst[ACCURACY_IMAGE].x == 11 && worst[ACCURACY_IMAGE].y == 4);
     assert_int_equal(errors.display.off_by_more, 3);
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_distances_and_normals(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
+    PictureLayers reference = layers_make(), variant = layers_make();
     variant.t[at(2, 2)] = 8 + 3 * 8 * (double)FLT_EPSILON;
     // 10 degrees about y, and a tiny angle that the cosine cannot show
     const double angle = acos(-1) / 18, tiny = 1e-12;
@@ -246,18 +246,18 @@ static void test_distances_and_normals(void **state)
     normal[0] = (double)NAN;
     errors = compare(&reference, &variant);
     assert_true(isinf(errors.t_relative.largest) && isinf(errors.normal.largest));
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_unsound_pixels(void **state)
 {
     (void)state;
-    AccuracyLayers reference = layers_make(), variant = layers_make();
-    variant.colors[3 * at(3, 3)] = (double)NAN;
-    variant.colors[3 * at(3, 3) + 1] = -1; // counts for both
-    variant.colors[3 * at(4, 3) + 2] = -(double)INFINITY;
-    variant.colors[3 * at(5, 3) + 2] = -0.0;
+    PictureLayers reference = layers_make(), variant = layers_make();
+    variant.color[3 * at(3, 3)] = (double)NAN;
+    variant.color[3 * at(3, 3) + 1] = -1; // counts for both
+    variant.color[3 * at(4, 3) + 2] = -(double)INFINITY;
+    variant.color[3 * at(5, 3) + 2] = -0.0;
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.nonfinite, 2);
     assert_int_equal(errors.negative, 2);
@@ -265,24 +265,24 @@ static void test_unsound_pixels(void **state)
     assert_int_equal(errors.image.count, 3 * PIXELS - 2);
     assert_true(isfinite(errors.image.rmse) && isfinite(errors.display.flip_mean));
     assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);
-    accuracy_layers_free(&reference);
-    accuracy_layers_free(&variant);
+    layers_free(&reference);
+    layers_free(&variant);
 }
 
 static void test_colors_only(void **state)
 {
     (void)state;
-    AccuracyLayers variant = layers_make(), source = layers_make();
-    AccuracyLayers reference = {.width = WIDTH, .height = HEIGHT, .colors = source.colors};
-    variant.colors[3 * at(3, 3)] = 0.75;
+    PictureLayers variant = layers_make(), source = layers_make();
+    PictureLayers reference = {.width = WIDTH, .height = HEIGHT, .color = source.color};
+    variant.color[3 * at(3, 3)] = 0.75;
     AccuracyVariant compared = {.errors = compare(&reference, &variant)};
     assert_non_null(compared.errors.why_colors_only);
     assert_non_null(accuracy_figure(&compared, ACCURACY_OBJECT).why_not);
     assert_non_null(accuracy_figure(&compared, ACCURACY_SHADING).why_not);
     assert_near(accuracy_figure(&compared, ACCURACY_IMAGE).value, 0.25 / sqrt(3.0 * PIXELS), 1e-16);
     assert_null(accuracy_figure(&compared, ACCURACY_FLIP).why_not);
-    accuracy_layers_free(&source);
-    accuracy_layers_free(&variant);
+    layers_free(&source);
+    layers_free(&variant);
 }
 
 enum { VARIANTS = 5 };

@@ -53,7 +53,7 @@ typedef struct {
     AccuracyOptions options;
     OpenDevice open;
     VariantSet set;
-    AccuracyLayers reference; // of the scene at work; read from a file: of the only one
+    PictureLayers reference; // of the scene at work; read from a file: of the only one
     AccuracyScene *scenes;
     OutputFile page; // opened before anything is measured
     MessageList messages;
@@ -120,18 +120,9 @@ static bool reference_read(Accuracy *accuracy)
                     "the reference '%s' has %ux%u pixels, the pictures have %ux%u", path, image.width,
                     image.height, settings->width, settings->height);
     accuracy->reference =
-        (AccuracyLayers){.width = image.width, .height = image.height, .wide = true, .colors = colors};
+        (PictureLayers){.width = image.width, .height = image.height, .wide = true, .color = colors};
     image_free(&image);
     return !fault && fits;
-}
-
-static float *narrowed(const AccuracyLayers *layers)
-{
-    const size_t count = (size_t)layers->width * layers->height * 3;
-    float *values = memory_allocate(count, sizeof *values);
-    for (size_t i = 0; i < count; i++)
-        values[i] = (float)layers->colors[i];
-    return values;
 }
 
 // The scene's picture in double with the most samples of any variant, unperturbed. EXIT_DONE, or why not.
@@ -178,7 +169,7 @@ static AccuracyReport report_of(const Accuracy *accuracy)
 }
 
 static bool layers_keep(Accuracy *accuracy, size_t scene, const AccuracyVariant *variant,
-                        const AccuracyLayers *layers)
+                        const PictureLayers *layers)
 {
     if (!accuracy->options.folder) return true;
     const AccuracyReport report = report_of(accuracy);
@@ -197,17 +188,17 @@ static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVaria
         compared->status = ACCURACY_UNAVAILABLE;
         return EXIT_DONE;
     }
-    AccuracyLayers layers;
+    PictureLayers layers;
     if (!layers_render(&layers, variant->renderer, &variant->settings, scene->light_count))
         return EXIT_INTERRUPTED;
-    compared->picture = narrowed(&layers);
+    compared->picture = layers_narrow_color(&layers);
     if (is_reference(scene, compared))
         compared->status = ACCURACY_REFERENCE;
     else
         accuracy_compare(&compared->errors, &accuracy->reference, &scene->edges, &layers,
                          scene->display_values);
     bool saved = layers_keep(accuracy, scene_index, compared, &layers);
-    accuracy_layers_free(&layers);
+    layers_free(&layers);
     return saved ? EXIT_DONE : EXIT_USER;
 }
 
@@ -218,14 +209,14 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
     const Variant *variants = &accuracy->set.variants[first];
     int status = scene->reference.file ? EXIT_DONE : reference_render(accuracy, scene, variants);
     if (status != EXIT_DONE) return status;
-    const AccuracyLayers *reference = &accuracy->reference;
+    const PictureLayers *reference = &accuracy->reference;
     accuracy_count_unsound(reference, &scene->reference.nonfinite, &scene->reference.negative);
     accuracy_edges_find(&scene->edges, reference);
-    scene->reference.picture = narrowed(reference);
+    scene->reference.picture = layers_narrow_color(reference);
     if (!layers_keep(accuracy, scene_index, NULL, reference)) status = EXIT_USER;
     for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++)
         status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);
-    accuracy_layers_free(&accuracy->reference);
+    layers_free(&accuracy->reference);
     if (status == EXIT_DONE) accuracy_judge(scene);
     return status;
 }
@@ -321,7 +312,7 @@ static void accuracy_close(Accuracy *accuracy)
     for (size_t i = 0; accuracy->scenes && i < accuracy->set.scene_count; i++)
         accuracy_scene_free(&accuracy->scenes[i]);
     free(accuracy->scenes);
-    accuracy_layers_free(&accuracy->reference);
+    layers_free(&accuracy->reference);
     output_abandon(&accuracy->page);
     variant_set_close(&accuracy->set);
     messages_tell(&accuracy->messages, NULL);

@@ -2,6 +2,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/memory.h"
+#include "host/base/numbers.h"
 #include "host/base/text.h"
 #include "host/cli/version.h"
 #include <pthread.h>
@@ -191,21 +192,19 @@ static void *scratch_reserve(Scratch *scratch, size_t size)
 static const float *narrowed(Picture *picture, const double *values, size_t count)
 {
     float *narrow = scratch_reserve(&picture->converted, count * sizeof *narrow);
-    for (size_t i = 0; i < count; i++)
-        narrow[i] = (float)values[i];
+    numbers_narrow(narrow, values, count);
     return narrow;
 }
 
 // Positions come relative to the eye; the file has them in the world, in double so that no bit is lost.
 static const double *positions_in_world(Picture *picture, const Band *band, size_t pixels)
 {
-    bool wide = renderer_report(picture->renderer)->wide;
     double *world = scratch_reserve(&picture->converted, 3 * pixels * sizeof *world);
+    numbers_widen(world, band->position, 3 * pixels, renderer_report(picture->renderer)->wide);
     Vector3 eye = picture->scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
     for (size_t i = 0; i < 3 * pixels; i++)
-        world[i] = (wide ? ((const double *)band->position)[i] : (double)((const float *)band->position)[i]) +
-                   axes[i % 3];
+        world[i] += axes[i % 3];
     return world;
 }
 

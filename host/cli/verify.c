@@ -6,6 +6,7 @@
 #include "host/base/memory.h"
 #include "host/cli/bench_json.h"
 #include "host/cli/commands.h"
+#include "host/cli/layers.h"
 #include "host/cli/options.h"
 #include "host/cli/version.h"
 #include "host/render/camera_basis.h"
@@ -117,45 +118,12 @@ static void prober_close(void *opened)
     free(scene);
 }
 
-static void widen(double *target, const void *values, size_t count, bool wide)
-{
-    for (size_t i = 0; i < count; i++)
-        target[i] = wide ? ((const double *)values)[i] : (double)((const float *)values)[i];
-}
-
-typedef struct {
-    VerifyPicture *picture;
-    bool wide;
-} PictureSink;
-
-static bool picture_take_band(void *context, const Band *band, double fraction_done)
-{
-    (void)fraction_done;
-    const PictureSink *sink = context;
-    VerifyPicture *picture = sink->picture;
-    size_t first = (size_t)band->first_row * picture->width, count = (size_t)band->row_count * picture->width;
-    widen(picture->color + 3 * first, band->colors, 3 * count, sink->wide);
-    widen(picture->t + first, band->t, count, sink->wide);
-    widen(picture->normal + 3 * first, band->normal, 3 * count, sink->wide);
-    widen(picture->position + 3 * first, band->position, 3 * count, sink->wide);
-    widen(picture->ray + 3 * first, band->ray, 3 * count, sink->wide);
-    memcpy(picture->object + first, band->object, count * sizeof *picture->object);
-    memcpy(picture->path + first, band->path, count * sizeof *picture->path);
-    if (picture->light_count > 0)
-        memcpy(picture->shadow + first * picture->light_count, band->shadow,
-               count * picture->light_count * sizeof *picture->shadow);
-    return true;
-}
-
-static void prober_render(void *context, const Scene *scene, bool hierarchy, VerifyPicture *picture)
+static void prober_render(void *context, const Scene *scene, bool hierarchy, PictureLayers *picture)
 {
     Prober *prober = context;
     Renderer *renderer = scene_open_renderer(prober, scene, hierarchy, picture->width, picture->height);
-    const RenderReport *report = renderer_report(renderer);
-    const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
-    PictureSink sink = {picture, report->wide};
-    if (!renderer_render(renderer, aovs, picture_take_band, &sink)) fault("a picture ended early");
-    prober->render_kernel = report->kernel_hash;
+    if (!layers_take(picture, renderer)) fault("a picture ended early");
+    prober->render_kernel = renderer_report(renderer)->kernel_hash;
     renderer_close(renderer);
 }
 

@@ -6,22 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-static size_t pixel_count(const AccuracyLayers *layers)
-{
-    return (size_t)layers->width * layers->height;
-}
-
-void accuracy_layers_free(AccuracyLayers *layers)
-{
-    free(layers->colors);
-    free(layers->t);
-    free(layers->normal);
-    free(layers->object);
-    free(layers->shadow);
-    free(layers->path);
-    *layers = (AccuracyLayers){0};
-}
-
 // A map of what each pixel has `stride` values of.
 typedef struct {
     const uint32_t *values;
@@ -60,10 +44,10 @@ static size_t edges_mark(const ValueMap *map, bool *edges)
     return count;
 }
 
-void accuracy_edges_find(AccuracyEdges *edges, const AccuracyLayers *reference)
+void accuracy_edges_find(AccuracyEdges *edges, const PictureLayers *reference)
 {
     *edges = (AccuracyEdges){0};
-    const size_t pixels = pixel_count(reference);
+    const size_t pixels = layers_pixel_count(reference);
     ValueMap map = {reference->object, reference->width, reference->height, 1, 0};
     if (reference->object) {
         edges->silhouette = memory_allocate_zeroed(pixels, sizeof(bool));
@@ -93,18 +77,18 @@ void accuracy_edges_free(AccuracyEdges *edges)
     *edges = (AccuracyEdges){0};
 }
 
-void accuracy_count_unsound(const AccuracyLayers *layers, size_t *nonfinite, size_t *negative)
+void accuracy_count_unsound(const PictureLayers *layers, size_t *nonfinite, size_t *negative)
 {
     *nonfinite = *negative = 0;
-    for (size_t i = 0; i < pixel_count(layers); i++) {
-        const double *color = layers->colors + 3 * i;
+    for (size_t i = 0; i < layers_pixel_count(layers); i++) {
+        const double *color = layers->color + 3 * i;
         *nonfinite += !isfinite(color[0]) || !isfinite(color[1]) || !isfinite(color[2]);
         *negative += color[0] < 0 || color[1] < 0 || color[2] < 0;
     }
 }
 
 typedef struct {
-    const AccuracyLayers *reference, *variant;
+    const PictureLayers *reference, *variant;
     const AccuracyEdges *edges;
     AccuracyErrors *errors;
     // pixels that are compared further
@@ -121,8 +105,8 @@ static double value_error(double reference, double variant)
 // The channel in which a pixel's colors differ most.
 static size_t worst_channel(const Comparison *comparison, size_t pixel)
 {
-    const double *reference = comparison->reference->colors + 3 * pixel;
-    const double *variant = comparison->variant->colors + 3 * pixel;
+    const double *reference = comparison->reference->color + 3 * pixel;
+    const double *variant = comparison->variant->color + 3 * pixel;
     size_t worst = 0;
     for (size_t i = 1; i < 3; i++)
         if (value_error(reference[i], variant[i]) > value_error(reference[worst], variant[worst])) worst = i;
@@ -132,7 +116,7 @@ static size_t worst_channel(const Comparison *comparison, size_t pixel)
 static double color_error(const Comparison *comparison, size_t pixel)
 {
     size_t value = 3 * pixel + worst_channel(comparison, pixel);
-    return value_error(comparison->reference->colors[value], comparison->variant->colors[value]);
+    return value_error(comparison->reference->color[value], comparison->variant->color[value]);
 }
 
 // Keeps the error if it is the worst of its kind so far; one away from edges is worse than any at them.
@@ -148,8 +132,8 @@ static void worst_offer(const Comparison *comparison, AccuracyKind kind, size_t 
     worst->x = (uint32_t)(pixel % comparison->reference->width);
     worst->y = (uint32_t)(pixel / comparison->reference->width);
     for (size_t i = 0; i < 3; i++) {
-        worst->reference_color[i] = comparison->reference->colors[3 * pixel + i];
-        worst->variant_color[i] = comparison->variant->colors[3 * pixel + i];
+        worst->reference_color[i] = comparison->reference->color[3 * pixel + i];
+        worst->variant_color[i] = comparison->variant->color[3 * pixel + i];
     }
 }
 
@@ -236,8 +220,8 @@ static void color_offer(const Comparison *comparison, AccuracyKind kind, size_t 
 {
     const size_t value = 3 * pixel + worst_channel(comparison, pixel);
     AccuracyWorst offered = {.error = color_error(comparison, pixel),
-                             .reference = comparison->reference->colors[value],
-                             .variant = comparison->variant->colors[value]};
+                             .reference = comparison->reference->color[value],
+                             .variant = comparison->variant->color[value]};
     if (offered.error > 0) worst_offer(comparison, kind, pixel, &offered);
 }
 
@@ -257,39 +241,37 @@ static void pixel_compare(const Comparison *comparison, size_t pixel)
     surface_compare(comparison, pixel);
     if (!same_shadows || !same_path) return;
     for (size_t i = 0; i < 3; i++) {
-        comparison->expected[3 * errors->shading_pixels + i] = comparison->reference->colors[3 * pixel + i];
-        comparison->found[3 * errors->shading_pixels + i] = comparison->variant->colors[3 * pixel + i];
+        comparison->expected[3 * errors->shading_pixels + i] = comparison->reference->color[3 * pixel + i];
+        comparison->found[3 * errors->shading_pixels + i] = comparison->variant->color[3 * pixel + i];
     }
     errors->shading_pixels++;
     color_offer(comparison, ACCURACY_SHADING, pixel);
 }
 
-static ImageMetrics display_compare(const AccuracyLayers *reference, const AccuracyLayers *variant,
+static ImageMetrics display_compare(const PictureLayers *reference, const PictureLayers *variant,
                                     bool display_values)
 {
-    const size_t count = 3 * pixel_count(reference);
+    const PictureLayers *const layers[] = {reference, variant};
     Image images[2];
-    for (size_t i = 0; i < 2; i++) {
-        const double *colors = i == 0 ? reference->colors : variant->colors;
-        images[i] = (Image){
-            .width = reference->width, .height = reference->height, .channels = 3, .display = display_values};
-        images[i].values = memory_allocate(count, sizeof(float));
-        for (size_t k = 0; k < count; k++)
-            images[i].values[k] = (float)colors[k];
-    }
+    for (size_t i = 0; i < 2; i++)
+        images[i] = (Image){.width = layers[i]->width,
+                            .height = layers[i]->height,
+                            .channels = 3,
+                            .values = layers_narrow_color(layers[i]),
+                            .display = display_values};
     ImageMetrics metrics = image_metrics(&images[0], &images[1]);
     image_free(&images[0]);
     image_free(&images[1]);
     return metrics;
 }
 
-void accuracy_compare(AccuracyErrors *errors, const AccuracyLayers *reference, const AccuracyEdges *edges,
-                      const AccuracyLayers *variant, bool display_values)
+void accuracy_compare(AccuracyErrors *errors, const PictureLayers *reference, const AccuracyEdges *edges,
+                      const PictureLayers *variant, bool display_values)
 {
     *errors = (AccuracyErrors){0};
     if (!reference->object) errors->why_colors_only = "the reference has colors only";
     accuracy_count_unsound(variant, &errors->nonfinite, &errors->negative);
-    const size_t pixels = pixel_count(reference);
+    const size_t pixels = layers_pixel_count(reference);
     Comparison comparison = {
         .reference = reference,
         .variant = variant,
@@ -307,7 +289,7 @@ void accuracy_compare(AccuracyErrors *errors, const AccuracyLayers *reference, c
     errors->t_relative.percentile_999 = percentile_999(comparison.t_relative, errors->surface_pixels);
     errors->t_ulps.percentile_999 = percentile_999(comparison.t_ulps, errors->surface_pixels);
     errors->normal.percentile_999 = percentile_999(comparison.normal, errors->surface_pixels);
-    errors->image = error_summarize(reference->colors, variant->colors, 3 * pixels);
+    errors->image = error_summarize(reference->color, variant->color, 3 * pixels);
     errors->display = display_compare(reference, variant, display_values);
     free(comparison.expected);
     free(comparison.found);

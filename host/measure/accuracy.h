@@ -5,24 +5,10 @@
 
 #include "host/measure/bench.h"
 #include "host/measure/image_metrics.h"
+#include "host/measure/layers.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-// What was rendered: a value, or 3 or light_count of them, for each pixel, rows from the top. Numbers are
-// doubles whatever precision they were computed in, which changes none of them.
-typedef struct {
-    uint32_t width, height, light_count;
-    bool wide; // computed in double; else its t is counted in ulps of float
-    double *colors;
-    // of the ray through the pixel's center; NULL: not to be had
-    double *t, *normal; // infinity and 0 where nothing was hit
-    uint32_t *object;   // UINT32_MAX where nothing was hit
-    uint32_t *shadow;   // for each light, 1 where it does not reach what was hit
-    uint32_t *path;     // the signature of what the ray met
-} AccuracyLayers;
-
-void accuracy_layers_free(AccuracyLayers *layers); // and zeroes
 
 // Where a rounding decides what a pixel shows: the pixels whose value differs from one of their 4 neighbors',
 // and those around them. NULL where the layers lack the values.
@@ -31,7 +17,7 @@ typedef struct {
     size_t silhouette_pixels, *shadow_edge_pixels, path_pixels; // shadow: for each light
 } AccuracyEdges;
 
-void accuracy_edges_find(AccuracyEdges *edges, const AccuracyLayers *reference);
+void accuracy_edges_find(AccuracyEdges *edges, const PictureLayers *reference);
 void accuracy_edges_free(AccuracyEdges *edges); // and zeroes
 
 // The kinds of error, each with one figure that is plotted.
@@ -89,10 +75,10 @@ typedef struct {
 
 // `variant` and `reference` are of one size, and of one number of lights. `display_values`: colors are for a
 // screen as they are, without the sRGB curve.
-void accuracy_compare(AccuracyErrors *errors, const AccuracyLayers *reference, const AccuracyEdges *edges,
-                      const AccuracyLayers *variant, bool display_values);
+void accuracy_compare(AccuracyErrors *errors, const PictureLayers *reference, const AccuracyEdges *edges,
+                      const PictureLayers *variant, bool display_values);
 // Pixels with a channel that is not finite, and with one below 0.
-void accuracy_count_unsound(const AccuracyLayers *layers, size_t *nonfinite, size_t *negative);
+void accuracy_count_unsound(const PictureLayers *layers, size_t *nonfinite, size_t *negative);
 
 typedef enum {
     ACCURACY_MEASURED,

@@ -172,7 +172,7 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const Prob
     run->renderer->close(opened);
 }
 
-static bool is_pixel_sound(const VerifyRun *run, const VerifyPicture *picture, size_t i)
+static bool is_pixel_sound(const VerifyRun *run, const PictureLayers *picture, size_t i)
 {
     const double *color = &picture->color[3 * i], *normal = &picture->normal[3 * i];
     if (!is_finite(color) || color[0] < 0 || color[1] < 0 || color[2] < 0) return false;
@@ -183,42 +183,25 @@ static bool is_pixel_sound(const VerifyRun *run, const VerifyPicture *picture, s
     return run->tier == TIER_A || is_unit(run, normal);
 }
 
-VerifyPicture verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
                             uint32_t height)
 {
-    VerifyPicture picture = {width, height, (uint32_t)scene->lights.count, 0, 0, 0, 0, 0, 0, 0, 0};
-    size_t pixels = verify_pixel_count(&picture), shadows = pixels * picture.light_count;
-    double **const vectors[] = {&picture.color, &picture.normal, &picture.position, &picture.ray};
-    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-        *vectors[i] = memory_allocate(3 * pixels, sizeof **vectors[i]);
-    picture.t = memory_allocate(pixels, sizeof *picture.t);
-    picture.object = memory_allocate(pixels, sizeof *picture.object);
-    picture.shadow = memory_allocate(shadows + 1, sizeof *picture.shadow);
-    picture.path = memory_allocate(pixels, sizeof *picture.path);
+    PictureLayers picture = layers_allocate(width, height, (uint32_t)scene->lights.count);
+    const size_t pixels = layers_pixel_count(&picture);
+    picture.position = memory_allocate(3 * pixels, sizeof *picture.position);
+    picture.ray = memory_allocate(3 * pixels, sizeof *picture.ray);
     run->renderer->render(run->renderer->context, scene, hierarchy, &picture);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
         run->result->unsound += !is_pixel_sound(run, &picture, i);
+    const double *const vectors[] = {picture.color, picture.normal, picture.position, picture.ray};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-        hash_numbers(run, *vectors[i], 3 * pixels);
+        hash_numbers(run, vectors[i], 3 * pixels);
     hash_numbers(run, picture.t, pixels);
     hash_integers(run, picture.object, pixels);
-    hash_integers(run, picture.shadow, shadows);
+    hash_integers(run, picture.shadow, pixels * picture.light_count);
     hash_integers(run, picture.path, pixels);
     return picture;
-}
-
-void verify_picture_free(VerifyPicture *picture)
-{
-    free(picture->color);
-    free(picture->t);
-    free(picture->normal);
-    free(picture->position);
-    free(picture->ray);
-    free(picture->object);
-    free(picture->shadow);
-    free(picture->path);
-    *picture = (VerifyPicture){0};
 }
 
 bool verify_same_bits(const ProbeHit *a, const ProbeHit *b)

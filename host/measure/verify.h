@@ -2,6 +2,7 @@
 // held to a bound. Expected hits are exact (tests/oracle). docs/verify.md says what each case is.
 #pragma once
 
+#include "host/measure/layers.h"
 #include "host/scene/probe.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
@@ -12,18 +13,6 @@
 // `double`, and hold A as well.
 typedef enum { TIER_A, TIER_B, TIER_C, TIER_D, TIER_COUNT } VerifyTier;
 
-// A picture and what lies behind its pixels, row by row from the top left; numbers widened to double.
-typedef struct {
-    uint32_t width, height, light_count;
-    double *color;             // 3 per pixel
-    double *t;                 // infinity where nothing was hit
-    double *normal, *position; // 3 per pixel; 0 where nothing was hit; from the eye
-    double *ray;               // 3 per pixel: the direction that was traced, from the eye
-    uint32_t *object;          // UINT32_MAX where nothing was hit
-    uint32_t *shadow;          // 1 per light and pixel
-    uint32_t *path;            // the signature of the ray's way (kernels/types.h)
-} VerifyPicture;
-
 // The renderer under test, at one precision.
 typedef struct {
     void *context;
@@ -31,8 +20,8 @@ typedef struct {
     void *(*open)(void *context, const Scene *scene, bool hierarchy);
     void (*trace)(void *opened, const ProbeRay *rays, size_t count, ProbeHit *hits);
     void (*close)(void *opened);
-    // Fills a picture of the scene, all arrays of which are there.
-    void (*render)(void *context, const Scene *scene, bool hierarchy, VerifyPicture *picture);
+    // Renders a picture of the scene into all its arrays.
+    void (*render)(void *context, const Scene *scene, bool hierarchy, PictureLayers *picture);
     // The forward axis, and those along the picture's width and height, of a camera.
     void (*camera_axes)(const Camera *camera, Vector3 axes[3]);
     // Whether quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp.

@@ -75,17 +75,11 @@ void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 Scene verify_scene(const char *objects);
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
-// Renders a picture and counts what is unsound in it; verify_picture_free frees it.
-VerifyPicture verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+// Renders a picture, all of it kept, and counts what is unsound in it; layers_free frees it.
+PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
                             uint32_t height);
-void verify_picture_free(VerifyPicture *picture);
 
-static inline size_t verify_pixel_count(const VerifyPicture *picture)
-{
-    return (size_t)picture->width * picture->height;
-}
-
-static inline bool verify_pixel_found(const VerifyPicture *picture, size_t pixel)
+static inline bool verify_pixel_found(const PictureLayers *picture, size_t pixel)
 {
     return picture->object[pixel] != UINT32_MAX;
 }

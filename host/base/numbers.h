@@ -1,0 +1,9 @@
+// Arrays of numbers, from one precision to the other.
+#pragma once
+
+#include <stdbool.h>
+#include <stddef.h>
+
+void numbers_narrow(float *target, const double *values, size_t count);
+// `values` are doubles where `wide`, else floats.
+void numbers_widen(double *target, const void *values, size_t count, bool wide);
