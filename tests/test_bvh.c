@@ -52,18 +52,17 @@ static size_t few_or_many(size_t few, size_t many)
 
 typedef struct {
     const Bvh *bvh;
-    const BvhBox *boxes;
+    const Bounds *boxes;
     const uint8_t *kinds;
     uint8_t *seen;
     unsigned depth;
 } Walk;
 
-static void assert_contains(const BvhBox *outer, const BvhBox *inner)
+static void assert_contains(const Bounds *outer, const Bounds *inner)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        assert_true(outer->low[axis] <= inner->low[axis]);
-        assert_true(outer->high[axis] >= inner->high[axis]);
-    }
+    assert_true(outer->min.x <= inner->min.x && outer->max.x >= inner->max.x);
+    assert_true(outer->min.y <= inner->min.y && outer->max.y >= inner->max.y);
+    assert_true(outer->min.z <= inner->min.z && outer->max.z >= inner->max.z);
 }
 
 static void leaf_check(Walk *walk, const BvhChild *leaf)
@@ -84,7 +83,7 @@ static void node_check(Walk *walk, uint32_t index, unsigned depth)
     if (depth > walk->depth) walk->depth = depth;
     for (int side = 0; side < 2; side++) {
         const BvhChild *child = &walk->bvh->nodes[index].children[side];
-        if (child->box.low[0] > child->box.high[0]) {
+        if (bounds_is_empty(&child->box)) {
             assert_int_equal(walk->bvh->primitive_count > BVH_LEAF_LARGEST, 0);
         } else if (child->count > 0) {
             leaf_check(walk, child);
@@ -120,7 +119,7 @@ static void wide_node_check(Walk *walk, const BvhWide *wide, unsigned width, uin
     }
 }
 
-static void wide_check(const Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, unsigned width)
+static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, unsigned width)
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
@@ -134,7 +133,7 @@ static void wide_check(const Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds
 }
 
 // Every primitive in exactly one leaf, leaves of one kind, boxes that hold what is below them, bounded depth.
-static void tree_check(const BvhBox *boxes, const uint8_t *kinds, size_t count)
+static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
 {
     Bvh bvh;
     bvh_build(&bvh, boxes, kinds, count);
@@ -150,20 +149,14 @@ static void tree_check(const BvhBox *boxes, const uint8_t *kinds, size_t count)
     bvh_free(&bvh);
 }
 
-static BvhBox box_around(Vector3 center, Vector3 half)
+static Bounds cube_around(Vector3 center, double half)
 {
-    return (BvhBox){{center.x - half.x, center.y - half.y, center.z - half.z},
-                    {center.x + half.x, center.y + half.y, center.z + half.z}};
-}
-
-static BvhBox cube_around(Vector3 center, double half)
-{
-    return box_around(center, (Vector3){half, half, half});
+    return bounds_around(center, vector_all(half));
 }
 
 enum { IDENTICAL, ONE_CENTER, HUGE_AMONG_TINY, MANY_BINADES, NESTED, ON_A_LINE, FLAT, RANDOM, SET_COUNT };
 
-static BvhBox box_of_set(int set, size_t index, size_t count)
+static Bounds box_of_set(int set, size_t index, size_t count)
 {
     const Vector3 nothing = {0, 0, 0};
     double part = (double)index / (double)count;
@@ -183,8 +176,8 @@ static BvhBox box_of_set(int set, size_t index, size_t count)
     case ON_A_LINE:
         return cube_around((Vector3){part, 0, 0}, 0);
     case FLAT:
-        return box_around((Vector3){random_between(-1, 1), 7, random_between(-1, 1)},
-                          (Vector3){0.01, 0, 0.01});
+        return bounds_around((Vector3){random_between(-1, 1), 7, random_between(-1, 1)},
+                             (Vector3){0.01, 0, 0.01});
     default:
         return cube_around(random_in_cube(10), random_between(0, 0.5));
     }
@@ -196,7 +189,7 @@ static void any_boxes_make_a_tree(void **state)
     static const size_t counts[SET_COUNT] = {65536, 65536, 100001, 50000, 50000, 20000, 20000, 50000};
     for (int set = 0; set < SET_COUNT; set++) {
         size_t count = counts[set];
-        BvhBox *boxes = memory_allocate(count, sizeof *boxes);
+        Bounds *boxes = memory_allocate(count, sizeof *boxes);
         uint8_t *kinds = memory_allocate_zeroed(count, 1);
         for (size_t i = 0; i < count; i++)
             boxes[i] = box_of_set(set, i, count);
@@ -212,7 +205,7 @@ static void any_boxes_make_a_tree(void **state)
 static void few_boxes_make_a_tree(void **state)
 {
     (void)state;
-    BvhBox boxes[20];
+    Bounds boxes[20];
     uint8_t kinds[20];
     for (size_t count = 1; count <= 20; count++) {
         for (size_t i = 0; i < count; i++) {

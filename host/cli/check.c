@@ -44,11 +44,6 @@ static SceneFacts facts_of(const Scene *scene)
     return facts;
 }
 
-static bool bounds_are_empty(const Bounds *bounds)
-{
-    return bounds->min.x > bounds->max.x;
-}
-
 // SPOT_LIGHTS -> "spot lights"
 static void feature_name_write(char *target, size_t size, const char *name)
 {
@@ -71,7 +66,7 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
     printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count,
            scene->materials.count);
     Vector3 low = facts->bounds.min, high = facts->bounds.max;
-    if (bounds_are_empty(&facts->bounds))
+    if (bounds_is_empty(&facts->bounds))
         printf("none");
     else
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
@@ -131,7 +126,7 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         json_integer(json, "unbounded", (int64_t)facts.unbounded_count);
         json_integer(json, "lights", (int64_t)scene->lights.count);
         json_integer(json, "materials", (int64_t)scene->materials.count);
-        if (bounds_are_empty(&facts.bounds)) {
+        if (bounds_is_empty(&facts.bounds)) {
             json_null(json, "bounds");
         } else {
             json_begin_object(json, "bounds");

@@ -11,12 +11,11 @@ typedef struct {
 } Enclosure;
 
 // Larger by what the roundings here and of the box itself come to, far from the eye.
-static Enclosure box_enclosure(const BvhBox *box)
+static Enclosure box_enclosure(const Bounds *box)
 {
-    Vector3 low = {box->low[0], box->low[1], box->low[2]}, high = {box->high[0], box->high[1], box->high[2]};
-    Vector3 half = vector_scale(vector_subtract(high, low), 0.5);
-    double roundings = 4 * DBL_EPSILON * (vector_length(low) + vector_length(high));
-    return (Enclosure){vector_add(low, half), vector_length(half) + roundings};
+    Vector3 half = vector_scale(vector_subtract(box->max, box->min), 0.5);
+    double roundings = 4 * DBL_EPSILON * (vector_length(box->min) + vector_length(box->max));
+    return (Enclosure){vector_add(box->min, half), vector_length(half) + roundings};
 }
 
 static Enclosure primitive_enclosure(size_t kind, const void *primitive)
@@ -33,7 +32,7 @@ static Enclosure primitive_enclosure(size_t kind, const void *primitive)
         const Torus *torus = primitive;
         return (Enclosure){vector3_of(&torus->center_major), torus->center_major.w + torus->axis_minor.w};
     }
-    BvhBox box;
+    Bounds box;
     if (!primitive_box(kind, primitive, &box)) return (Enclosure){.radius = INFINITY};
     return box_enclosure(&box);
 }
@@ -55,8 +54,7 @@ static Ball hierarchy_ball(const SceneHeader *header, Vector3 apex, double round
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         count += hanging[kind];
     if (count == 0) return (Ball){{0, 0, 0, BALL_LARGEST}};
-    scalar4 low = header->bounds_low, high = header->bounds_high;
-    const BvhBox bounds = {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+    const Bounds bounds = {vector3_of(&header->bounds_low), vector3_of(&header->bounds_high)};
     return ball_seen(box_enclosure(&bounds), apex, roundoff);
 }
 

@@ -29,6 +29,11 @@ static const float binary_step_cost = 1.0f, binary_test_cost = 1.0f;
 typedef float Float4 __attribute__((vector_size(16)));
 typedef int32_t Int4 __attribute__((vector_size(16)));
 
+static inline Float4 float4_of(Vector3 v)
+{
+    return (Float4){(float)v.x, (float)v.y, (float)v.z, 0};
+}
+
 // gcc makes no minps of a comparison and a choice.
 #ifdef __SSE__
 static inline Float4 float4_min(Float4 a, Float4 b)
@@ -277,47 +282,34 @@ static void range_build(Builder *builder, Range range, unsigned depth, BvhChild 
                 &builder->nodes[index]);
 }
 
-static inline void bvh_box_join(BvhBox *box, const BvhBox *other)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        if (other->low[axis] < box->low[axis]) box->low[axis] = other->low[axis];
-        if (other->high[axis] > box->high[axis]) box->high[axis] = other->high[axis];
-    }
-}
-
-static const BvhBox bvh_empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-
 // Boxes from the primitives up, in double: children come after their parent, so one walk backwards meets them
 // first.
-static void boxes_fit(Bvh *bvh, const BvhBox *boxes)
+static void boxes_fit(Bvh *bvh, const Bounds *boxes)
 {
     for (size_t i = bvh->node_count; i-- > 0;) {
         for (int side = 0; side < 2; side++) {
             BvhChild *child = &bvh->nodes[i].children[side];
-            child->box = bvh_empty_box;
+            child->box = bounds_empty();
             if (child->count > 0) {
                 for (uint32_t k = 0; k < child->count; k++)
-                    bvh_box_join(&child->box, &boxes[bvh->order[child->first + k]]);
+                    child->box = bounds_join(child->box, boxes[bvh->order[child->first + k]]);
             } else if (child->first > i) {
-                bvh_box_join(&child->box, &bvh->nodes[child->first].children[0].box);
-                bvh_box_join(&child->box, &bvh->nodes[child->first].children[1].box);
+                child->box = bvh_node_bounds(&bvh->nodes[child->first]);
             }
         }
     }
 }
 
-static double largest_coordinate(const BvhBox *boxes, size_t count)
+static double largest_coordinate(const Bounds *boxes, size_t count)
 {
-    BvhBox all = bvh_empty_box;
+    Bounds all = {{0, 0, 0}, {0, 0, 0}};
     for (size_t i = 0; i < count; i++)
-        bvh_box_join(&all, &boxes[i]);
-    double largest = 0;
-    for (int axis = 0; axis < 3; axis++)
-        largest = fmax(largest, fmax(-all.low[axis], all.high[axis]));
-    return largest;
+        all = bounds_join(all, boxes[i]);
+    Vector3 largest = vector_max(all.max, vector_scale(all.min, -1));
+    return fmax(largest.x, fmax(largest.y, largest.z));
 }
 
-void bvh_build(Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, size_t count)
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count)
 {
     *bvh = (Bvh){.primitive_count = count};
     Builder builder = {
@@ -331,11 +323,10 @@ void bvh_build(Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, size_t count
     double scale = largest > 0 ? 1 / largest : 1;
     for (size_t i = 0; i < count; i++) {
         Reference *reference = &builder.references[i];
-        *reference = (Reference){.index = (uint32_t)i, .kind = kinds[i]};
-        for (int axis = 0; axis < 3; axis++) {
-            reference->box.low[axis] = (float)(boxes[i].low[axis] * scale);
-            reference->box.high[axis] = (float)(boxes[i].high[axis] * scale);
-        }
+        reference->box.low = float4_of(vector_scale(boxes[i].min, scale));
+        reference->box.high = float4_of(vector_scale(boxes[i].max, scale));
+        reference->index = (uint32_t)i;
+        reference->kind = kinds[i];
     }
     BvhChild root = {.first = 0};
     if (count > 0) {

@@ -3,16 +3,13 @@
 // sides of a split built by two threads, and every leaf of one kind of shape).
 #pragma once
 
+#include "host/scene/bounds.h"
 #include <stddef.h>
 #include <stdint.h>
 
-typedef struct {
-    double low[3], high[3];
-} BvhBox;
-
 // A child: an inner node's index, or `count` primitives from `first` of the order below.
 typedef struct {
-    BvhBox box;
+    Bounds box;
     uint32_t first, count; // count 0: `first` is the node's index
 } BvhChild;
 
@@ -20,8 +17,14 @@ typedef struct {
     BvhChild children[2];
 } BvhNodeBuild;
 
+// An empty child adds nothing.
+static inline Bounds bvh_node_bounds(const BvhNodeBuild *node)
+{
+    return bounds_join(node->children[0].box, node->children[1].box);
+}
+
 typedef struct {
-    BvhNodeBuild *nodes; // the root first; a tree of one leaf has an empty second child (low > high)
+    BvhNodeBuild *nodes; // the root first; a tree of one leaf has a second child with an empty box
     size_t node_count;
     uint32_t *order; // the primitives, leaf by leaf
     uint8_t *kinds;  // theirs, in this order
@@ -35,5 +38,5 @@ enum { BVH_LEAF_LARGEST = 8 };
 
 // `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
 // of them.
-void bvh_build(Bvh *bvh, const BvhBox *boxes, const uint8_t *kinds, size_t count);
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count);
 void bvh_free(Bvh *bvh);

@@ -37,18 +37,12 @@ typedef struct {
 
 static bool child_is_empty(const BvhChild *child)
 {
-    return child->box.low[0] > child->box.high[0];
+    return bounds_is_empty(&child->box);
 }
 
 static bool child_is_node(const BvhChild *child)
 {
     return child->count == 0 && !child_is_empty(child);
-}
-
-static double box_half_area(const BvhBox *box)
-{
-    double x = box->high[0] - box->low[0], y = box->high[1] - box->low[1], z = box->high[2] - box->low[2];
-    return x * y + y * z + z * x;
 }
 
 static float leaf_cost(const Widening *widening, double half_area, uint32_t count)
@@ -61,7 +55,7 @@ static Subtree child_subtree(const Widening *widening, const BvhChild *child)
     if (child_is_node(child)) return widening->subtrees[child->first];
     Subtree leaf = {.first = child->first, .count = child->count};
     if (!child_is_empty(child))
-        leaf.leaves_cost = leaf_cost(widening, box_half_area(&child->box), child->count);
+        leaf.leaves_cost = leaf_cost(widening, bounds_half_area(child->box), child->count);
     return leaf;
 }
 
@@ -72,16 +66,6 @@ static unsigned places_share(const float *first, const float *second, unsigned p
     for (unsigned k = 2; k < places; k++)
         if (first[k] + second[places - k] < first[best] + second[places - best]) best = k;
     return best;
-}
-
-static double node_half_area(const BvhNodeBuild *node)
-{
-    BvhBox box = node->children[0].box;
-    for (int axis = 0; axis < 3; axis++) {
-        box.low[axis] = fmin(box.low[axis], node->children[1].box.low[axis]);
-        box.high[axis] = fmax(box.high[axis], node->children[1].box.high[axis]);
-    }
-    return box_half_area(&box);
 }
 
 // Both sides' primitives, where they make one leaf.
@@ -109,7 +93,7 @@ static void costs_find(Widening *widening)
             unsigned share = places_share(first.costs, second.costs, places);
             subtree.costs[places] = first.costs[share] + second.costs[places - share];
         }
-        double half_area = node_half_area(node);
+        double half_area = bounds_half_area(bvh_node_bounds(node));
         float as_node = subtree.costs[widening->width] +
                         (float)(half_area * widening->scale * (wide_node_cost + wide_box_cost));
         float as_leaf = leaf_cost(widening, half_area, subtree.count) - subtree.leaves_cost;
@@ -156,7 +140,7 @@ static void child_gather(const Widening *widening, const BvhChild *child, unsign
 void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
 {
     if (width < 2 || width > BVH_WIDTH_LARGEST) fault("a node of %u children", width);
-    double root_area = node_half_area(&bvh->nodes[0]);
+    double root_area = bounds_half_area(bvh_node_bounds(&bvh->nodes[0]));
     Widening widening = {
         .bvh = bvh,
         .subtrees = memory_allocate(bvh->node_count, sizeof(Subtree)),

@@ -6,23 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Half the extent, along each axis, of a circle of radius 1 across an axis.
-static Vector3 circle_reach(Vector3 unit)
-{
-    return (Vector3){hypot(unit.y, unit.z), hypot(unit.x, unit.z), hypot(unit.x, unit.y)};
-}
-
-static void box_include(BvhBox *box, Vector3 center, Vector3 reach)
-{
-    const double centers[3] = {center.x, center.y, center.z}, reaches[3] = {reach.x, reach.y, reach.z};
-    for (int axis = 0; axis < 3; axis++) {
-        double low = centers[axis] - reaches[axis], high = centers[axis] + reaches[axis];
-        if (low < box->low[axis]) box->low[axis] = low;
-        if (high > box->high[axis]) box->high[axis] = high;
-    }
-}
-
-static bool revolution_box(const Revolution *shape, BvhBox *box)
+static bool revolution_box(const Revolution *shape, Bounds *box)
 {
     if (!(shape->id.y & REVOLUTION_FINITE)) return false;
     Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
@@ -30,45 +14,44 @@ static bool revolution_box(const Revolution *shape, BvhBox *box)
     double height = shape->range.x / shape->range.z; // in units of the stored axis
     double end_radius = radius + shape->axis_slope.w * height * length;
     Vector3 reach = circle_reach(vector_scale(axis, 1 / length));
-    box_include(box, base, vector_scale(reach, fabs(radius)));
-    box_include(box, vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius)));
+    *box = bounds_join(
+        bounds_around(base, vector_scale(reach, fabs(radius))),
+        bounds_around(vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius))));
     return true;
 }
 
-bool primitive_box(size_t kind, const void *primitive, BvhBox *box)
+bool primitive_box(size_t kind, const void *primitive, Bounds *box)
 {
-    *box = (BvhBox){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    const Vector3 nothing = {0, 0, 0};
     switch (kind) {
     case KIND_SPHERES: {
         const Sphere *sphere = primitive;
-        double radius = sphere->center_radius.w;
-        box_include(box, vector3_of(&sphere->center_radius), (Vector3){radius, radius, radius});
+        *box = bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
         return true;
     }
     case KIND_DISCS: {
         const Disc *disc = primitive;
-        double radius = disc->center_radius.w;
-        box_include(box, vector3_of(&disc->center_radius), (Vector3){radius, radius, radius});
+        *box = bounds_around(vector3_of(&disc->center_radius), vector_all(disc->center_radius.w));
         return true;
     }
-    case KIND_BOXES:
-        box_include(box, vector3_of(&((const Box *)primitive)->low), nothing);
-        box_include(box, vector3_of(&((const Box *)primitive)->high), nothing);
+    case KIND_BOXES: {
+        const Box *shape = primitive;
+        *box = (Bounds){vector3_of(&shape->low), vector3_of(&shape->high)};
         return true;
+    }
     case KIND_CYLINDERS:
     case KIND_CONES:
         return revolution_box(primitive, box);
-    case KIND_TRIANGLES:
-        box_include(box, vector3_of(&((const Triangle *)primitive)->a), nothing);
-        box_include(box, vector3_of(&((const Triangle *)primitive)->b), nothing);
-        box_include(box, vector3_of(&((const Triangle *)primitive)->c), nothing);
+    case KIND_TRIANGLES: {
+        const Triangle *triangle = primitive;
+        *box =
+            bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
         return true;
+    }
     case KIND_TORI: {
         const Torus *torus = primitive;
-        double major = torus->center_major.w, minor = torus->axis_minor.w;
-        Vector3 reach = vector_scale(circle_reach(vector3_of(&torus->axis_minor)), major);
-        box_include(box, vector3_of(&torus->center_major), vector_add(reach, (Vector3){minor, minor, minor}));
+        Vector3 reach = vector_scale(circle_reach(vector3_of(&torus->axis_minor)), torus->center_major.w);
+        *box = bounds_around(vector3_of(&torus->center_major),
+                             vector_add(reach, vector_all(torus->axis_minor.w)));
         return true;
     }
     default:
@@ -78,7 +61,7 @@ bool primitive_box(size_t kind, const void *primitive, BvhBox *box)
 
 // The bounded primitives on their way into the tree.
 typedef struct {
-    BvhBox *boxes;
+    Bounds *boxes;
     uint8_t *kinds;
     uint32_t *places; // in their shapes' arrays
     size_t count;
@@ -91,7 +74,7 @@ static void bounded_collect(Bounded *bounded, const FlatScene *flat)
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         capacity += flat->arrays[FLAT_FIRST_SHAPE + kind].count;
     *bounded = (Bounded){
-        .boxes = memory_allocate(capacity + 1, sizeof(BvhBox)),
+        .boxes = memory_allocate(capacity + 1, sizeof(Bounds)),
         .kinds = memory_allocate(capacity + 1, 1),
         .places = memory_allocate(capacity + 1, sizeof(uint32_t)),
     };
@@ -154,7 +137,7 @@ static void array_reorder(FlatScene *flat, size_t kind, const Bvh *bvh, const Bo
     size_t count = 0;
     for (size_t i = 0; i < bvh->primitive_count; i++)
         if (bounded->kinds[bvh->order[i]] == kind) from[count++] = bounded->places[bvh->order[i]];
-    BvhBox box;
+    Bounds box;
     for (size_t i = 0; count < array->count; i++)
         if (!primitive_box(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
     array_permute(array, from);
@@ -164,42 +147,28 @@ static void array_reorder(FlatScene *flat, size_t kind, const Bvh *bvh, const Bo
         entries[flat_id(array, i)].kind_index_material.y = (uint32_t)i;
 }
 
-static BvhBox bvh_bounds(const Bvh *bvh)
-{
-    BvhBox bounds;
-    const BvhBox *left = &bvh->nodes[0].children[0].box, *right = &bvh->nodes[0].children[1].box;
-    for (int axis = 0; axis < 3; axis++) { // an empty child's box is inside out, and adds nothing
-        bounds.low[axis] = fmin(left->low[axis], right->low[axis]);
-        bounds.high[axis] = fmax(left->high[axis], right->high[axis]);
-    }
-    return bounds;
-}
-
 // Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
 // primitives there: the rest of an empty place is 0.
-static BvhBox empty_place(const BvhBox *bounds)
+static Bounds empty_place(const Bounds *bounds)
 {
-    BvhBox box;
-    for (int axis = 0; axis < 3; axis++) {
-        double extent = bounds->high[axis] - bounds->low[axis];
-        box.low[axis] = bounds->high[axis] + extent;
-        box.high[axis] = bounds->low[axis] - extent;
-    }
-    return box;
+    Vector3 extent = vector_subtract(bounds->max, bounds->min);
+    return (Bounds){vector_add(bounds->max, extent), vector_subtract(bounds->min, extent)};
 }
 
 static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
-                       const BvhBox *empty, unsigned width, void *node)
+                       const Bounds *empty, unsigned width, void *node)
 {
     double *planes = node;
     uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *what = first + width;
     uint32_t next_node = wide->first_node;
     for (unsigned i = 0; i < width; i++) {
         const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
-        const BvhBox *box = child ? &child->box : empty;
+        const Bounds *box = child ? &child->box : empty;
+        const double low[3] = {box->min.x, box->min.y, box->min.z};
+        const double high[3] = {box->max.x, box->max.y, box->max.z};
         for (unsigned axis = 0; axis < 3; axis++) {
-            planes[(BVH_LOW + axis) * width + i] = box->low[axis];
-            planes[(BVH_HIGH + axis) * width + i] = box->high[axis];
+            planes[(BVH_LOW + axis) * width + i] = low[axis];
+            planes[(BVH_HIGH + axis) * width + i] = high[axis];
         }
         if (child && child->count > 0) {
             first[i] = order[child->first];
@@ -219,7 +188,7 @@ static void nodes_write(FlatScene *flat, const Bvh *bvh, const Bounded *bounded,
     free(nodes->items);
     *nodes = flat_nodes_make(wide.node_count, width);
     uint32_t *order = order_in_kinds(bvh, bounded);
-    const BvhBox bounds = bvh_bounds(bvh), empty = empty_place(&bounds);
+    const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
     for (size_t i = 0; i < wide.node_count; i++)
         node_write(&wide.nodes[i], bvh, bounded, order, &empty, width, flat_array_at(nodes, i));
     free(order);
@@ -233,16 +202,13 @@ static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *boun
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)bounded->kind_counts[kind];
     memcpy(header->bounded_counts, counts, sizeof counts);
-    const BvhBox bounds = bvh_bounds(bvh);
-    const double *low = bounds.low, *high = bounds.high;
-    double center[3], reach = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        center[axis] = 0.5 * low[axis] + 0.5 * high[axis];
-        reach += 0.5 * high[axis] - 0.5 * low[axis];
-    }
-    header->bounds = (scalar4){center[0], center[1], center[2], reach};
-    header->bounds_low = (scalar4){low[0], low[1], low[2], 0};
-    header->bounds_high = (scalar4){high[0], high[1], high[2], 0};
+    const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]);
+    Vector3 low = bounds.min, high = bounds.max;
+    Vector3 half_low = vector_scale(low, 0.5), half_high = vector_scale(high, 0.5);
+    Vector3 center = vector_add(half_low, half_high), reach = vector_subtract(half_high, half_low);
+    header->bounds = (scalar4){center.x, center.y, center.z, reach.x + reach.y + reach.z};
+    header->bounds_low = (scalar4){low.x, low.y, low.z, 0};
+    header->bounds_high = (scalar4){high.x, high.y, high.z, 0};
 }
 
 void hierarchy_hang(FlatScene *flat, unsigned lanes)
@@ -266,7 +232,7 @@ void hierarchy_hang(FlatScene *flat, unsigned lanes)
 size_t hierarchy_bounded_count(const FlatScene *flat)
 {
     size_t count = 0;
-    BvhBox box;
+    Bounds box;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++)

@@ -14,4 +14,4 @@ size_t hierarchy_bounded_count(const FlatScene *flat);
 
 // The box of one primitive; false where it has none. A disc's is that of the ball around it: where the ray
 // lies nearly in its plane the kernels know no more about t.
-bool primitive_box(size_t kind, const void *primitive, BvhBox *box);
+bool primitive_box(size_t kind, const void *primitive, Bounds *box);

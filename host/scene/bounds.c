@@ -1,32 +1,8 @@
 #include "host/scene/scene.h"
 
-static Vector3 vector_min(Vector3 a, Vector3 b)
-{
-    return (Vector3){fmin(a.x, b.x), fmin(a.y, b.y), fmin(a.z, b.z)};
-}
-
-static Vector3 vector_max(Vector3 a, Vector3 b)
-{
-    return (Vector3){fmax(a.x, b.x), fmax(a.y, b.y), fmax(a.z, b.z)};
-}
-
-static Bounds bounds_empty(void)
-{
-    return (Bounds){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-}
-
-static Bounds bounds_join(Bounds a, Bounds b)
-{
-    return (Bounds){vector_min(a.min, b.min), vector_max(a.max, b.max)};
-}
-
-// A disc reaches as far along a coordinate axis as that axis' projection into the disc's plane is long:
-// sqrt(1 - n_x^2) for the unit normal n, here as the length of n's other components, which does not cancel.
 static Bounds disc_bounds(Vector3 center, Vector3 normal, double radius)
 {
-    Vector3 n = vector_normalize(normal);
-    Vector3 reach = vector_scale((Vector3){hypot(n.y, n.z), hypot(n.x, n.z), hypot(n.x, n.y)}, radius);
-    return (Bounds){vector_subtract(center, reach), vector_add(center, reach)};
+    return bounds_around(center, vector_scale(circle_reach(vector_normalize(normal)), radius));
 }
 
 // Sides without caps reach as far as the discs that end them.
@@ -50,18 +26,6 @@ static bool object_is_bounded(const Object *object)
     }
 }
 
-static Bounds sphere_bounds(Vector3 center, double radius)
-{
-    Vector3 reach = {radius, radius, radius};
-    return (Bounds){vector_subtract(center, reach), vector_add(center, reach)};
-}
-
-static Bounds triangle_bounds(const Vector3 vertices[3])
-{
-    return (Bounds){vector_min(vertices[0], vector_min(vertices[1], vertices[2])),
-                    vector_max(vertices[0], vector_max(vertices[1], vertices[2]))};
-}
-
 static Bounds mesh_bounds(const Mesh *mesh)
 {
     Bounds bounds = bounds_empty();
@@ -74,7 +38,7 @@ static Bounds object_bounds(const Scene *scene, const Object *object)
 {
     switch (object->kind) {
     case SHAPE_SPHERE:
-        return sphere_bounds(object->as.sphere.center, object->as.sphere.radius);
+        return bounds_around(object->as.sphere.center, vector_all(object->as.sphere.radius));
     case SHAPE_DISC:
         return disc_bounds(object->as.disc.center, object->as.disc.normal, object->as.disc.radius);
     case SHAPE_BOX:
@@ -86,12 +50,12 @@ static Bounds object_bounds(const Scene *scene, const Object *object)
         return frustum_bounds(object->as.cone.from, object->as.cone.axis, object->as.cone.radius[0],
                               object->as.cone.radius[1]);
     case SHAPE_TRIANGLE:
-        return triangle_bounds(object->as.triangle.vertices);
+        return bounds_of_triangle(object->as.triangle.vertices[0], object->as.triangle.vertices[1],
+                                  object->as.triangle.vertices[2]);
     case SHAPE_TORUS: {
-        double minor = object->as.torus.minor;
+        const Vector3 minor = vector_all(object->as.torus.minor);
         Bounds circle = disc_bounds(object->as.torus.center, object->as.torus.axis, object->as.torus.major);
-        return (Bounds){vector_subtract(circle.min, (Vector3){minor, minor, minor}),
-                        vector_add(circle.max, (Vector3){minor, minor, minor})};
+        return (Bounds){vector_subtract(circle.min, minor), vector_add(circle.max, minor)};
     }
     case SHAPE_MESH:
         return mesh_bounds(&scene->meshes.items[object->as.mesh.index]);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "host/base/message.h"
+#include "host/scene/bounds.h"
 #include "host/scene/vector.h"
 #include <stdbool.h>
 #include <stddef.h>
@@ -180,10 +181,6 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
 // Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32,
 // ior 1.5.
 Material material_default(void);
-
-typedef struct {
-    Vector3 min, max; // min > max: empty
-} Bounds;
 
 // How many ids an object takes: one for each triangle of a mesh, else one.
 size_t object_primitive_count(const Scene *scene, const Object *object);

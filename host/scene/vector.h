@@ -8,6 +8,11 @@ typedef struct {
     double x, y, z;
 } Vector3;
 
+static inline Vector3 vector_all(double component)
+{
+    return (Vector3){component, component, component};
+}
+
 static inline Vector3 vector_add(Vector3 a, Vector3 b)
 {
     return (Vector3){a.x + b.x, a.y + b.y, a.z + b.z};
@@ -21,6 +26,17 @@ static inline Vector3 vector_subtract(Vector3 a, Vector3 b)
 static inline Vector3 vector_scale(Vector3 a, double factor)
 {
     return (Vector3){a.x * factor, a.y * factor, a.z * factor};
+}
+
+// Of each component the lesser, or the greater.
+static inline Vector3 vector_min(Vector3 a, Vector3 b)
+{
+    return (Vector3){b.x < a.x ? b.x : a.x, b.y < a.y ? b.y : a.y, b.z < a.z ? b.z : a.z};
+}
+
+static inline Vector3 vector_max(Vector3 a, Vector3 b)
+{
+    return (Vector3){b.x > a.x ? b.x : a.x, b.y > a.y ? b.y : a.y, b.z > a.z ? b.z : a.z};
 }
 
 static inline double vector_dot(Vector3 a, Vector3 b)

@@ -1,0 +1,47 @@
+// Boxes along the axes.
+#pragma once
+
+#include "host/scene/vector.h"
+
+typedef struct {
+    Vector3 min, max; // min > max: empty
+} Bounds;
+
+static inline Bounds bounds_empty(void)
+{
+    return (Bounds){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+}
+
+static inline bool bounds_is_empty(const Bounds *bounds)
+{
+    return bounds->min.x > bounds->max.x;
+}
+
+static inline Bounds bounds_around(Vector3 center, Vector3 reach)
+{
+    return (Bounds){vector_subtract(center, reach), vector_add(center, reach)};
+}
+
+static inline Bounds bounds_join(Bounds a, Bounds b)
+{
+    return (Bounds){vector_min(a.min, b.min), vector_max(a.max, b.max)};
+}
+
+static inline Bounds bounds_of_triangle(Vector3 a, Vector3 b, Vector3 c)
+{
+    return (Bounds){vector_min(vector_min(a, b), c), vector_max(vector_max(a, b), c)};
+}
+
+static inline double bounds_half_area(Bounds bounds)
+{
+    Vector3 size = vector_subtract(bounds.max, bounds.min);
+    return size.x * size.y + size.y * size.z + size.z * size.x;
+}
+
+// How far a circle of radius 1 across the unit vector n reaches along each axis: as far as that axis'
+// projection into the circle's plane is long, sqrt(1 - n_x^2), here as the length of n's other components,
+// which does not cancel.
+static inline Vector3 circle_reach(Vector3 n)
+{
+    return (Vector3){hypot(n.y, n.z), hypot(n.x, n.z), hypot(n.x, n.y)};
+}
