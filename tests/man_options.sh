@@ -5,7 +5,7 @@ cd "$(dirname "$0")/.."
 GLINT=${GLINT:-build/glint}
 "$GLINT" --version >/dev/null
 
-# Options that stand in the text, one a line; all but -h and --help, which every subcommand has.
+# Options that stand in the text, one a line; all but -h and --help, which are looked for on their own.
 options() {
     { grep -oE '(^|[^a-zA-Z=-])--?[a-zA-Z][a-z-]*' || true; } | sed 's/^[^-]*//; /^-h$/d; /^--help$/d' | sort -u
 }
@@ -39,6 +39,14 @@ for subcommand in $subcommands; do
         failed=1
         continue
     fi
+    last=$("$GLINT" "$subcommand" --help | tail -n 1)
+    case $last in
+    '  -h, --help  '*) ;;
+    *)
+        echo "glint $subcommand --help ends with '$last', not with -h, --help"
+        failed=1
+        ;;
+    esac
     for place in man bash zsh fish; do
         if ! difference=$(diff <(echo "$help") <("in_$place" "$subcommand")); then
             echo "glint $subcommand: --help (<) and $place (>) differ:"

@@ -34,14 +34,12 @@ static const char help_text[] =
     "usage: glint accuracy SCENE... [OPTIONS]\n\n"
     "Renders each scene in each way asked for, and tells the times beside the errors against a reference.\n\n"
     "      --reference FILE  linear colors to compare with, .exr or .npy (default: the device's own picture "
-    "at "
-    "double)\n"
+    "at double)\n"
     "      --samples LIST    per pixel, each on its own; the reference takes the most of them (default: 1)\n"
-    "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
     "      --save FOLDER     write all that is compared there, as .npy\n"
-    "      --json            for programs\n"
     "      --html FILE       a page with plots and pictures, that needs nothing but itself\n"
-    "      --precision LIST  of fast, single, strict, double (default: all of them)\n";
+    "      --precision LIST  of fast, single, strict, double (default: all of them)\n" //
+    HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
@@ -81,17 +79,12 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
     }
 }
 
-// EXIT_DONE: go on. *helped: the help was printed, stop.
-static int options_read(AccuracyOptions *options, int argument_count, char **arguments, bool *helped)
+static int options_read(AccuracyOptions *options, int argument_count, char **arguments)
 {
     *options = (AccuracyOptions){.variants = variant_options_default};
     options->variants.precisions = (1u << PRECISION_COUNT) - 1;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') {
-            printf("%s%s%s", help_text, variant_options_help, perturb_option_help);
-            *helped = true;
-            return EXIT_DONE;
-        }
+        if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
     if (optind == argument_count) return option_usage_fault("accuracy", "which scenes?");
@@ -99,7 +92,7 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
         return option_usage_fault("accuracy", "--html takes a file's name");
     if (options->reference_path && optind + 1 != argument_count)
         return option_usage_fault("accuracy", "a reference is for one scene");
-    return EXIT_DONE;
+    return OPTIONS_READ;
 }
 
 // Before anything is measured. False: told why.
@@ -321,9 +314,8 @@ static void accuracy_close(Accuracy *accuracy)
 int command_accuracy(int argument_count, char **arguments)
 {
     Accuracy accuracy = {0};
-    bool helped = false;
-    int status = options_read(&accuracy.options, argument_count, arguments, &helped);
-    if (status != EXIT_DONE || helped) return status;
+    int status = options_read(&accuracy.options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     const AccuracyOptions *options = &accuracy.options;
     const size_t scene_count = (size_t)(argument_count - optind);
     status = EXIT_USER;

@@ -1,6 +1,6 @@
 #include "host/cli/accuracy_report.h"
 
-#include "host/cli/bench_json.h"
+#include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <inttypes.h>
 #include <math.h>
@@ -231,7 +231,7 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
         json_integer(json, "lanes", scene->reference.lanes);
         json_text(json, "bvh", scene->reference.bvh);
         json_integer(json, "samples", scene->reference.samples);
-        kernel_hash_json(json, scene->reference.kernel_hash);
+        hash_json(json, "kernel_hash", scene->reference.kernel_hash);
     }
     json_integer(json, "nonfinite", (int64_t)scene->reference.nonfinite);
     json_integer(json, "negative", (int64_t)scene->reference.negative);
@@ -379,7 +379,7 @@ static void variant_json(Json *json, const AccuracyReport *report, size_t scene,
     if (variant->status == ACCURACY_UNAVAILABLE) json_text(json, "reason", variant->row->failure);
     if (variant->status == ACCURACY_REFERENCE) json_text(json, "reason", is_reference);
     if (variant->status != ACCURACY_UNAVAILABLE) {
-        kernel_hash_json(json, variant->row->kernel_hash);
+        hash_json(json, "kernel_hash", variant->row->kernel_hash);
         times_json(json, variant->row);
         rays_json(json, variant->row);
         saved_json(json, report, scene, variant);
@@ -442,12 +442,7 @@ Json *accuracy_json(const AccuracyReport *report)
     json_begin_object(json, "device");
     device_json(json, report->device);
     json_end(json);
-    if (report->perturb_seed > 0) {
-        json_begin_object(json, "perturb");
-        json_integer(json, "seed", report->perturb_seed);
-        json_integer(json, "scale", report->perturb_scale);
-        json_end(json);
-    }
+    perturb_json(json, report->perturb_seed, report->perturb_scale);
     json_begin_array(json, "scenes");
     for (size_t i = 0; i < report->scene_count; i++)
         scene_json(json, report, i);

@@ -24,12 +24,12 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint bench SCENE... [OPTIONS]\n\n"
     "Renders each scene in each way asked for, all in turn, and tells the times.\n\n"
-    "      --json            for programs\n"
     "      --compare FILE    hold the times against those of an earlier report (--json); exit status 3 where "
     "one is slower\n"
     "      --tolerance R     new over old that still passes (default: 1.1)\n"
     "      --launches        list the launches of each row's last run\n"
-    "      --precision LIST  of fast, single, strict, double (default: single)\n";
+    "      --precision LIST  of fast, single, strict, double (default: single)\n" //
+    HELP_VARIANTS HELP_JSON HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
@@ -128,10 +128,7 @@ int command_bench(int argument_count, char **arguments)
         .options = {.variants = variant_options_default, .tolerance = 1.1},
     };
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') {
-            printf("%s%s", help_text, variant_options_help);
-            return EXIT_DONE;
-        }
+        if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(&bench.options, option, optarg)) return EXIT_USER;
     }
     if (optind == argument_count) return option_usage_fault("bench", "which scenes?");

@@ -1,6 +1,6 @@
 #include "host/cli/bench_report.h"
 
-#include "host/cli/bench_json.h"
+#include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <inttypes.h>
 #include <stdio.h>
@@ -182,7 +182,7 @@ static void ratio_json(Json *json, Ratio ratio, double tolerance)
 
 static void results_json(Json *json, const BenchReport *report, const BenchRow *row)
 {
-    kernel_hash_json(json, row->kernel_hash);
+    hash_json(json, "kernel_hash", row->kernel_hash);
     times_json(json, row);
     json_begin_object(json, "build_ms");
     figure_json(json, "cold", 1e3, row->build_cold);

@@ -22,9 +22,8 @@ static const char help_text[] =
     "usage: glint check SCENE [OPTIONS]\n\n"
     "Says how many objects, lights and materials a scene has, where it lies, which parts of the kernel it "
     "needs,\n"
-    "and what was tolerated in it.\n\n"
-    "      --json            for programs\n"
-    "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
+    "and what was tolerated in it.\n\n" //
+    HELP_JSON HELP_LENIENT HELP_HELP;
 
 typedef struct {
     size_t shapes[SHAPE_COUNT], mesh_triangle_count, unbounded_count;
@@ -157,8 +156,7 @@ int command_check(int argument_count, char **arguments)
             scene_options.lenient = true;
             break;
         case 'h':
-            fputs(help_text, stdout);
-            return EXIT_DONE;
+            return option_help(help_text);
         default:
             return EXIT_USER;
         }

@@ -20,9 +20,8 @@ static const struct option long_options[] = {
 
 static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
                                 "Lists every OpenCL device of every platform; * marks the one that is used "
-                                "unless --device says otherwise.\n\n"
-                                "      --json            for programs\n"
-                                "  -h, --help            this text\n";
+                                "unless --device says otherwise.\n\n" //
+    HELP_JSON HELP_HELP;
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
@@ -150,10 +149,7 @@ int command_devices(int argument_count, char **arguments)
     bool as_json = false;
     optind = 1;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') {
-            fputs(help_text, stdout);
-            return EXIT_DONE;
-        }
+        if (option == 'h') return option_help(help_text);
         if (option != OPTION_JSON) return EXIT_USER;
         as_json = true;
     }

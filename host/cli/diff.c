@@ -1,9 +1,9 @@
 // glint diff: how far apart two pictures are.
 #include "host/base/fault.h"
-#include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/cli/report_json.h"
 #include "host/measure/flip.h"
 #include "host/measure/heatmap.h"
 #include "host/measure/image_metrics.h"
@@ -24,9 +24,7 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint diff REFERENCE PICTURE [OPTIONS]\n\n"
     "Compares two pictures (PNG, PPM, EXR or NPY) of one size and kind. Exit status 0: equal; 3: not.\n\n"
-    "      --heatmap FILE    a picture of the differences: .png, .ppm, .exr or .npy\n"
-    "      --json            for programs\n"
-    "  -h, --help            this text\n";
+    "      --heatmap FILE    a picture of the differences: .png, .ppm, .exr or .npy\n" HELP_JSON HELP_HELP;
 
 typedef struct {
     const char *reference_path, *test_path, *heatmap_path;
@@ -60,10 +58,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_integer(json, "schema", 1);
     json_text(json, "reference", options->reference_path);
     json_text(json, "picture", options->test_path);
-    json_begin_array(json, "size");
-    json_integer(json, NULL, reference->width);
-    json_integer(json, NULL, reference->height);
-    json_end(json);
+    size_json(json, reference->width, reference->height);
     json_integer(json, "channels", reference->channels);
     json_text(json, "kind", reference->display ? "display" : "linear");
     json_boolean(json, "equal", metrics->differing_count == 0);
@@ -184,8 +179,7 @@ int command_diff(int argument_count, char **arguments)
             options.as_json = true;
             break;
         case 'h':
-            fputs(help_text, stdout);
-            return EXIT_DONE;
+            return option_help(help_text);
         default:
             return EXIT_USER;
         }

@@ -8,20 +8,8 @@
 #include <string.h>
 #include <strings.h>
 
-const char common_options_help[] =
-    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
-    "else a CPU)\n"
-    "      --precision P     fast, single, strict or double (default: single)\n"
-    "      --lanes N         rays a work-item carries at once: 1, 4, 8 or 16 (default: the device's own)\n"
-    "      --bvh B           auto, on or off: rays through a hierarchy; the picture is the same (default: "
-    "auto)\n"
-    "      --no-cache        build the kernels anew and keep nothing\n"
-    "      --lenient         skip what .rt files hold beyond the format, with a warning\n";
-
-const char perturb_option_help[] =
-    "      --perturb SEED[:SCALE]\n"
-    "                        err in divisions, roots and powers as other devices may, SCALE times as much "
-    "(default: 1)\n";
+const char *const lanes_choice_names[LANES_CHOICE_COUNT] = {"1", "4", "8", "16"};
+const uint32_t lanes_choice_values[LANES_CHOICE_COUNT] = {1, 4, 8, 16};
 
 // Decimal digits only; *end is left behind them.
 static bool digits_read(const char *value, const char **end, uint64_t *result)
@@ -141,13 +129,10 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
         *valid = option_choice("precision", value, precision_names, PRECISION_COUNT, &choice);
         common->precision = (Precision)choice;
         return true;
-    case OPTION_LANES: {
-        static const char *const names[] = {"1", "4", "8", "16"};
-        static const uint32_t lanes[] = {1, 4, 8, 16};
-        *valid = option_choice("lanes", value, names, 4, &choice);
-        common->lanes = lanes[choice];
+    case OPTION_LANES:
+        *valid = option_choice("lanes", value, lanes_choice_names, LANES_CHOICE_COUNT, &choice);
+        common->lanes = lanes_choice_values[choice];
         return true;
-    }
     case OPTION_BVH:
         *valid = option_choice("bvh", value, bvh_choice_names, BVH_CHOICE_COUNT, &choice);
         common->bvh = (BvhChoice)choice;
@@ -164,6 +149,12 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     default:
         return false;
     }
+}
+
+int option_help(const char *text)
+{
+    fputs(text, stdout);
+    return EXIT_DONE;
 }
 
 int option_usage_fault(const char *command, const char *what)
@@ -187,6 +178,23 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
     bool loaded = scene_load(scene, path, &(SceneOptions){.lenient = common->lenient}, &messages);
     messages_tell(&messages, path);
     return loaded;
+}
+
+RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height)
+{
+    return (RenderSettings){
+        .width = width,
+        .height = height,
+        .region_width = width,
+        .region_height = height,
+        .sample_count = 1,
+        .precision = common->precision,
+        .lanes = common->lanes,
+        .bvh = common->bvh,
+        .no_cache = common->no_cache,
+        .perturb_seed = common->perturb_seed,
+        .perturb_scale = common->perturb_scale,
+    };
 }
 
 void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)

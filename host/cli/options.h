@@ -45,10 +45,37 @@ enum {
         "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
     }
 
-extern const char common_options_help[];
-extern const char perturb_option_help[];
+// A line of help for each option that several subcommands have; a subcommand's text ends with HELP_HELP.
+#define HELP_DEVICE                                                                                          \
+    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "  \
+    "else a CPU)\n"
+#define HELP_LANES                                                                                           \
+    "      --lanes N         rays a work-item carries at once: 1, 4, 8 or 16 (default: the device's own)\n"
+#define HELP_BOUNCES  "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
+#define HELP_NO_CACHE "      --no-cache        build the kernels anew and keep nothing\n"
+#define HELP_LENIENT  "      --lenient         skip what .rt files hold beyond the format, with a warning\n"
+#define HELP_PERTURB                                                                                         \
+    "      --perturb SEED[:SCALE]\n"                                                                         \
+    "                        err in divisions, roots and powers as other devices may, SCALE times as much "  \
+    "(default: 1)\n"
+#define HELP_JSON "      --json            for programs\n"
+#define HELP_HELP "  -h, --help            this text\n"
 
-enum { PICTURE_SIDE_LARGEST = 1 << 20 }; // pixels
+// Of COMMON_LONG_OPTIONS.
+#define HELP_COMMON                                                                                          \
+    HELP_DEVICE                                                                                              \
+    "      --precision P     fast, single, strict or double (default: single)\n" HELP_LANES                  \
+    "      --bvh B           auto, on or off: rays through a hierarchy; the picture is the same "            \
+    "(default: auto)\n" HELP_NO_CACHE HELP_LENIENT
+
+enum { PICTURE_SIDE_LARGEST = 1 << 20, SAMPLES_LARGEST = 1 << 20, BOUNCES_LARGEST = 16, BOUNCES_DEFAULT = 5 };
+
+enum { LANES_CHOICE_COUNT = 4 };
+extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
+extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
+
+// What reading a command line gives where the subcommand is to go on; else it gives the exit status.
+enum { OPTIONS_READ = -1 };
 
 // Each reads one value; on a fault it tells the user what is wrong with `option` and returns false.
 bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
@@ -63,6 +90,8 @@ bool option_set(const char *option, const char *value, const char *const *names,
 // ones.
 bool option_common(CommonOptions *common, int option, const char *value, bool *valid);
 
+// Prints what --help asks for; returns EXIT_DONE.
+int option_help(const char *text);
 // Says that the command line of a subcommand is wrong in general, pointing to its help; returns EXIT_USER.
 int option_usage_fault(const char *command, const char *what);
 
@@ -70,6 +99,9 @@ int option_usage_fault(const char *command, const char *what);
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
 // Prints and frees messages; a fault in an .rt file is headed by the line that miniRT's testers look for.
 void messages_tell(MessageList *messages, const char *path);
+
+// A whole picture as the common options have it: one sample, no bounces, the scene as it is.
+RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height);
 
 // A picture's size where the user gave none (width 0): the scene's own, else 1280 wide at the frame's shape
 // or 16:9.

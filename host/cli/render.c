@@ -53,8 +53,8 @@ static const char help_text[] =
     "      --timing[=json]   tell the time of every stage and launch\n"
     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
-    "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
-    "      --quiet           no progress\n";
+    "      --quiet           no progress\n" //
+    HELP_BOUNCES HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -99,7 +99,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     case OPTION_SIZE:
         return option_size("size", value, &options->width, &options->height);
     case OPTION_SAMPLES:
-        return option_count("samples", value, 1, 1u << 20, &options->sample_count);
+        return option_count("samples", value, 1, SAMPLES_LARGEST, &options->sample_count);
     case OPTION_REGION:
         options->has_region = true;
         return region_read(value, options->region);
@@ -117,7 +117,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         options->picture.bits = choice == 0 ? 8 : 16;
         return true;
     case OPTION_BOUNCES:
-        return option_count("bounces", value, 0, 16, &options->bounce_count);
+        return option_count("bounces", value, 0, BOUNCES_LARGEST, &options->bounce_count);
     case OPTION_QUIET:
         options->quiet = true;
         return true;
@@ -126,25 +126,22 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     }
 }
 
-// EXIT_DONE: go on. *helped: the help was printed, stop.
-static int options_read(RenderOptions *options, int argument_count, char **arguments, bool *helped)
+static int options_read(RenderOptions *options, int argument_count, char **arguments)
 {
-    *options = (RenderOptions){
-        .common.precision = PRECISION_SINGLE, .sample_count = 1, .bounce_count = 5, .picture.bits = 8};
+    *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
+                               .sample_count = 1,
+                               .bounce_count = BOUNCES_DEFAULT,
+                               .picture.bits = 8};
     int option;
     while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
-        if (option == 'h') {
-            printf("%s%s%s", help_text, common_options_help, perturb_option_help);
-            *helped = true;
-            return EXIT_DONE;
-        }
+        if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
     if (optind + 1 != argument_count)
         return option_usage_fault("render",
                                   optind == argument_count ? "which scene?" : "one scene at a time");
     options->scene = arguments[optind];
-    return EXIT_DONE;
+    return OPTIONS_READ;
 }
 
 static bool settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
@@ -160,24 +157,15 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
                 region[0], region[1], region[2], region[3], options->width, options->height);
         return false;
     }
-    *settings = (RenderSettings){
-        .width = options->width,
-        .height = options->height,
-        .region_x = region[0],
-        .region_y = region[1],
-        .region_width = region[2],
-        .region_height = region[3],
-        .sample_count = options->sample_count,
-        .precision = options->common.precision,
-        .lanes = options->common.lanes,
-        .bvh = options->common.bvh,
-        .bounce_count = options->bounce_count,
-        .shift_to_eye = true,
-        .stop = progress_interrupted,
-        .no_cache = options->common.no_cache,
-        .perturb_seed = options->common.perturb_seed,
-        .perturb_scale = options->common.perturb_scale,
-    };
+    *settings = settings_whole(&options->common, options->width, options->height);
+    settings->region_x = region[0];
+    settings->region_y = region[1];
+    settings->region_width = region[2];
+    settings->region_height = region[3];
+    settings->sample_count = options->sample_count;
+    settings->bounce_count = options->bounce_count;
+    settings->shift_to_eye = true;
+    settings->stop = progress_interrupted;
     return true;
 }
 
@@ -237,9 +225,8 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
 int command_render(int argument_count, char **arguments)
 {
     RenderOptions options;
-    bool helped = false;
-    int status = options_read(&options, argument_count, arguments, &helped);
-    if (status != EXIT_DONE || helped) return status;
+    int status = options_read(&options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     char *default_path = picture_default_path(options.scene);
     if (!options.picture.path) options.picture.path = default_path;
 

@@ -1,7 +1,7 @@
 #include "host/cli/timing.h"
 
-#include "host/base/json.h"
 #include "host/cli/options.h"
+#include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <stdio.h>
 #include <string.h>
@@ -119,16 +119,11 @@ static void json_report(const RenderReport *report, const Device *device, const 
     json_text(json, "platform", device->platform_name);
     json_text(json, "driver", device->driver);
     json_end(json);
-    json_begin_array(json, "size");
-    json_integer(json, NULL, settings->region_width);
-    json_integer(json, NULL, settings->region_height);
-    json_end(json);
+    size_json(json, settings->region_width, settings->region_height);
     json_integer(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     json_integer(json, "lanes", report->lanes);
-    char hash[17];
-    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)report->kernel_hash);
-    json_text(json, "kernel", hash);
+    hash_json(json, "kernel", report->kernel_hash);
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
     if (report->features & FEATURE_BVH)

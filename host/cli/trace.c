@@ -24,14 +24,16 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
-                                "Writes object,t,nx,ny,nz for each ray; an empty object is a miss. Scene and "
-                                "rays are taken as they are,\n"
-                                "each number rounded once to the precision.\n\n"
-                                "      --rays FILE       one ray a line: ox oy oz dx dy dz [tmin tmax], "
-                                "decimal or C's hexadecimal; - is the\n"
-                                "                        standard input; # begins a comment\n"
-                                "  -o, --output FILE     the CSV (default: the standard output)\n";
+static const char help_text[] =
+    "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+    "Writes object,t,nx,ny,nz for each ray; an empty object is a miss. Scene and rays are taken as they "
+    "are,\n"
+    "each number rounded once to the precision.\n\n"
+    "      --rays FILE       one ray a line: ox oy oz dx dy dz [tmin tmax], decimal or C's hexadecimal; - is "
+    "the\n"
+    "                        standard input; # begins a comment\n"
+    "  -o, --output FILE     the CSV (default: the standard output)\n" //
+    HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -147,19 +149,7 @@ static bool hits_write(const char *path, const ProbeHit *hits, size_t count, boo
 
 static int rays_trace(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
 {
-    RenderSettings settings = {
-        .width = 1,
-        .height = 1,
-        .region_width = 1,
-        .region_height = 1,
-        .sample_count = 1,
-        .precision = options->common.precision,
-        .lanes = options->common.lanes,
-        .bvh = options->common.bvh,
-        .no_cache = options->common.no_cache,
-        .perturb_seed = options->common.perturb_seed,
-        .perturb_scale = options->common.perturb_scale,
-    };
+    const RenderSettings settings = settings_whole(&options->common, 1, 1);
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     messages_tell(&messages, NULL);
@@ -172,17 +162,13 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     return written ? EXIT_DONE : EXIT_USER;
 }
 
-static int options_read(TraceOptions *options, int argument_count, char **arguments, bool *helped)
+static int options_read(TraceOptions *options, int argument_count, char **arguments)
 {
     *options = (TraceOptions){.common.precision = PRECISION_SINGLE, .output = "-"};
     int option;
     bool valid;
     while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
-        if (option == 'h') {
-            printf("%s%s%s", help_text, common_options_help, perturb_option_help);
-            *helped = true;
-            return EXIT_DONE;
-        }
+        if (option == 'h') return option_help(help_text);
         if (option == '?') return EXIT_USER;
         if (option == OPTION_RAYS)
             options->rays = optarg;
@@ -195,15 +181,14 @@ static int options_read(TraceOptions *options, int argument_count, char **argume
         return option_usage_fault("trace", optind == argument_count ? "which scene?" : "one scene at a time");
     if (!options->rays) return option_usage_fault("trace", "which rays? name a file with --rays");
     options->scene = arguments[optind];
-    return EXIT_DONE;
+    return OPTIONS_READ;
 }
 
 int command_trace(int argument_count, char **arguments)
 {
     TraceOptions options;
-    bool helped = false;
-    int status = options_read(&options, argument_count, arguments, &helped);
-    if (status != EXIT_DONE || helped) return status;
+    int status = options_read(&options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     Scene scene = {0};
     RayList rays = {0};
     OpenDevice open;

@@ -8,22 +8,9 @@
 #include <string.h>
 
 const VariantOptions variant_options_default = {
-    .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO, .bounce_count = 5};
+    .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO, .bounce_count = BOUNCES_DEFAULT};
 
-const char variant_options_help[] =
-    "      --lanes LIST      of 1, 4, 8, 16 (default: the device's own)\n"
-    "      --bvh LIST        of auto, on, off (default: auto)\n"
-    "      --size WxH        of the pictures (default: as glint render has it)\n"
-    "      --seconds MAX     stop measuring after so long, settled or not (default: 5 for each row)\n"
-    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
-    "else a CPU)\n"
-    "      --lenient         skip what .rt files hold beyond the format, with a warning\n"
-    "  -h, --help            this text\n";
-
-// The lanes that are asked for: a bit for each of these.
-static const char *const lanes_names[] = {"1", "4", "8", "16"};
-static const uint32_t lanes_values[] = {1, 4, 8, 16};
-enum { LANES_CHOICE_COUNT = 4, WARM_UP_RUNS = 3, ENOUGH_RUNS = 20, SAMPLES_LARGEST = 1 << 20 };
+enum { WARM_UP_RUNS = 3, ENOUGH_RUNS = 20 };
 
 bool option_positive(const char *option, const char *value, double *result)
 {
@@ -66,7 +53,7 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
         *valid = option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
         return true;
     case OPTION_LANES:
-        *valid = option_set("lanes", value, lanes_names, LANES_CHOICE_COUNT, &options->lanes);
+        *valid = option_set("lanes", value, lanes_choice_names, LANES_CHOICE_COUNT, &options->lanes);
         return true;
     case OPTION_BVH:
         *valid = option_set("bvh", value, bvh_choice_names, BVH_CHOICE_COUNT, &options->bvhs);
@@ -81,7 +68,7 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
         *valid = option_samples(options, value);
         return true;
     case OPTION_BOUNCES:
-        *valid = option_count("bounces", value, 0, 16, &options->bounce_count);
+        *valid = option_count("bounces", value, 0, BOUNCES_LARGEST, &options->bounce_count);
         return true;
     default:
         return option_common(&options->common, option, value, valid);
@@ -102,16 +89,9 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
 {
     uint32_t width = options->width, height = options->height;
     picture_size_choose(&set->scenes[scene_index], &width, &height);
-    RenderSettings settings = {
-        .width = width,
-        .height = height,
-        .region_width = width,
-        .region_height = height,
-        .bounce_count = options->bounce_count,
-        .perturb_seed = options->common.perturb_seed,
-        .perturb_scale = options->common.perturb_scale,
-        .shift_to_eye = true,
-    };
+    RenderSettings settings = settings_whole(&options->common, width, height);
+    settings.bounce_count = options->bounce_count;
+    settings.shift_to_eye = true;
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
         for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
@@ -121,7 +101,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
                     // where no lanes are asked for, once with the device's own
                     if (options->lanes ? !(options->lanes >> lanes & 1) : lanes > 0) continue;
                     settings.precision = (Precision)precision;
-                    settings.lanes = options->lanes ? lanes_values[lanes] : 0;
+                    settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
                     settings.bvh = (BvhChoice)bvh;
                     settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
                     variant_add(set, path, scene_index, &settings);

@@ -39,7 +39,13 @@ enum {
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
 
-extern const char variant_options_help[]; // of those, but for --precision, whose default differs
+// Of those, but for --precision, whose default differs.
+#define HELP_VARIANTS                                                                                        \
+    "      --lanes LIST      of 1, 4, 8, 16 (default: the device's own)\n"                                   \
+    "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
+    "      --size WxH        of the pictures (default: as glint render has it)\n"                            \
+    "      --seconds MAX     stop measuring after so long, settled or not (default: 5 for each "             \
+    "row)\n" HELP_DEVICE HELP_LENIENT
 
 // Takes one of them; *valid tells whether its value was one, else the user is told. False if `option` is
 // none.

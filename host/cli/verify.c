@@ -4,10 +4,10 @@
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
-#include "host/cli/bench_json.h"
 #include "host/cli/commands.h"
 #include "host/cli/layers.h"
 #include "host/cli/options.h"
+#include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include "host/render/camera_basis.h"
 #include <getopt.h>
@@ -35,15 +35,10 @@ static const char help_text[] =
     "usage: glint verify [CASE...] [OPTIONS]\n\n"
     "Runs the hard cases, or those named, on a device and holds each to its bound; exit status 3 if any "
     "fails.\n\n"
-    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "
-    "else a "
-    "CPU)\n"
     "      --precision P     fast, single, strict or double (default: all that the device has)\n"
-    "      --lanes N         rays a work-item carries at once: 1, 4, 8 or 16 (default: the device's own)\n"
-    "      --no-cache        build the kernels anew and keep nothing\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
-    "compiler\n"
-    "      --json            the results as JSON\n";
+    "compiler\n" //
+    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -68,22 +63,13 @@ static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hi
 {
     bool picture = width > 0;
     const FeatureSet lean_features = picture ? 0 : FEATURE_REFLECTION | FEATURE_TRANSMISSION;
-    RenderSettings settings = {
-        .width = picture ? width : 1,
-        .height = picture ? height : 1,
-        .region_width = picture ? width : 1,
-        .region_height = picture ? height : 1,
-        .bounce_count = picture ? 5 : 0,
-        .shift_to_eye = picture,
-        .sample_count = 1,
-        .precision = prober->precision,
-        .lanes = prober->options->common.lanes,
-        .bvh = hierarchy ? BVH_ON : BVH_OFF,
-        .no_cache = prober->options->common.no_cache,
-        .perturb_seed = prober->options->common.perturb_seed,
-        .perturb_scale = prober->options->common.perturb_scale,
-        .extra_features = prober->options->lean ? lean_features : FEATURE_ALL,
-    };
+    RenderSettings settings =
+        settings_whole(&prober->options->common, picture ? width : 1, picture ? height : 1);
+    settings.precision = prober->precision;
+    settings.bvh = hierarchy ? BVH_ON : BVH_OFF;
+    settings.bounce_count = picture ? BOUNCES_DEFAULT : 0;
+    settings.shift_to_eye = picture;
+    settings.extra_features = prober->options->lean ? lean_features : FEATURE_ALL;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
     messages_tell(&messages, NULL);
@@ -169,13 +155,6 @@ static void result_tell(const VerifyResult *result, const Report *report)
     fflush(stdout);
 }
 
-static void hash_add_json(Json *json, const char *key, uint64_t hash)
-{
-    char digits[17];
-    snprintf(digits, sizeof digits, "%016" PRIx64, hash);
-    json_text(json, key, digits);
-}
-
 static void result_add_json(Json *json, const VerifyResult *result, double seconds)
 {
     json_begin_object(json, NULL);
@@ -194,7 +173,7 @@ static void result_add_json(Json *json, const VerifyResult *result, double secon
     json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
     json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
     if (result->bound > 0) json_text(json, "unit", result->unit);
-    hash_add_json(json, "hash", result->hash);
+    hash_json(json, "hash", result->hash);
     json_number(json, "seconds", seconds);
     json_end(json);
 }
@@ -245,8 +224,8 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     if (json) {
         json_end(json);
         json_integer(json, "lanes", prober.lanes);
-        hash_add_json(json, "trace_kernel", prober.trace_kernel);
-        hash_add_json(json, "render_kernel", prober.render_kernel);
+        hash_json(json, "trace_kernel", prober.trace_kernel);
+        hash_json(json, "render_kernel", prober.render_kernel);
         json_integer(json, "held", (int64_t)report.held);
         json_integer(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
@@ -269,12 +248,7 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
     json_begin_object(json, "device");
     device_json(json, device);
     json_end(json);
-    if (common->perturb_seed > 0) {
-        json_begin_object(json, "perturb");
-        json_integer(json, "seed", common->perturb_seed);
-        json_integer(json, "scale", common->perturb_scale);
-        json_end(json);
-    }
+    perturb_json(json, common->perturb_seed, common->perturb_scale);
 }
 
 static int device_verify(Compute *compute, const VerifyOptions *options)
@@ -306,17 +280,13 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
 }
 
-static int options_read(VerifyOptions *options, int argument_count, char **arguments, bool *helped)
+static int options_read(VerifyOptions *options, int argument_count, char **arguments)
 {
     *options = (VerifyOptions){.every_precision = true};
     int option;
     bool valid;
     while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
-        if (option == 'h') {
-            printf("%s%s", help_text, perturb_option_help);
-            *helped = true;
-            return EXIT_DONE;
-        }
+        if (option == 'h') return option_help(help_text);
         if (option == '?') return EXIT_USER;
         if (option == OPTION_PRECISION) options->every_precision = false;
         if (option == OPTION_JSON)
@@ -333,15 +303,14 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
                     options->cases.names[i]);
             return EXIT_USER;
         }
-    return EXIT_DONE;
+    return OPTIONS_READ;
 }
 
 int command_verify(int argument_count, char **arguments)
 {
     VerifyOptions options;
-    bool helped = false;
-    int status = options_read(&options, argument_count, arguments, &helped);
-    if (status != EXIT_DONE || helped) return status;
+    int status = options_read(&options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     OpenDevice open;
     if (!device_open(&open, options.common.device)) return EXIT_USER;
     status = device_verify(&open.compute, &options);

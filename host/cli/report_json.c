@@ -1,4 +1,4 @@
-#include "host/cli/bench_json.h"
+#include "host/cli/report_json.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -50,11 +50,20 @@ void size_json(Json *json, uint32_t width, uint32_t height)
     json_end(json);
 }
 
-void kernel_hash_json(Json *json, uint64_t hash)
+void hash_json(Json *json, const char *key, uint64_t hash)
 {
     char digits[17];
     snprintf(digits, sizeof digits, "%016" PRIx64, hash);
-    json_text(json, "kernel_hash", digits);
+    json_text(json, key, digits);
+}
+
+void perturb_json(Json *json, uint32_t seed, uint32_t scale)
+{
+    if (seed == 0) return;
+    json_begin_object(json, "perturb");
+    json_integer(json, "seed", seed);
+    json_integer(json, "scale", scale);
+    json_end(json);
 }
 
 void times_json(Json *json, const BenchRow *row)

@@ -1,4 +1,4 @@
-// Parts of the JSON that the reports of times share.
+// Parts of the JSON that several reports share.
 #pragma once
 
 #include "host/base/json.h"
@@ -11,6 +11,7 @@ void unavailable_json(Json *json, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
 void device_json(Json *json, const Device *device); // what it is, into the object that is open
 void size_json(Json *json, uint32_t width, uint32_t height);
-void kernel_hash_json(Json *json, uint64_t hash);
+void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
+void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0
 void times_json(Json *json, const BenchRow *row); // frame_ms, kernel_ms and the clock of the latter
 void rays_json(Json *json, const BenchRow *row);  // rays, mrays_per_s
