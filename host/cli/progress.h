@@ -10,6 +10,7 @@ typedef struct {
 
 // From here on an interrupt or a request to end is noted, not obeyed at once; a second one ends the process.
 void progress_open(Progress *progress, bool quiet);
+// `fraction_done` is above 0 and at most 1, which is all; from it and the time spent follows the time left.
 void progress_show(Progress *progress, double fraction_done);
-void progress_close(Progress *progress); // wipes the line
+void progress_close(Progress *progress); // wipes the line; signals are noted as before
 bool progress_interrupted(void);

@@ -159,7 +159,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
     while (spent < bound && !all_settled(set)) {
         if (!round_run(set, false)) return false;
         spent = clock_seconds() - start;
-        progress_show(progress, spent / bound);
+        progress_show(progress, fmin(spent / bound, 1));
     }
     for (size_t i = 0; i < set->count; i++)
         if (set->variants[i].renderer)

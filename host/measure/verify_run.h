@@ -50,7 +50,9 @@ static inline bool verify_is_wide(const VerifyRun *run)
 
 double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1
 double verify_ulp(const VerifyRun *run, double value);
-double verify_rounded(const VerifyRun *run, double value);
+double verify_rounded(const VerifyRun *run, double value); // to the precision at work
+// Rounds the ray's numbers as the renderer will, so that exact answers are of the same ray; a tmax beyond the
+// precision's range becomes the largest number in it.
 void verify_round_ray(const VerifyRun *run, ProbeRay *ray);
 
 static inline bool verify_is_hit(const ProbeHit *hit)
@@ -71,7 +73,8 @@ void verify_note_error(VerifyRun *run, double error, double bound);
 // The same for an error in another unit.
 void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 
-// Reads a scene of objects, without a camera, that the program itself carries.
+// Reads a scene that the program itself carries: native YAML, all but the camera. A text that cannot be read
+// is a program's fault. Caller frees it with scene_free.
 Scene verify_scene(const char *objects);
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 

@@ -83,7 +83,7 @@ typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
 // Renders the region in bands of about band_seconds each. False if the sink stopped it.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
-// Closest hits of explicit rays, by the same intersection code that renders.
+// Closest hits of explicit rays (host/scene/probe.h), by the same intersection code that renders.
 void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, ProbeHit *hits);
 
 // A kernel's launch, or a transfer.

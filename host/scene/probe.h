@@ -3,13 +3,17 @@
 
 #include <stdint.h>
 
+// A renderer rounds each number to its precision first. A point of the ray is origin + t direction, so that t
+// counts lengths of `direction`, which need not be unit; hits lie strictly between tmin and tmax. A direction
+// whose length squared is 0 or infinite at the precision meets nothing: at float, lengths below about 1e-22
+// and above 1e19.
 typedef struct {
     double origin[3], direction[3], tmin, tmax;
 } ProbeRay;
 
 typedef struct {
-    uint32_t object; // UINT32_MAX: a miss, and only `light` has a meaning
-    double t;
+    uint32_t object;                                  // UINT32_MAX: a miss, and only `light` has a meaning
+    double t;                                         // in lengths of the ray's direction
     double normal[3];                                 // unit, of the geometry, facing the ray
     double position[3];                               // the hit, put onto the surface
     double mirrored_origin[3], mirrored_direction[3]; // of the reflected ray
