@@ -276,7 +276,7 @@ check 'nothing on standard output' test ! -s out
 # Times and facts for programs: JSON alone on standard output.
 ok '--timing=json' render ball.yaml $small --timing=json -o j.png
 check '--timing=json is JSON' python3 -m json.tool out
-python 'what it says' 'import json; d = json.load(open("out")); assert d["schema"] == 1 and d["size"] == [8, 6]
+python 'what it says' 'import json; d = json.load(open("out")); assert d["schema"] == 2 and len(d["kernel_hash"]) == 16 and d["size"] == [8, 6]
 for key in "parse_ms flatten_ms build_ms build_from_cache upload_ms launches read_backs encode_ms".split(): assert key in d, key
 assert [l["name"] for l in d["launches"]] == ["render"]'
 ok '--timing' render ball.yaml $small --timing -o j.png

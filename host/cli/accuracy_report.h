@@ -15,7 +15,7 @@ typedef struct {
 } AccuracyReport;
 
 void accuracy_print_text(const AccuracyReport *report, FILE *stream);
-Json *accuracy_json(const AccuracyReport *report); // as docs/accuracy.md has it; to be printed
+Json *accuracy_json(const AccuracyReport *report); // as docs/json.md has it; to be printed
 
 // Where the arrays of a scene's variant are, NULL: of its reference: FOLDER/0-scene-single-16-auto-1, say.
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,

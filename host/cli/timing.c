@@ -112,7 +112,7 @@ static void json_report(const RenderReport *report, const Device *device, const 
                         const HostTimes *host)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 1);
+    json_integer(json, "schema", 2);
     json_text(json, "glint", glint_version());
     json_begin_object(json, "device");
     json_text(json, "name", device->name);
@@ -123,7 +123,7 @@ static void json_report(const RenderReport *report, const Device *device, const 
     json_integer(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     json_integer(json, "lanes", report->lanes);
-    hash_json(json, "kernel", report->kernel_hash);
+    hash_json(json, "kernel_hash", report->kernel_hash);
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
     if (report->features & FEATURE_BVH)

@@ -5,8 +5,8 @@
 
 // A renderer rounds each number to its precision first. A point of the ray is origin + t direction, so that t
 // counts lengths of `direction`, which need not be unit; hits lie strictly between tmin and tmax. A direction
-// whose length squared is 0 or infinite at the precision meets nothing: at float, lengths below about 1e-22
-// and above 1e19.
+// whose length squared is 0 at the precision (in float, a length below 1e-22) meets nothing; one whose length
+// squared is infinite (above 1e19) may.
 typedef struct {
     double origin[3], direction[3], tmin, tmax;
 } ProbeRay;
