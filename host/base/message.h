@@ -1,4 +1,4 @@
-// What glint tells its user about a file they gave: errors and warnings with their place.
+// Messages to the user about a file they gave: errors and warnings with their place.
 #pragma once
 
 #include <stdbool.h>

@@ -95,7 +95,7 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
     return OPTIONS_READ;
 }
 
-// Before anything is measured. False: told why.
+// Before anything is measured. False, with a message, where it cannot be used.
 static bool reference_read(Accuracy *accuracy)
 {
     const char *path = accuracy->options.reference_path;
@@ -195,7 +195,7 @@ static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVaria
     return saved ? EXIT_DONE : EXIT_USER;
 }
 
-// Holds the variants of one scene, `first` and on, to its reference.
+// Compares the variants of one scene, `first` and on, with its reference.
 static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
 {
     AccuracyScene *scene = &accuracy->scenes[scene_index];
@@ -214,7 +214,7 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
     return status;
 }
 
-// The scenes' variants, before any is held to anything.
+// The scenes' variants, before any is compared.
 static void scenes_prepare(Accuracy *accuracy)
 {
     const VariantSet *set = &accuracy->set;

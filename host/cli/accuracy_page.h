@@ -1,4 +1,4 @@
-// What glint accuracy tells, as one page of HTML that needs nothing beside it: no network, no other file.
+// What glint accuracy reports, as one page of HTML that needs nothing beside it: no network, no other file.
 #pragma once
 
 #include "host/base/text.h"

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Differences are told in steps of half a power of ten, the same in every picture of every page, so that they
-// can be held beside one another: black up to 1e-7, then 14 colors up to 1 and beyond, and red where one is
-// not finite. The darkest color is not black, which nobody would tell from the next.
+// Differences are shown in steps of half a power of ten, the same in every picture of every page, so that
+// they can be compared with one another: black up to 1e-7, then 14 colors up to 1 and beyond, and red where
+// one is not finite. The darkest color is not black, which nobody could distinguish from the next.
 enum { DECADES = 7, STEPS = 2 * DECADES, STEP_NOT_FINITE = STEPS + 1, STEP_COUNT };
 
 static uint8_t difference_step(float difference)

@@ -1,4 +1,4 @@
-// What glint accuracy tells: tables and plain words for people, or JSON.
+// What glint accuracy reports: tables and plain words for people, or JSON.
 #pragma once
 
 #include "host/base/json.h"
@@ -20,7 +20,8 @@ Json *accuracy_json(const AccuracyReport *report); // as docs/json.md has it; to
 // Where the arrays of a scene's variant are, NULL: of its reference: FOLDER/0-scene-single-16-auto-1, say.
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
                            const AccuracyVariant *variant);
-// The variant's precision, and of lanes, hierarchy and samples what tells it from others of its scene.
+// The variant's precision, and of lanes, hierarchy and samples what distinguishes it from others of its
+// scene.
 void accuracy_variant_name(Text *text, const AccuracyScene *scene, const AccuracyVariant *variant);
 // Why it is crossed out, in words; `index` counts from 0, NULL after the last.
 const char *accuracy_crossed_words(const AccuracyVariant *variant, size_t index);

@@ -1,4 +1,4 @@
-// What glint bench tells: a table for people, or JSON.
+// What glint bench reports: a table for people, or JSON.
 #pragma once
 
 #include "host/measure/baseline.h"

@@ -77,7 +77,7 @@ extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 // What reading a command line gives where the subcommand is to go on; else it gives the exit status.
 enum { OPTIONS_READ = -1 };
 
-// Each reads one value; on a fault it tells the user what is wrong with `option` and returns false.
+// Each reads one value; on a fault it prints what is wrong with `option` and returns false.
 bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
                   uint32_t *result);
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // WxH
@@ -86,7 +86,7 @@ bool option_choice(const char *option, const char *value, const char *const *nam
 // Comma-separated names; the result has a bit for each.
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,
                 unsigned *result);
-// Takes a common option; *valid tells whether its value was one. False if `option` is none of the common
+// Takes a common option; *valid says whether its value was one. False if `option` is none of the common
 // ones.
 bool option_common(CommonOptions *common, int option, const char *value, bool *valid);
 
@@ -95,7 +95,7 @@ int option_help(const char *text);
 // Says that the command line of a subcommand is wrong in general, pointing to its help; returns EXIT_USER.
 int option_usage_fault(const char *command, const char *what);
 
-// Loads the scene and tells its messages. False: told, nothing to free.
+// Loads the scene and prints its messages. False: it cannot be read; nothing to free.
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
 // Prints and frees messages; a fault in an .rt file is headed by the line that miniRT's testers look for.
 void messages_tell(MessageList *messages, const char *path);
@@ -112,7 +112,7 @@ typedef struct {
     Compute compute;
 } OpenDevice;
 
-// Chooses and opens a device. False: told, nothing to close.
+// Chooses and opens a device. False: there is none, which was printed; nothing to close.
 bool device_open(OpenDevice *open, const char *wish);
 // At a command's end. The context ends with the process: PoCL takes 80 ms to free what its compiler has read.
 void device_close(OpenDevice *open);

@@ -21,7 +21,7 @@ typedef struct Picture Picture;
 
 char *
 picture_default_path(const char *scene_path); // the scene's name with .png, in this folder; caller frees
-bool picture_path_known(const char *path);    // false: told the user which endings there are
+bool picture_path_known(const char *path);    // false: the endings there are were printed
 unsigned picture_renderer_aovs(const PictureOptions *options);
 
 // Files are opened with the first band, when the kernels' hash is known.

@@ -6,7 +6,7 @@
 #include "host/opencl/device.h"
 
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
-// In place of what cannot be had, in the object that is open.
+// In place of what is not available, in the object that is open.
 void unavailable_json(Json *json, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
 void device_json(Json *json, const Device *device); // what it is, into the object that is open

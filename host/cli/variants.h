@@ -47,10 +47,11 @@ enum {
     "      --seconds MAX     stop measuring after so long, settled or not (default: 5 for each "             \
     "row)\n" HELP_DEVICE HELP_LENIENT
 
-// Takes one of them; *valid tells whether its value was one, else the user is told. False if `option` is
+// Takes one of them; *valid says whether its value was one; if not, why was printed. False if `option` is
 // none.
 bool variant_option(VariantOptions *options, int option, const char *value, bool *valid);
-bool option_positive(const char *option, const char *value, double *result); // false: told what is wrong
+// Reads a number above 0. False: what is wrong was printed.
+bool option_positive(const char *option, const char *value, double *result);
 
 typedef struct {
     Scene *scenes;
@@ -62,7 +63,7 @@ typedef struct {
     size_t count;
 } VariantSet;
 
-// Reads the scenes. False: told why; the set still wants closing.
+// Reads the scenes. False: one cannot be read, which was printed; the set is still to be closed.
 bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
 // Readies each variant for its runs, then measures: in turn (A B C A B C …), so that a machine that slows
 // down does so for all; until times settle, or after options->seconds. `timing_builds`: rows get times of

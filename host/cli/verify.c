@@ -197,7 +197,7 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
                                Json *json)
 {
     Prober prober = {.compute = compute, .options = options, .precision = precision};
-    // perturbed, a device is inexact: `single` cannot be held to its bounds, `strict` repairs what it does
+    // perturbed, a device is inexact: `single` cannot meet its bounds, `strict` corrects the errors
     bool inexact = options->common.perturb_seed > 0 && precision < PRECISION_STRICT;
     const VerifyRenderer renderer = {&prober,       prober_open,        prober_trace, prober_close,
                                      prober_render, prober_camera_axes, inexact};
