@@ -101,14 +101,9 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
                                scalar4 grid)
 {
     real cells;
-    if (HAS_PLANES && kind == KIND_PLANES) {
-        Plane plane = scene->planes[index];
-        cells = floor(vector_dot(patch->position, vector_of(plane.grid_u)) + (real)(plane.grid_u.w)) +
-                floor(vector_dot(patch->position, vector_of(plane.grid_v)) + (real)(plane.grid_v.w));
-    } else if (HAS_DISCS && kind == KIND_DISCS) {
-        Disc disc = scene->discs[index];
-        cells = floor(vector_dot(patch->position, vector_of(disc.grid_u)) + (real)(disc.grid_u.w)) +
-                floor(vector_dot(patch->position, vector_of(disc.grid_v)) + (real)(disc.grid_v.w));
+    if (kind_has_grid(kind)) {
+        GridPlace place = grid_place(scene, kind, index, patch->position);
+        cells = floor(place.u) + floor(place.v);
     } else {
         Vector cell = vector_fma(patch->position, (real)(grid.w), vector_of(grid));
         cell = vector_fma(inward, (real)(0x1p-10f), cell);

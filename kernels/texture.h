@@ -27,15 +27,21 @@ static inline PicturePoint sphere_picture_point(const Sphere *sphere, Vector out
     return point;
 }
 
-static inline PicturePoint picture_point(const Scene *scene, uint kind, uint index, const Material *material,
-                                         const Patch *patch)
+// Planes and discs have a grid of their own, along the surface.
+static inline bool kind_has_grid(uint kind)
+{
+    if (HAS_PLANES && kind == KIND_PLANES) return true;
+    return HAS_DISCS && kind == KIND_DISCS;
+}
+
+typedef struct {
+    real u, v; // counted in checker squares, or in pictures
+} GridPlace;
+
+// Where in its grid a point of a plane or disc lies.
+static inline GridPlace grid_place(const Scene *scene, uint kind, uint index, Vector position)
 {
     scalar4 grid_u = (scalar4)(0), grid_v = (scalar4)(0);
-    if (HAS_SPHERES && kind == KIND_SPHERES) {
-        Sphere sphere = scene->spheres[index];
-        return sphere_picture_point(&sphere, patch->normal,
-                                    scene->texture_levels[material->image.x - 1].place);
-    }
     if (HAS_PLANES && kind == KIND_PLANES) {
         grid_u = scene->planes[index].grid_u;
         grid_v = scene->planes[index].grid_v;
@@ -43,9 +49,20 @@ static inline PicturePoint picture_point(const Scene *scene, uint kind, uint ind
         grid_u = scene->discs[index].grid_u;
         grid_v = scene->discs[index].grid_v;
     }
-    return (PicturePoint){vector_dot(patch->position, vector_of(grid_u)) + (real)(grid_u.w),
-                          vector_dot(patch->position, vector_of(grid_v)) + (real)(grid_v.w),
-                          (real)(material->mirror_glass.w)};
+    return (GridPlace){vector_dot(position, vector_of(grid_u)) + (real)(grid_u.w),
+                       vector_dot(position, vector_of(grid_v)) + (real)(grid_v.w)};
+}
+
+static inline PicturePoint picture_point(const Scene *scene, uint kind, uint index, const Material *material,
+                                         const Patch *patch)
+{
+    if (HAS_SPHERES && kind == KIND_SPHERES) {
+        Sphere sphere = scene->spheres[index];
+        return sphere_picture_point(&sphere, patch->normal,
+                                    scene->texture_levels[material->image.x - 1].place);
+    }
+    GridPlace place = grid_place(scene, kind, index, patch->position);
+    return (PicturePoint){place.u, place.v, (real)(material->mirror_glass.w)};
 }
 
 // From here on one lane at a time: each reads texels of its own.
