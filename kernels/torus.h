@@ -1,8 +1,11 @@
 // Torus: the points at distance `minor` from a circle of radius `major`.
 //
 // Everything happens around the ray's closest approach to the center, where the quartic has no cubic term and
-// no large numbers. The quartic only tells where the distance to the surface stops falling or rising; between
-// two such places the distance itself,
+// no large numbers: in s, the length along the ray from there, it is
+//     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
+// for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
+// The quartic only tells, by its derivative, where the distance to the surface stops falling or rising;
+// between two such places the distance itself,
 //     sqrt((rho - R)^2 + z^2) - r,
 // which is exact to a few u where the quartic cancels, is followed to its one zero. All by + - * / sqrt:
 // bracketing, so that axis-parallel and equatorial rays need no case of their own.
@@ -18,6 +21,7 @@ typedef struct {
     real major, minor;
 } TorusLine;
 
+// From the tube's surface, negative inside it, and how fast that grows along the line.
 static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
     Vector radial = vector_fma(line->turn, s, line->across);
@@ -30,7 +34,7 @@ static inline real torus_distance(const TorusLine *line, real s, real *slope)
     return from_circle - line->minor;
 }
 
-// 4 s^3 + 2 p s + q, half of the quartic's derivative.
+// The quartic's derivative, 4 s^3 + 2 p s + q.
 static inline real torus_cubic(real p, real q, real s, real *slope)
 {
     *slope = fma((real)(12) * s, s, p + p);
@@ -83,53 +87,70 @@ static inline real torus_zero(const TorusLine *line, real low, real high, mask e
     return s;
 }
 
-static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
+// The ray's closest approach to the center, seen from there, and its t.
+static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *closest_t)
 {
-    Vector center = vector_of(torus->center_major), axis = vector_of(torus->axis_minor);
-    real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
-    real inverse_length = real_sqrt(ray->inverse_squared);
-    Vector direction = vector_scale(ray->direction, inverse_length);
-
-    Vector closest; // to the center, from there
-    real closest_t;
+    Vector center = vector_of(torus->center_major);
     if (IS_COMPENSATED) {
         PairVector f = pair_vector_difference(ray->origin, center);
         Vector moment = pair_vector_high(pair_vector_cross(f, ray->direction));
-        closest = vector_scale(vector_cross(ray->direction, moment), ray->inverse_squared);
         Pair squared = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
-        closest_t = -real_divide(pair_vector_dot_vector(f, ray->direction).high, squared.high);
-    } else {
-        Vector f = vector_subtract(ray->origin, center);
-        closest =
-            vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
-        closest_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
+        *closest_t = -real_divide(pair_vector_dot_vector(f, ray->direction).high, squared.high);
+        return vector_scale(vector_cross(ray->direction, moment), ray->inverse_squared);
     }
+    Vector f = vector_subtract(ray->origin, center);
+    *closest_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
+    return vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
+}
+
+// The line's places, from where it enters the ball around the torus to where it leaves it: between any two
+// neighbors the distance has at most one zero. They are where the quartic's derivative has its zeros, which
+// its own turning points, at +-sqrt(-p / 6), keep apart.
+enum { TORUS_PLACES = 5 };
+
+static inline void torus_places(const TorusLine *line, real squared_distance, real span,
+                                real places[TORUS_PLACES])
+{
+    real k = fma(line->major, line->major, squared_distance) - line->minor * line->minor;
+    real squared_major = line->major * line->major;
+    real p = fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
+    real q = (real)(8) * squared_major * line->height * line->rise;
+    real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
+    places[0] = -span;
+    places[1] = torus_turning_point(p, q, -span, -bend);
+    places[2] = torus_turning_point(p, q, -bend, bend);
+    places[3] = torus_turning_point(p, q, bend, span);
+    places[4] = span;
+}
+
+static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
+{
+    real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
+    real closest_t;
+    Vector closest = torus_closest(torus, ray, &closest_t);
     real reach = major + minor;
     real squared_distance = vector_dot(closest, closest);
     real half_chord_squared = fma(reach * (real)(1.001f), reach, -squared_distance);
     mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
     if (!lanes_any(hit)) return hit;
 
+    Vector axis = vector_of(torus->axis_minor);
+    real inverse_length = real_sqrt(ray->inverse_squared);
+    Vector direction = vector_scale(ray->direction, inverse_length);
     TorusLine line = {vector_cross(closest, axis),
                       vector_cross(direction, axis),
                       vector_dot(closest, axis),
                       vector_dot(direction, axis),
                       major,
                       minor};
-    real k = fma(major, major, squared_distance) - minor * minor;
-    real squared_major = major * major;
-    real p = fma((real)(-4) * squared_major, vector_dot(line.turn, line.turn), k + k);
-    real q = (real)(8) * squared_major * line.height * line.rise;
-    real span = real_sqrt(real_max(half_chord_squared, (real)(0)));
-    real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
-    real places[5] = {-span, torus_turning_point(p, q, -span, -bend), torus_turning_point(p, q, -bend, bend),
-                      torus_turning_point(p, q, bend, span), span};
+    real places[TORUS_PLACES];
+    torus_places(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), places);
 
     real start = (ray->near - closest_t) * real_sqrt(ray->squared); // of the ray, as s
     real slope, found_s = (real)(LARGEST);
     real before = torus_distance(&line, places[0], &slope);
     mask found = mask_none();
-    for (uint i = 0; i < 4; i++) {
+    for (uint i = 0; i + 1 < TORUS_PLACES; i++) {
         real after = torus_distance(&line, places[i + 1], &slope);
         mask entering = before > (real)(0);
         mask crosses = hit & !found & (entering != (after > (real)(0))) & (places[i + 1] > start);
