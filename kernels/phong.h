@@ -74,7 +74,7 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, uin
     to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL) ray_take_apex(&to_light.shadow_ray, APEX_FIRST_LIGHT + index);
     rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
-    real passing = light_passing(scene, &to_light.shadow_ray);
+    real passing = transmittance(scene, &to_light.shadow_ray);
     lit = lit & (passing > (real)(0));
     *shadowed = surface->found & !lit;
     if (!lanes_any(lit)) return black;

@@ -57,26 +57,26 @@ static inline void rays_count(const Scene *scene, uint what, mask rays)
 // A ray's way through the scene: to its closest hit, or only to whether anything blocks it.
 typedef struct {
     Hit hit;
-    mask open;       // the lanes that are looking: not those that found enough, nor those whose turn is later
-    bool any;        // a hit takes light from a lane, all of it unless the object is transparent
-    integer opacity; // that the lanes met, in steps of -log2
+    mask open; // the lanes that are looking: not those that found enough, nor those whose turn is later
+    bool any;  // a hit takes light from a lane, all of it unless the object is transparent
+    integer optical_depth; // that the lanes met, in steps of -log2
 } Search;
 
 #if IS_DOUBLE
-#define OPACITY_STEPS   0x1p48
-#define LN_2            0x1.62e42fefa39efp-1
-#define OPACITY_LARGEST 0x7f000000000000L
+#define OPTICAL_DEPTH_STEPS   0x1p48
+#define LN_2                  0x1.62e42fefa39efp-1
+#define OPTICAL_DEPTH_LARGEST 0x7f000000000000L
 #else
-#define OPACITY_STEPS   0x1p24f
-#define LN_2            0x1.62e43p-1f
-#define OPACITY_LARGEST OPAQUE
+#define OPTICAL_DEPTH_STEPS   0x1p24f
+#define LN_2                  0x1.62e43p-1f
+#define OPTICAL_DEPTH_LARGEST OPAQUE
 #endif
 
-static inline integer opacity_of(const Scene *scene, uint id)
+static inline integer optical_depth_of(const Scene *scene, uint id)
 {
-    uint4 steps = scene->materials[scene->objects[id].kind_index_material.z].opacity;
+    uint4 steps = scene->materials[scene->objects[id].kind_index_material.z].optical_depth;
 #if IS_DOUBLE
-    return (integer)(steps.x == OPAQUE ? OPACITY_LARGEST : upsample(as_int(steps.z), steps.y));
+    return (integer)(steps.x == OPAQUE ? OPTICAL_DEPTH_LARGEST : upsample(as_int(steps.z), steps.y));
 #else
     return (integer)((scalar_integer)steps.x);
 #endif
@@ -89,12 +89,13 @@ static inline void search_darken(Search *search, const Scene *scene, mask found,
         search->open = search->open & !found;
         return;
     }
-    integer opacity = opacity_of(scene, id);
-    const integer largest = (integer)(OPACITY_LARGEST);
+    integer optical_depth = optical_depth_of(scene, id);
+    const integer largest = (integer)(OPTICAL_DEPTH_LARGEST);
     // a sum beyond the largest stays there
-    integer sum = lanes_select(search->opacity < largest - opacity, search->opacity + opacity, largest);
-    search->opacity = lanes_select(found, sum, search->opacity);
-    search->open = search->open & (search->opacity < largest);
+    integer sum = lanes_select(search->optical_depth < largest - optical_depth,
+                               search->optical_depth + optical_depth, largest);
+    search->optical_depth = lanes_select(found, sum, search->optical_depth);
+    search->open = search->open & (search->optical_depth < largest);
 }
 
 // Keeps a crossing that is nearer, or as near and of a lower id: the picture does not depend on the objects'
@@ -351,13 +352,13 @@ static inline mask hit_found(const Hit *hit)
 
 // How much light passes along each active ray between near and far: 1 where nothing stands, 0 behind anything
 // opaque. What is transparent passes its transmission, unbent, once for each object.
-static inline real light_passing(const Scene *scene, Ray *ray)
+static inline real transmittance(const Scene *scene, Ray *ray)
 {
     Search search = scene_search(scene, ray, true);
     const real none = (real)(0), all = (real)(1);
     if (!HAS_TRANSMISSION) return lanes_select(search.open, all, none);
-    const real ln2_of_step = (real)(-LN_2 / OPACITY_STEPS);
-    real passed = real_exp_negative(real_from_integer(search.opacity) * ln2_of_step);
+    const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);
+    real passed = real_exp_negative(real_from_integer(search.optical_depth) * ln2_of_step);
     return lanes_select(search.open, passed, none);
 }
 

@@ -60,7 +60,7 @@ static OUT_OF_LINE MetTriangles triangles_met(const Scene *scene, integer object
     met.lanes = mask_none();
     Vector normal = nothing;
     Corners corners = {nothing, nothing, nothing}, normals = corners, uvs = corners;
-    real density = (real)(scene->materials[material].mirror_glass.w);
+    real density = (real)(scene->materials[material].reflection_transmission_ior.w);
     bool smooth = false;
     for (;;) {
         scalar_integer object = lanes_smallest(objects);
@@ -165,9 +165,11 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
         surface.ambient = lanes_select(same, (real)(material.color.w), surface.ambient);
         surface.specular = lanes_select(same, (real)(material.diffuse.w), surface.specular);
         surface.shininess = lanes_select(same, (real)(material.other_color.w), surface.shininess);
-        surface.reflection = lanes_select(same, (real)(material.mirror_glass.x), surface.reflection);
-        surface.transmission = lanes_select(same, (real)(material.mirror_glass.y), surface.transmission);
-        surface.ior = lanes_select(same, (real)(material.mirror_glass.z), surface.ior);
+        surface.reflection =
+            lanes_select(same, (real)(material.reflection_transmission_ior.x), surface.reflection);
+        surface.transmission =
+            lanes_select(same, (real)(material.reflection_transmission_ior.y), surface.transmission);
+        surface.ior = lanes_select(same, (real)(material.reflection_transmission_ior.z), surface.ior);
     }
 
     surface.position = patch.position;

@@ -62,7 +62,7 @@ static inline PicturePoint picture_point(const Scene *scene, uint kind, uint ind
                                     scene->texture_levels[material->image.x - 1].place);
     }
     GridPlace place = grid_place(scene, kind, index, patch->position);
-    return (PicturePoint){place.u, place.v, (real)(material->mirror_glass.w)};
+    return (PicturePoint){place.u, place.v, (real)(material->reflection_transmission_ior.w)};
 }
 
 // From here on one lane at a time: each reads texels of its own.

@@ -32,7 +32,7 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
         {hit.t}, {n.x}, {n.y}, {n.z}, {p.x}, {p.y}, {p.z},
         {mo.x}, {mo.y}, {mo.z}, {md.x}, {md.y}, {md.z},
         {po.x}, {po.y}, {po.z}, {pd.x}, {pd.y}, {pd.z},
-        {passed.weight.x}, {light_passing(scene, &ray)},
+        {passed.weight.x}, {transmittance(scene, &ray)},
     };
     // clang-format on
     IntegerLanes object = {hit.object};

@@ -146,16 +146,15 @@ typedef struct {
 } ObjectEntry;
 
 typedef struct {
-    scalar4 color;        // rgb, w: ka
-    scalar4 diffuse;      // kd rgb, w: ks
-    scalar4 other_color;  // the checker's second color, w: shininess
-    scalar4 grid;         // xyz: where the eye stands among the checker's cells, w: cells per unit; 0: plain
-    scalar4 mirror_glass; // x: reflection, y: transmission, z: index of refraction; w: texels of the picture
-                          // per unit of length, on planes and discs
+    scalar4 color;       // rgb, w: ka
+    scalar4 diffuse;     // kd rgb, w: ks
+    scalar4 other_color; // the checker's second color, w: shininess
+    scalar4 grid;        // xyz: where the eye stands among the checker's cells, w: cells per unit; 0: plain
+    scalar4 reflection_transmission_ior; // w: texels of the picture per unit of length, on planes and discs
     // How much light a shadow ray loses here, as -log2(transmission) in whole steps, whose sum does not
     // depend on the order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of
     // 2^-48, for double.
-    uint4 opacity;
+    uint4 optical_depth;
     uint4 image; // x: 1 + the index of its picture's first level, 0: none; y: number of levels
 } Material;
 

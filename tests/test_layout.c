@@ -88,8 +88,8 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, other_color)                   \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, mirror_glass)                  \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, opacity)                    \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, image)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \

@@ -24,7 +24,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
                     BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
     [FLAT_BALLS] = LAYOUT_OF_REALS(Ball),
     [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
-    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, opacity, image),
+    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, image),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
     [FLAT_TEXELS] = LAYOUT(Texel, color, color),
@@ -397,7 +397,7 @@ static void objects_flatten(FlatScene *flat, const Scene *scene, const Rounding 
     flat->arrays[FLAT_TRIANGLE_NORMALS].count = filling.normals_count;
 }
 
-static uint4 opacity_of(double transmission)
+static uint4 optical_depth_of(double transmission)
 {
     double log2_loss = transmission > 0 ? -log2(transmission) : INFINITY;
     if (log2_loss >= 127) return (uint4){OPAQUE, 0, 0, 0};
@@ -418,8 +418,8 @@ static void materials_flatten(FlatScene *flat, const Scene *scene, const Roundin
                                 material->ambient),
             .diffuse = scalar4_of(material->diffuse, material->specular),
             .other_color = scalar4_of(material->checker_colors[1], material->shininess),
-            .mirror_glass = {material->reflection, material->transmission, material->ior, 0},
-            .opacity = opacity_of(material->full_shadow ? 0 : material->transmission),
+            .reflection_transmission_ior = {material->reflection, material->transmission, material->ior, 0},
+            .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
         };
         if (material->checker)
             materials[i].grid =

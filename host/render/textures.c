@@ -167,7 +167,7 @@ static void materials_tell(FlatScene *flat, const Scene *scene, const uint32_t *
         size_t image = material->image - 1;
         materials[i].image =
             (uint4){1 + first_levels[image], first_levels[image + 1] - first_levels[image], 0, 0};
-        materials[i].mirror_glass.w = sizes[image].width / material->image_size;
+        materials[i].reflection_transmission_ior.w = sizes[image].width / material->image_size;
     }
 }
 
