@@ -2,11 +2,22 @@
 // they are.
 #include "bounce.h"
 
-enum { RAY_SCALARS = 8, RESULT_SCALARS = 21 };
+static inline Vector vector_load(const RealLanes *from)
+{
+    return (Vector){from[0].all, from[1].all, from[2].all};
+}
 
-// rays: origin, direction, tmin, tmax of each. results: t; the geometric normal, facing the ray; the point;
-// the mirrored ray's origin and direction; the passed one's; how much of the ray passes; and how much light
-// passes along it from tmin to tmax. Behind t all are without meaning where nothing is hit, but for the last.
+static inline void vector_store(Vector vector, RealLanes *to)
+{
+    to[0].all = vector.x;
+    to[1].all = vector.y;
+    to[2].all = vector.z;
+}
+
+// rays: RAY_SCALARS of each, near and far its tmin and tmax. results: RESULT_SCALARS of each: t; the
+// geometric normal, facing the ray; the point; the mirrored ray's origin and direction; the passed one's; how
+// much of the ray passes; and how much light passes along it from tmin to tmax. Behind t all are without
+// meaning where nothing is hit, but for the last.
 static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
 {
@@ -16,25 +27,24 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
         for (uint i = 0; i < RAY_SCALARS; i++)
             value[i].each[lane] = rays[(size_t)index * RAY_SCALARS + i];
     }
-    Vector origin = {value[0].all, value[1].all, value[2].all};
-    Vector direction = {value[3].all, value[4].all, value[5].all};
-    Ray ray = ray_make(origin, direction, value[6].all, value[7].all, mask_all());
+    Vector origin = vector_load(value + RAY_ORIGIN), direction = vector_load(value + RAY_DIRECTION);
+    Ray ray = ray_make(origin, direction, value[RAY_NEAR].all, value[RAY_FAR].all, mask_all());
     Hit hit = closest_hit(scene, &ray);
     Surface surface = surface_at(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce mirrored = {origin, direction, black}, passed = mirrored;
     surface_bounce(&surface, vector_normalize(direction), white, true, &mirrored, &passed);
 
-    Vector n = surface.normal, p = surface.position;
-    Vector mo = mirrored.origin, md = mirrored.direction, po = passed.origin, pd = passed.direction;
-    // clang-format off
-    RealLanes result[RESULT_SCALARS] = {
-        {hit.t}, {n.x}, {n.y}, {n.z}, {p.x}, {p.y}, {p.z},
-        {mo.x}, {mo.y}, {mo.z}, {md.x}, {md.y}, {md.z},
-        {po.x}, {po.y}, {po.z}, {pd.x}, {pd.y}, {pd.z},
-        {passed.weight.x}, {transmittance(scene, &ray)},
-    };
-    // clang-format on
+    RealLanes result[RESULT_SCALARS];
+    result[RESULT_T].all = hit.t;
+    vector_store(surface.normal, result + RESULT_NORMAL);
+    vector_store(surface.position, result + RESULT_POSITION);
+    vector_store(mirrored.origin, result + RESULT_MIRRORED_ORIGIN);
+    vector_store(mirrored.direction, result + RESULT_MIRRORED_DIRECTION);
+    vector_store(passed.origin, result + RESULT_PASSED_ORIGIN);
+    vector_store(passed.direction, result + RESULT_PASSED_DIRECTION);
+    result[RESULT_PASSED].all = passed.weight.x;
+    result[RESULT_LIGHT].all = transmittance(scene, &ray);
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {
         size_t index = first + lane;

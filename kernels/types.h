@@ -185,6 +185,21 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 // group, which it is on a CPU, it costs PoCL some hundred cycles to start.
 enum { ITEM_TILES_LARGEST = 8 };
 
+// The scalars of an explicit ray, and of what is answered to it (kernels/trace.cl): where each vector begins.
+enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_NEAR = 6, RAY_FAR, RAY_SCALARS };
+enum {
+    RESULT_T,
+    RESULT_NORMAL,
+    RESULT_POSITION = 4,
+    RESULT_MIRRORED_ORIGIN = 7,
+    RESULT_MIRRORED_DIRECTION = 10,
+    RESULT_PASSED_ORIGIN = 13,
+    RESULT_PASSED_DIRECTION = 16,
+    RESULT_PASSED = 19,
+    RESULT_LIGHT,
+    RESULT_SCALARS
+};
+
 // What a counting build counts.
 enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
 

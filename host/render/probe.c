@@ -3,7 +3,7 @@
 #include "host/render/renderer_state.h"
 #include <stdlib.h>
 
-enum { PROBE_GROUP = 64, PROBE_RAYS_OF_LAUNCH = 1 << 18, RAY_SCALARS = 8, RESULT_SCALARS = 21 };
+enum { PROBE_GROUP = 64, PROBE_RAYS_OF_LAUNCH = 1 << 18 };
 
 static void scalar_set(void *scalars, size_t index, bool wide, double value)
 {
@@ -24,19 +24,19 @@ static void vector_at(const void *scalars, size_t index, bool wide, double vecto
         vector[axis] = scalar_at(scalars, index + axis, wide);
 }
 
-// The scalars of one hit, in the order of kernels/trace.cl.
+// The scalars of one hit, from `index` on.
 static ProbeHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object)
 {
     ProbeHit hit = {.object = object,
-                    .t = scalar_at(scalars, index, wide),
-                    .passed = scalar_at(scalars, index + 19, wide),
-                    .light = scalar_at(scalars, index + 20, wide)};
-    vector_at(scalars, index + 1, wide, hit.normal);
-    vector_at(scalars, index + 4, wide, hit.position);
-    vector_at(scalars, index + 7, wide, hit.mirrored_origin);
-    vector_at(scalars, index + 10, wide, hit.mirrored_direction);
-    vector_at(scalars, index + 13, wide, hit.passed_origin);
-    vector_at(scalars, index + 16, wide, hit.passed_direction);
+                    .t = scalar_at(scalars, index + RESULT_T, wide),
+                    .passed = scalar_at(scalars, index + RESULT_PASSED, wide),
+                    .light = scalar_at(scalars, index + RESULT_LIGHT, wide)};
+    vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
+    vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
+    vector_at(scalars, index + RESULT_MIRRORED_ORIGIN, wide, hit.mirrored_origin);
+    vector_at(scalars, index + RESULT_MIRRORED_DIRECTION, wide, hit.mirrored_direction);
+    vector_at(scalars, index + RESULT_PASSED_ORIGIN, wide, hit.passed_origin);
+    vector_at(scalars, index + RESULT_PASSED_DIRECTION, wide, hit.passed_direction);
     return hit;
 }
 
