@@ -77,27 +77,21 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) natural; // wraps around
 #define natural_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
 #define integer_from_natural LANES_AS(INTEGER_BASE)
 
-// The tile of neighboring pixels that one work-item carries at once, and each lane's place in it.
+// The tile that one work-item carries at once (types.h), and each lane's place in it.
+#define TILE_WIDTH  TILE_WIDTH_OF(LANES)
+#define TILE_HEIGHT TILE_HEIGHT_OF(LANES)
 #if LANES == 1
-#define TILE_WIDTH  1
-#define TILE_HEIGHT 1
-#define LANE_X      ((integer)(0))
-#define LANE_Y      ((integer)(0))
+#define LANE_X ((integer)(0))
+#define LANE_Y ((integer)(0))
 #elif LANES == 4
-#define TILE_WIDTH  2
-#define TILE_HEIGHT 2
-#define LANE_X      ((integer)(0, 1, 0, 1))
-#define LANE_Y      ((integer)(0, 0, 1, 1))
+#define LANE_X ((integer)(0, 1, 0, 1))
+#define LANE_Y ((integer)(0, 0, 1, 1))
 #elif LANES == 8
-#define TILE_WIDTH  4
-#define TILE_HEIGHT 2
-#define LANE_X      ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
-#define LANE_Y      ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
+#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
 #elif LANES == 16
-#define TILE_WIDTH  4
-#define TILE_HEIGHT 4
-#define LANE_X      ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
-#define LANE_Y      ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
+#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
 #endif
 
 // Marks a branch that few rays take: what it alone needs then stays out of registers.

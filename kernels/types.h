@@ -181,6 +181,10 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define PATH_START  0x811c9dc5u
 #define PATH_FACTOR 0x01000193u
 
+// The tile of neighboring pixels that a work-item of 1, 4, 8 or 16 lanes carries at once.
+#define TILE_WIDTH_OF(lanes)  ((lanes) >= 8 ? 4 : (lanes) == 4 ? 2 : 1)
+#define TILE_HEIGHT_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
+
 // Neighboring tiles along a row that a work-item of several lanes carries, one after the other. As its own
 // group, which it is on a CPU, it costs PoCL some hundred cycles to start.
 enum { ITEM_TILES_LARGEST = 8 };

@@ -55,6 +55,8 @@ static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *r
     return true;
 }
 
+_Static_assert(sizeof((BenchRow){0}.rays) == sizeof((RenderReport){0}.rays), "in the same order");
+
 static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, MessageList *messages)
 {
     RenderSettings settings = variant->settings;

@@ -19,17 +19,7 @@ typedef struct {
 
 static TileShape tile_shape(uint32_t lanes)
 {
-    // as kernels/lanes.h has it
-    switch (lanes) {
-    case 4:
-        return (TileShape){2, 2};
-    case 8:
-        return (TileShape){4, 2};
-    case 16:
-        return (TileShape){4, 4};
-    default:
-        return (TileShape){1, 1};
-    }
+    return (TileShape){TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
 }
 
 // The pixels of all tiles that a work-item carries, as ITEM_TILES in kernels/film.h has it.
@@ -130,6 +120,8 @@ static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint a
         {settings->region_x, settings->region_y + rows.first_row, settings->region_width, rows.row_count}};
     kernel_argument(kernel, argument, sizeof band, &band);
 }
+
+_Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");
 
 static void ray_counts_clear(Renderer *renderer, const Film *film)
 {
