@@ -185,13 +185,13 @@ typedef struct {
     ushort what;
     ushort lanes; // whose rays meet it, as bits
     scalar near;
-} Waiting;
+} StackEntry;
 
 // Each node leaves at most all but one of its children waiting.
-#define WAITING_LARGEST ((BVH_WIDTH - 1) * BVH_DEPTH_LARGEST + 1)
+#define STACK_LARGEST ((BVH_WIDTH - 1) * BVH_DEPTH_LARGEST + 1)
 
 // Starts to fetch what will be read when its turn comes.
-static inline void waiting_fetch(const Scene *scene, uint first, uint what)
+static inline void stack_fetch(const Scene *scene, uint first, uint what)
 {
     if (what == BVH_NODE)
         memory_fetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
@@ -199,6 +199,19 @@ static inline void waiting_fetch(const Scene *scene, uint first, uint what)
         memory_fetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
     else if (HAS_SPHERES && (what & 0xff) == KIND_SPHERES)
         memory_fetch((global const char *)&scene->spheres[first], sizeof(Sphere));
+}
+
+// Makes room for a child among its siblings, which begin at `bottom`: the nearest last, or where
+// `farthest_last` that. Returns its place.
+static inline uint stack_room(StackEntry *stack, uint bottom, uint count, scalar near, bool farthest_last)
+{
+    uint place = count;
+    for (; place > bottom; place--) {
+        StackEntry below = stack[place - 1];
+        if (farthest_last ? below.near <= near : below.near >= near) break;
+        stack[place] = below;
+    }
+    return place;
 }
 
 // Up to so many lanes are held against a node's boxes one by one at once, which takes no longer than the beam
@@ -210,7 +223,7 @@ static inline void waiting_fetch(const Scene *scene, uint first, uint what)
 // that meet the node and still look.
 static inline uint node_open(const Scene *scene, uint index, uint lanes, const Beam *beam,
                              const BoxRays *rays, LaidRays *laid, real limit, scalar beam_limit, bool any,
-                             Waiting *waiting, uint count)
+                             StackEntry *stack, uint count)
 {
     global const BvhNode *node = &scene->nodes[index];
     const uint bottom = count;
@@ -238,14 +251,9 @@ static inline uint node_open(const Scene *scene, uint index, uint lanes, const B
                 by = lanes_bits(beam_rays_meet(beam, rays, boxes + child, limit));
             if (by == 0) continue;
             scalar near = nears.each[child];
-            uint place = count++;
-            for (; place > bottom; place--) {
-                Waiting below = waiting[place - 1];
-                if (any ? below.near <= near : below.near >= near) break;
-                waiting[place] = below;
-            }
-            waiting[place] = (Waiting){firsts[part + child], (ushort)whats[part + child], (ushort)by, near};
-            waiting_fetch(scene, firsts[part + child], whats[part + child]);
+            uint place = stack_room(stack, bottom, count++, near, any);
+            stack[place] = (StackEntry){firsts[part + child], (ushort)whats[part + child], (ushort)by, near};
+            stack_fetch(scene, firsts[part + child], whats[part + child]);
         }
     }
     return count;
@@ -257,13 +265,13 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 {
     real limit = search_limit(search);
     scalar beam_limit = beam->limit;
-    Waiting waiting[WAITING_LARGEST], next = {0, BVH_NODE, (ushort)open, beam->near};
-    for (uint count = 0;; next = waiting[--count]) {
+    StackEntry stack[STACK_LARGEST], next = {0, BVH_NODE, (ushort)open, beam->near};
+    for (uint count = 0;; next = stack[--count]) {
         uint lanes = next.lanes & open;
         if (next.near <= beam_limit && lanes != 0) {
             if (next.what == BVH_NODE) {
                 count = node_open(scene, next.first, lanes, beam, rays, laid, limit, beam_limit, search->any,
-                                  waiting, count);
+                                  stack, count);
             } else {
                 search_shapes(search, scene, ray, next.what & 0xff, next.first,
                               next.first + (next.what >> 8));
