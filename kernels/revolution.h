@@ -154,6 +154,32 @@ typedef struct {
     Vector m, q; // at t the point is |m + t q| / |w| from the axis
 } RevolutionCrossings;
 
+// Where the ray is between the planes of a finite shape's ends.
+static inline Roots revolution_slab(const Revolution *shape, const Ray *ray)
+{
+    Vector axis = vector_of(shape->axis_slope);
+    real from, towards;
+    if (IS_COMPENSATED) {
+        PairVector f = pair_vector_difference(ray->origin, vector_of(shape->base_radius));
+        from = pair_vector_dot_vector(f, axis).high;
+        towards = pair_vector_dot_vector(pair_vector_of(ray->direction), axis).high;
+    } else {
+        from = vector_dot(vector_subtract(ray->origin, vector_of(shape->base_radius)), axis);
+        towards = vector_dot(ray->direction, axis);
+    }
+    return slab_crossings((real)(0), (real)(shape->range.x), from, towards, real_inverse_or_zero(towards));
+}
+
+// Inside the nappe that the ends cut: outside the roots, on the side where the radius grows.
+static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask growing)
+{
+    Roots side = crossings->side;
+    Roots nappe = {lanes_select(growing, side.far, (real)(-LARGEST)),
+                   lanes_select(growing, (real)(LARGEST), side.near)};
+    crossings->side.near = lanes_select(crossings->outer, nappe.near, side.near);
+    crossings->side.far = lanes_select(crossings->outer, nappe.far, side.far);
+}
+
 // A root is taken as q / a only where that is below the largest number; a = 0 is a ray along the side, which
 // has one root, c / q, and one infinitely far.
 static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray)
@@ -193,24 +219,8 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
 
     crossings.slab = (Roots){(real)(-LARGEST), (real)(LARGEST)};
     if (shape->id.y & REVOLUTION_FINITE) {
-        Vector axis = vector_of(shape->axis_slope);
-        real from, towards;
-        if (IS_COMPENSATED) {
-            PairVector f = pair_vector_difference(ray->origin, vector_of(shape->base_radius));
-            from = pair_vector_dot_vector(f, axis).high;
-            towards = pair_vector_dot_vector(pair_vector_of(ray->direction), axis).high;
-        } else {
-            from = vector_dot(vector_subtract(ray->origin, vector_of(shape->base_radius)), axis);
-            towards = vector_dot(ray->direction, axis);
-        }
-        crossings.slab =
-            slab_crossings((real)(0), (real)(shape->range.x), from, towards, real_inverse_or_zero(towards));
-        // inside the nappe that the ends cut: outside the roots, on the side where the radius grows
-        mask growing = quadric.h > (real)(0);
-        Roots nappe = {lanes_select(growing, crossings.side.far, (real)(-LARGEST)),
-                       lanes_select(growing, (real)(LARGEST), crossings.side.near)};
-        crossings.side.near = lanes_select(crossings.outer, nappe.near, crossings.side.near);
-        crossings.side.far = lanes_select(crossings.outer, nappe.far, crossings.side.far);
+        crossings.slab = revolution_slab(shape, ray);
+        revolution_keep_nappe(&crossings, quadric.h > (real)(0));
     }
     return crossings;
 }
