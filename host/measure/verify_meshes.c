@@ -238,13 +238,17 @@ static void add_other(Scene *scene, ShapeKind kind, uint64_t index)
         object.as.cone.finite = true;
         object.as.cone.caps = index % 2;
         break;
-    default:
-        object.kind = SHAPE_TORUS;
+    case SHAPE_TORUS:
         object.as.torus.center = a;
         object.as.torus.axis = axis;
         object.as.torus.major = size;
         object.as.torus.minor = size / 4;
         break;
+    case SHAPE_PLANE: // without end, so in no hierarchy
+    case SHAPE_TRIANGLE:
+    case SHAPE_MESH: // as CROWD_TRIANGLES
+    case SHAPE_COUNT:
+        return;
     }
     array_push(scene->objects, object);
 }

@@ -77,6 +77,8 @@ class Thing:
             return exact.Revolution(base, axis, map(rounding, radii), caps=given.get("caps", True))
         if kind == "cylinder":
             return exact.Revolution(from_eye(given["point"]), way("axis"), [size("radius")] * 2, endless=True)
+        if kind != "cone":
+            raise ValueError(f"the oracle knows no {kind}")
         if "slope" in given:
             slope = rational(given["slope"])
         else:
