@@ -126,6 +126,14 @@ done
 GLINT_DEVICE=toaster refused 1 'no usable device is "toaster"' render ball.yaml
 OCL_ICD_VENDORS=$scratch/none.icd refused 1 'no OpenCL device.*pocl-opencl-icd' render ball.yaml
 
+# PoCL has no device where it cannot keep its cache: Debian's, at least.
+pocl=$(find /etc/OpenCL/vendors -name '*pocl*.icd' 2>/dev/null | head -1)
+if [ "$pocl" ]; then
+    if ! XDG_CACHE_HOME=/dev/null OCL_ICD_VENDORS=$pocl "$GLINT" devices >out 2>err; then
+        check 'PoCL without a cache' grep -q 'set HOME, XDG_CACHE_HOME or POCL_CACHE_DIR' err
+    fi
+fi
+
 # Files that are not there or do not fit.
 for command in render check 'trace --rays rays'; do
     refused 1 "missing.yaml.*No such file" $command missing.yaml

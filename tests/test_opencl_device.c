@@ -32,7 +32,7 @@ typedef struct {
 static void machine_fill(Machine *machine)
 {
     Device *items = machine->items;
-    items[0] = fabricated(0, CL_DEVICE_TYPE_CPU, "pthread-haswell", "Portable Computing Language");
+    items[0] = fabricated(0, CL_DEVICE_TYPE_CPU, "pthread-haswell-avx512", "Portable Computing Language");
     items[1] = fabricated(1, CL_DEVICE_TYPE_ACCELERATOR, "Tile Board", "Acme");
     items[2] = fabricated(2, CL_DEVICE_TYPE_GPU, "Iris Mute", "Acme");
     items[2].compiler = false;
@@ -50,29 +50,15 @@ static void test_choice(void **state)
         const char *wish;
         int index;
     } cases[] = {
-        {NULL, 3},
-        {"gpu", 3},
-        {"GPU", 3},
-        {"cpu", 0},
-        {"Cpu", 0},
-        {"0", 0},
-        {"4", 4},
-        {"5", 5},
-        {"3090", 3},
-        {"force", 3},
-        {"haswell", 0},
-        {"portable", 0},
-        {"XEON", 5},
-        {"tile", 1},
-        {"acme", 5},
-        {"2", -1},
-        {"mute", -1},
-        {"nonsense", -1},
-        {"6", -1},
-        {"-1", -1},
-        {"00", 0},
-        {"0x0", -1},
-        {"99999999999999999999999", -1},
+        {NULL, 3},    {"gpu", 3},     {"GPU", 3},
+        {"cpu", 0},   {"Cpu", 0},     {"0", 0},
+        {"4", 4},     {"5", 5},       {"3090", 3},
+        {"force", 3}, {"haswell", 0}, {"portable", 0},
+        {"XEON", 5},  {"tile", 1},    {"acme", 5},
+        {"2", -1},    {"mute", -1},   {"nonsense", -1},
+        {"6", -1},    {"512", 0},     {"12", -1},
+        {"51", -1},   {"309", -1},    {"-1", -1},
+        {"00", 0},    {"0x0", -1},    {"99999999999999999999999", -1},
     };
     Machine machine = {0};
     machine_fill(&machine);
@@ -107,6 +93,11 @@ static void test_choice_falls_back(void **state)
     machine.list.count = 0;
     assert_null(device_choose(&machine.list, NULL, &messages));
     assert_non_null(strstr(messages.items[1].text, "pocl-opencl-icd"));
+    assert_non_null(strstr(messages.items[1].text, "set HOME, XDG_CACHE_HOME or POCL_CACHE_DIR"));
+    machine.list.platform_count = 0;
+    assert_null(device_choose(&machine.list, NULL, &messages));
+    assert_non_null(strstr(messages.items[2].text, "pocl-opencl-icd"));
+    assert_null(strstr(messages.items[2].text, "HOME"));
     message_list_free(&messages);
 }
 

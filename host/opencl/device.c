@@ -191,18 +191,35 @@ static int device_rank(const Device *device)
     return device->type & CL_DEVICE_TYPE_GPU ? 2 : device->type & CL_DEVICE_TYPE_CPU ? 1 : 0;
 }
 
+static bool is_number(const char *wish)
+{
+    return wish[0] != '\0' && wish[strspn(wish, "0123456789")] == '\0';
+}
+
+// A number fits a whole number of the name: an index that no device has is no part of "haswell-avx512".
+static bool name_fits(const char *name, const char *wish)
+{
+    if (!is_number(wish)) return strcasestr(name, wish) != NULL;
+    for (const char *at = name + strcspn(name, "0123456789"); *at; at += strcspn(at, "0123456789")) {
+        size_t length = strspn(at, "0123456789");
+        if (length == strlen(wish) && strncmp(at, wish, length) == 0) return true;
+        at += length;
+    }
+    return false;
+}
+
 static bool device_fits(const Device *device, const char *wish)
 {
     if (!wish) return true;
     if (strcasecmp(wish, "gpu") == 0) return (device->type & CL_DEVICE_TYPE_GPU) != 0;
     if (strcasecmp(wish, "cpu") == 0) return (device->type & CL_DEVICE_TYPE_CPU) != 0;
-    return strcasestr(device->name, wish) || strcasestr(device->platform_name, wish);
+    return name_fits(device->name, wish) || name_fits(device->platform_name, wish);
 }
 
 // Whether the wish is the index of a device: "3090" may still be a part of a name.
 static bool wish_is_index(const DeviceList *list, const char *wish, size_t *index)
 {
-    if (!wish || wish[0] == '\0' || wish[strspn(wish, "0123456789")] != '\0') return false;
+    if (!wish || !is_number(wish)) return false;
     *index = strtoul(wish, NULL, 10);
     return *index < list->count;
 }
@@ -210,10 +227,15 @@ static bool wish_is_index(const DeviceList *list, const char *wish, size_t *inde
 static void complain(const DeviceList *list, const char *wish, MessageList *messages)
 {
     if (list->count == 0) {
-        message_add(messages, MESSAGE_ERROR,
-                    "no OpenCL device (platforms: %u, none has one); PoCL runs on any CPU: "
-                    "`apt install pocl-opencl-icd` on Debian and Ubuntu",
-                    list->platform_count);
+        message_add(
+            messages, MESSAGE_ERROR,
+            "no OpenCL device (platforms: %u, none has one); PoCL runs on any CPU: "
+            "`apt install pocl-opencl-icd` on Debian and Ubuntu%s",
+            list->platform_count,
+            list->platform_count == 0
+                ? ""
+                : "; if it is installed, it needs a folder for its cache that can be written: set HOME, "
+                  "XDG_CACHE_HOME or POCL_CACHE_DIR");
         return;
     }
     Text devices = {0};

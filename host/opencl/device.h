@@ -36,10 +36,10 @@ typedef struct {
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
 
-// `wish`: an index, a part of the name or platform's name (any case), "cpu", "gpu", or NULL for the default:
-// a GPU if there is one, else a CPU, else any. Only devices that are available, little-endian and have a
-// compiler are taken. Identical twins: the first. NULL with an error message where nothing fits; the message
-// lists the devices there are, and says how to install PoCL if there are none.
+// `wish`: an index, a part of the name or platform's name (any case; a number only as a whole), "cpu", "gpu",
+// or NULL for the default: a GPU if there is one, else a CPU, else any. Only devices that are available,
+// little-endian and have a compiler are taken. Identical twins: the first. NULL with an error message where
+// nothing fits; the message lists the devices there are, and says how to install PoCL if there are none.
 const Device *device_choose(const DeviceList *list, const char *wish, MessageList *messages);
 
 // What the user asked for: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
