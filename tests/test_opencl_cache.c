@@ -137,6 +137,37 @@ static void test_entry_without_rights(void **state)
     free(path);
 }
 
+// Replaced when the key is stored; a pipe that nobody writes into is not waited for.
+static void test_entry_that_is_none_of_ours(void **state)
+{
+    (void)state;
+    char *path = cache_entry_path(key), *other = cache_entry_path("another key");
+    alarm(60);
+    for (int kind = 0; kind < 3; kind++) {
+        store(key);
+        if (kind == 0) {
+            assert_int_equal(unlink(path), 0);
+            assert_int_equal(mkfifo(path, 0600), 0);
+        } else if (kind == 1) {
+            assert_int_equal(rename(path, other), 0);
+            assert_int_equal(symlink(other, path), 0);
+        } else if (geteuid() == 0) {
+            assert_int_equal(chown(path, 65534, 65534), 0);
+        } else {
+            continue;
+        }
+        assert_false(loads(key));
+        store(key);
+        assert_true(loads(key));
+        struct stat status;
+        assert_int_equal(lstat(path, &status), 0);
+        assert_true(S_ISREG(status.st_mode) && status.st_uid == geteuid());
+    }
+    alarm(0);
+    free(path);
+    free(other);
+}
+
 static void test_no_place(void **state)
 {
     (void)state;
@@ -276,6 +307,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_of_another_key, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_without_rights, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_that_is_none_of_ours, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_no_place, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_unwritable, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_folder_in_place_of_entry, set_up, tear_down),

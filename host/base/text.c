@@ -63,14 +63,8 @@ size_t text_character_size(const char *text, size_t length)
     return size;
 }
 
-bool text_read_file(Text *text, const char *path, MessageList *messages)
+bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages)
 {
-    bool is_standard_input = strcmp(path, "-") == 0;
-    FILE *file = is_standard_input ? stdin : fopen(path, "rbe");
-    if (!file) {
-        message_add(messages, MESSAGE_ERROR, "cannot read '%s': %s", path, strerror(errno));
-        return false;
-    }
     // A device or a pipe may be endless.
     struct stat status;
     bool is_regular = fstat(fileno(file), &status) == 0 && S_ISREG(status.st_mode);
@@ -92,6 +86,18 @@ bool text_read_file(Text *text, const char *path, MessageList *messages)
         message_add(messages, MESSAGE_ERROR, "cannot read '%s': larger than 2 GiB", path);
         whole = false;
     }
+    return whole;
+}
+
+bool text_read_file(Text *text, const char *path, MessageList *messages)
+{
+    bool is_standard_input = strcmp(path, "-") == 0;
+    FILE *file = is_standard_input ? stdin : fopen(path, "rbe");
+    if (!file) {
+        message_add(messages, MESSAGE_ERROR, "cannot read '%s': %s", path, strerror(errno));
+        return false;
+    }
+    bool whole = text_read_open_file(text, file, path, messages);
     if (!is_standard_input) fclose(file);
     return whole;
 }

@@ -4,6 +4,7 @@
 #include "host/base/message.h"
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 typedef struct {
     char *items;
@@ -20,6 +21,8 @@ size_t text_character_size(const char *text, size_t length);
 
 // Reads a whole file (`-`: standard input). On failure adds a message that names the file and returns false.
 bool text_read_file(Text *text, const char *path, MessageList *messages);
+// The rest of one that is open, and stays so; `path` is used in messages only.
+bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages);
 
 // The known word nearest to `word` by edit distance, or NULL where none is near
 // (distance > 1 + length / 4, or as large as the word). A swap of neighbors counts one.

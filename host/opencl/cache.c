@@ -73,16 +73,39 @@ static bool entry_open(const Text *entry, const char *key, Text *binary)
     return true;
 }
 
+// What is loaded is run: an entry is a file of its user's own, and whatever else lies there is not waited
+// for.
+static bool is_own_file(const struct stat *status)
+{
+    return S_ISREG(status->st_mode) && status->st_uid == geteuid();
+}
+
+static bool entry_read(Text *entry, const char *path)
+{
+    int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+    if (descriptor < 0) return false;
+    struct stat status;
+    bool is_own = fstat(descriptor, &status) == 0 && is_own_file(&status);
+    FILE *file = is_own ? fdopen(descriptor, "rb") : NULL;
+    if (!file) {
+        close(descriptor);
+        return false;
+    }
+    MessageList ignored = {0};
+    bool read = text_read_open_file(entry, file, path, &ignored);
+    message_list_free(&ignored);
+    fclose(file);
+    return read;
+}
+
 bool cache_load(const char *key, Text *binary)
 {
     char *path = cache_entry_path(key);
     if (!path) return false;
-    MessageList ignored = {0};
     Text entry = {0};
-    bool found = text_read_file(&entry, path, &ignored) && entry_open(&entry, key, binary);
+    bool found = entry_read(&entry, path) && entry_open(&entry, key, binary);
     if (found) utimensat(AT_FDCWD, path, NULL, 0); // used now
     text_free(&entry);
-    message_list_free(&ignored);
     free(path);
     return found;
 }
@@ -155,7 +178,9 @@ void cache_store(const char *key, const Text *binary)
     char *path = cache_entry_path(key);
     if (!path) return;
     make_folders(path);
-    if (access(path, R_OK | W_OK) != 0) unlink(path); // an output would leave it as it is
+    struct stat status;
+    bool is_own = lstat(path, &status) == 0 && is_own_file(&status);
+    if (!is_own || access(path, R_OK | W_OK) != 0) unlink(path); // an output would leave it as it is
     CacheHeader header = entry_header(key, binary->items, binary->count);
     MessageList ignored = {0};
     OutputFile output;

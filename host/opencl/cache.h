@@ -8,7 +8,8 @@
 #include "host/base/text.h"
 #include <stdint.h>
 
-// Fills `binary`, which must be empty. False if there is no entry; one that is damaged is none.
+// Fills `binary`, which must be empty. False if there is no entry; one that is damaged, no regular file or
+// another user's is none.
 bool cache_load(const char *key, Text *binary);
 // Replaces the key's entry, and trims the cache to CACHE_BYTES_LARGEST.
 void cache_store(const char *key, const Text *binary);
