@@ -146,6 +146,9 @@ echo '0 0 -4 0 0 1 0' >bad-rays && refused 1 '^bad-rays:1:1: error: expected .*f
 echo '0 0 -4 0 0 1 0 1 2' >bad-rays && refused 1 'found more' trace ball.yaml --rays bad-rays
 echo '0 0 -4 0 0 inf' >bad-rays && refused 1 'beyond the precision' trace ball.yaml --rays bad-rays
 echo '0 0 -4 0 0 1e-50' >bad-rays && refused 1 'direction cannot be 0 0 0' trace ball.yaml --rays bad-rays
+seq 100000 >bad-rays && refused 1 '^bad-rays:1:1: error: expected .*found 1$' trace ball.yaml --rays bad-rays
+check '20 errors and no more' test "$(grep -c 'bad-rays:[0-9]' err)" = 20
+check 'and that there are more' grep -q 'bad-rays: many errors: reading stopped' err
 echo '0 0 -4 0 -0 0' >bad-rays && refused 1 'direction cannot be 0 0 0' trace ball.yaml --rays bad-rays
 echo 'camera: 5' >bad.yaml && refused 1 '^bad.yaml:1:' check bad.yaml
 echo 'bogus 1' >bad.rt && refused 1 '^Error$' check bad.rt

@@ -6,6 +6,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/scene/report.h"
 #include <float.h>
 #include <getopt.h>
 #include <math.h>
@@ -46,9 +47,9 @@ typedef struct {
 } RayList;
 
 // The numbers of one line, at most eight; the count, or -1 where something is no number.
-static int line_numbers(const Source *source, size_t start, size_t end, double numbers[8],
-                        MessageList *messages)
+static int line_numbers(Report *report, size_t start, size_t end, double numbers[8])
 {
+    const Source *source = report->source;
     int count = 0;
     const char *at = source->bytes + start, *stop = source->bytes + end;
     for (;;) {
@@ -59,11 +60,11 @@ static int line_numbers(const Source *source, size_t start, size_t end, double n
         double number = strtod(at, &after);
         size_t offset = (size_t)(at - source->bytes);
         if (after == at || after > stop || isnan(number)) {
-            message_add_at(messages, MESSAGE_ERROR, source, offset, "expected a number");
+            report_error(report, offset, "expected a number");
             return -1;
         }
         if (count == 8) {
-            message_add_at(messages, MESSAGE_ERROR, source, offset, "expected 6 numbers or 8, found more");
+            report_error(report, offset, "expected 6 numbers or 8, found more");
             return -1;
         }
         numbers[count++] = number;
@@ -74,11 +75,12 @@ static int line_numbers(const Source *source, size_t start, size_t end, double n
 static bool rays_read(RayList *rays, const Source *source, const CommonOptions *common, MessageList *messages)
 {
     double farthest = common->precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
-    for (size_t start = 0; start < source->length;) {
+    Report report = report_open(source, messages);
+    for (size_t start = 0; start < source->length && !report_is_full(&report);) {
         const char *newline = memchr(source->bytes + start, '\n', source->length - start);
         size_t end = newline ? (size_t)(newline - source->bytes) : source->length;
         double n[8] = {0};
-        int count = line_numbers(source, start, end, n, messages);
+        int count = line_numbers(&report, start, end, n);
         double narrow[3] = {n[3], n[4], n[5]};
         bool beyond = n[7] == -INFINITY;
         for (int i = 0; i < 7; i++)
@@ -88,16 +90,15 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
                 narrow[i] = (double)(float)fmax(-farthest, fmin(n[i + 3], farthest));
         if (count > 0) {
             if (count != 6 && count != 8) {
-                message_add_at(messages, MESSAGE_ERROR, source, start,
-                               "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
+                report_error(&report, start,
+                             "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
                 count = -1;
             } else if (beyond) {
-                message_add_at(messages, MESSAGE_ERROR, source, start,
-                               "a number is beyond the precision's range; only tmax may be infinite");
+                report_error(&report, start,
+                             "a number is beyond the precision's range; only tmax may be infinite");
                 count = -1;
             } else if (narrow[0] == 0 && narrow[1] == 0 && narrow[2] == 0) {
-                message_add_at(messages, MESSAGE_ERROR, source, start,
-                               "a ray's direction cannot be 0 0 0 at its precision");
+                report_error(&report, start, "a ray's direction cannot be 0 0 0 at its precision");
                 count = -1;
             }
         }
@@ -108,7 +109,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
         }
         start = end + 1;
     }
-    return message_count(messages, MESSAGE_ERROR) == 0;
+    return report_close(&report);
 }
 
 static bool rays_load(RayList *rays, const TraceOptions *options)
