@@ -178,6 +178,14 @@ if [ "$(id -u)" != 0 ]; then
 fi
 [ ! -c /dev/full ] || { ln -s /dev/full full.png && refused 1 'cannot write' render ball.yaml $small -o full.png; }
 
+if [ -c /dev/full ]; then
+    ln -s /dev/full old.t.npy
+    untouched 'a file beside it on a full disk' 1 ball.yaml $small --aov t
+    rm old.t.npy
+    "$GLINT" trace ball.yaml --rays rays >/dev/full 2>err
+    check 'a full disk behind standard output: exit status' test $? = 2
+    check 'and one message' test "$(wc -l <err)" = 1
+fi
 # Ctrl-C while a long render runs: started with the default action, which a background job of this shell has not.
 cp every.yaml long.yaml
 echo 'an earlier picture' >long.png

@@ -6,12 +6,14 @@
 #include "host/base/output.h"
 #include "host/base/text.h"
 
+#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -260,6 +262,80 @@ static void test_output_replaces_what_a_link_leads_to(void **state)
     unlink("real");
 }
 
+// Relative to the folder of each link on the way.
+static void test_output_makes_what_a_link_leads_to(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    assert_int_equal(mkdir("folder", 0700), 0);
+    assert_int_equal(symlink("folder/link", "link"), 0);
+    assert_int_equal(symlink("../made", "folder/link"), 0);
+    assert_true(output_open(&output, "link", &messages));
+    assert_true(output_write(&output, "new", 3, &messages));
+    assert_true(output_commit(&output, &messages));
+    check_content("made", "new");
+    struct stat status;
+    assert_int_equal(lstat("link", &status), 0);
+    assert_true(S_ISLNK(status.st_mode));
+    assert_int_equal(lstat("folder/link", &status), 0);
+    assert_true(S_ISLNK(status.st_mode));
+    unlink("made");
+    unlink("link");
+
+    assert_int_equal(symlink("link", "link"), 0);
+    assert_false(output_open(&output, "link", &messages));
+    check_only_message(&messages, "cannot create 'link': Too many levels of symbolic links");
+    unlink("link");
+    unlink("folder/link");
+    rmdir("folder");
+}
+
+// In place of libc's.
+static bool modes_are_refused;
+
+int fchmod(int descriptor, mode_t mode) // NOLINT(readability-inconsistent-declaration-parameter-name)
+{
+    if (!modes_are_refused) return (int)syscall(SYS_fchmod, descriptor, mode);
+    errno = EPERM;
+    return -1;
+}
+
+static void test_output_where_there_are_no_modes(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    modes_are_refused = true;
+    assert_true(output_open(&output, "new", &messages));
+    modes_are_refused = false;
+    assert_true(output_write(&output, "new", 3, &messages));
+    assert_true(output_commit(&output, &messages));
+    assert_int_equal(mode_of("new"), 0600);
+    check_content("new", "new");
+    unlink("new");
+}
+
+static void test_output_settle(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile output;
+    file_write("kept", "old");
+    assert_true(output_open(&output, "kept", &messages));
+    assert_true(output_write(&output, "new", 3, &messages));
+    assert_true(output_settle(&output, &messages));
+    check_content(output.temporary, "new");
+    check_content("kept", "old");
+    assert_true(output_commit(&output, &messages));
+    check_content("kept", "new");
+    assert_true(output_open(&output, "/dev/full", &messages));
+    assert_true(output_write(&output, "x", 1, &messages));
+    assert_false(output_settle(&output, &messages));
+    check_only_message(&messages, "cannot write '/dev/full': No space left on device");
+    unlink("kept");
+}
+
 static void test_output_failures(void **state)
 {
     (void)state;
@@ -346,6 +422,9 @@ int main(void)
         cmocka_unit_test(test_read_failures),
         cmocka_unit_test(test_output_commit),
         cmocka_unit_test(test_output_replaces_what_a_link_leads_to),
+        cmocka_unit_test(test_output_makes_what_a_link_leads_to),
+        cmocka_unit_test(test_output_where_there_are_no_modes),
+        cmocka_unit_test(test_output_settle),
         cmocka_unit_test(test_output_failures),
         cmocka_unit_test(test_output_abandon),
         cmocka_unit_test(test_fault_removes_the_temporary),

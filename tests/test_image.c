@@ -332,11 +332,44 @@ static void test_disk_full(void **state)
         ImageWriter *writer = image_writer_open("/dev/full", &header, &messages);
         if (writer) {
             image_writer_rows(writer, values, SIDE, &messages);
+            if (i % 2) assert_false(image_writer_settle(writer, &messages));
             assert_false(image_writer_commit(writer, &messages));
         }
         assert_int_equal(messages.count, 1);
         assert_string_equal(messages.items[0].text, "cannot write '/dev/full': No space left on device");
         message_list_free(&messages);
+    }
+    free(values);
+}
+
+static void test_settled_is_yet_to_be_renamed(void **state)
+{
+    (void)state;
+    float *values = values_make(8 * 40 * 3);
+    for (size_t i = 0; i < 4; i++) {
+        char path[16];
+        snprintf(path, sizeof path, "old.%s", endings[i]);
+        file_write(path, "old", 3);
+        unsigned before = folder_count();
+        MessageList messages = {0};
+        ImageHeader header = {image_format_of(path), 8, 40, 3, TRANSFER_SRGB, 8, 'f', notes};
+        for (int commits = 0; commits < 2; commits++) {
+            ImageWriter *writer = image_writer_open(path, &header, &messages);
+            assert_non_null(writer);
+            assert_true(image_writer_rows(writer, values, 40, &messages));
+            assert_true(image_writer_settle(writer, &messages));
+            check_content(path, "old");
+            if (commits)
+                assert_true(image_writer_commit(writer, &messages));
+            else
+                image_writer_abandon(writer);
+            assert_int_equal(folder_count(), before);
+        }
+        Image image;
+        assert_true(image_read(&image, path, &messages));
+        assert_int_equal(image.height, 40);
+        image_free(&image);
+        check_no_messages(&messages);
     }
     free(values);
 }
@@ -450,6 +483,7 @@ int main(void)
         cmocka_unit_test(test_png_notes),
         cmocka_unit_test(test_exr_notes),
         cmocka_unit_test(test_abandoned_leaves_the_old_file),
+        cmocka_unit_test(test_settled_is_yet_to_be_renamed),
         cmocka_unit_test(test_disk_full),
         cmocka_unit_test(test_folder_that_is_not_there),
         cmocka_unit_test(test_format_by_ending),

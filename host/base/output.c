@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -86,12 +87,31 @@ static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *mes
         return output_failed(output, "create", messages);
     }
     pending_add(output->temporary);
-    if (fchmod(descriptor, mode) == 0) output->file = fdopen(descriptor, "wb");
+    fchmod(descriptor, mode); // where a file system has no modes, it is written all the same
+    output->file = fdopen(descriptor, "wb");
     if (output->file) return true;
     int error = errno;
     close(descriptor);
     errno = error;
     return output_failed(output, "create", messages);
+}
+
+// Where a link that leads to no file yet ends: `target` itself if it is none.
+static char *link_end(const char *target)
+{
+    enum { STEPS_LARGEST = 40 }; // as Linux has it; what is left then leads in a circle
+    char *path = memory_copy_text(target), aim[PATH_MAX];
+    for (int step = 0; step < STEPS_LARGEST; step++) {
+        ssize_t length = readlink(path, aim, sizeof aim);
+        if (length < 0) break;
+        const char *slash = aim[0] == '/' ? NULL : strrchr(path, '/');
+        char *next;
+        if (asprintf(&next, "%.*s%.*s", slash ? (int)(slash + 1 - path) : 0, path, (int)length, aim) < 0)
+            fault("out of memory: file name");
+        free(path);
+        path = next;
+    }
+    return path;
 }
 
 bool output_open(OutputFile *output, const char *target, MessageList *messages)
@@ -102,12 +122,12 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
         output->file = stdout;
         return true;
     }
-    // A link stays: the file it leads to is the one replaced.
-    char *resolved = realpath(target, NULL);
-    output->target = resolved ? resolved : memory_copy_text(target);
-
     struct stat old;
-    bool exists = stat(output->target, &old) == 0;
+    bool exists = stat(target, &old) == 0;
+    // A link stays: the file it leads to is the one replaced, or made.
+    char *resolved = exists ? realpath(target, NULL) : link_end(target);
+    output->target = resolved ? resolved : memory_copy_text(target);
+    if (!exists && errno == ELOOP) return output_failed(output, "create", messages);
     if (exists && !S_ISREG(old.st_mode)) return output_open_directly(output, messages);
     // Renaming would replace a file that its owner made read-only.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
@@ -116,18 +136,27 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
 
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages)
 {
-    if (size == 0 || fwrite(bytes, 1, size, output->file) == size) return true;
+    if (size == 0 || fwrite(bytes, 1, size, output->file) == size || output->file == stdout) return true;
     message_add(messages, MESSAGE_ERROR, "cannot write '%s': %s", output->target, strerror(errno));
     return false;
 }
 
-bool output_commit(OutputFile *output, MessageList *messages)
+bool output_settle(OutputFile *output, MessageList *messages)
 {
-    errno = EIO; // what an error that an earlier write met has left is not known
-    if (fflush(output->file) != 0 || ferror(output->file)) return output_failed(output, "write", messages);
     FILE *file = output->file;
     output->file = NULL;
-    if (file != stdout && fclose(file) != 0) return output_failed(output, "write", messages);
+    if (!file || file == stdout) return true;
+    errno = EIO; // what an error that an earlier write met has left is not known
+    bool written = fflush(file) == 0 && !ferror(file);
+    int error = errno;
+    if (fclose(file) == 0 && written) return true;
+    if (!written) errno = error;
+    return output_failed(output, "write", messages);
+}
+
+bool output_commit(OutputFile *output, MessageList *messages)
+{
+    if (!output_settle(output, messages)) return false;
     if (output->temporary) {
         if (rename(output->temporary, output->target) != 0) return output_failed(output, "write", messages);
         pending_drop(output->temporary);

@@ -300,7 +300,14 @@ bool picture_commit(Picture *picture, MessageList *messages, double *seconds)
         return false;
     }
     double start = clock_seconds();
-    bool whole = image_writer_commit(picture->color, messages);
+    bool whole = image_writer_settle(picture->color, messages);
+    for (size_t i = 0; i < PICTURE_AOV_COUNT && whole; i++)
+        if (picture->aovs[i]) whole = image_writer_settle(picture->aovs[i], messages);
+    if (!whole) {
+        picture_abandon(picture);
+        return false;
+    }
+    whole = image_writer_commit(picture->color, messages);
     for (size_t i = 0; i < PICTURE_AOV_COUNT; i++) {
         if (!picture->aovs[i]) continue;
         if (whole)

@@ -11,7 +11,7 @@ struct ImageWriter {
     const struct Encoder *encoder;
     void *state;
     uint32_t rows_written;
-    bool failed;
+    bool settled, failed;
 };
 
 // A function that fails adds a message and returns false; the writer is then only freed.

@@ -71,12 +71,20 @@ static void writer_free(ImageWriter *writer)
     free(writer);
 }
 
+bool image_writer_settle(ImageWriter *writer, MessageList *messages)
+{
+    if (writer->failed || writer->settled) return !writer->failed;
+    if (writer->rows_written < writer->header.height)
+        fault("a picture without all its rows: %s", writer->output.target);
+    writer->settled = (!writer->encoder->end || writer->encoder->end(writer, messages)) &&
+                      output_settle(&writer->output, messages);
+    writer->failed = !writer->settled;
+    return writer->settled;
+}
+
 bool image_writer_commit(ImageWriter *writer, MessageList *messages)
 {
-    if (!writer->failed && writer->rows_written < writer->header.height)
-        fault("a picture without all its rows: %s", writer->output.target);
-    bool done = !writer->failed && (!writer->encoder->end || writer->encoder->end(writer, messages)) &&
-                output_commit(&writer->output, messages);
+    bool done = image_writer_settle(writer, messages) && output_commit(&writer->output, messages);
     writer_free(writer);
     return done;
 }

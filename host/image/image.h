@@ -34,8 +34,11 @@ ImageWriter *image_writer_open(const char *path, const ImageHeader *header, Mess
 // be committed, which fails without another message, or abandoned. More rows than the picture has are a
 // program's fault.
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
-// Completes the file and renames it to its target; false with an error message where that fails, and the
-// target is as it was. Frees the writer either way. Missing rows are a program's fault.
+// Completes the file, so that only the renaming is left: of several files none is put in place before all are
+// whole. False with an error message where that fails; the writer is still to be committed or abandoned.
+bool image_writer_settle(ImageWriter *writer, MessageList *messages);
+// Completes the file unless it is settled, and renames it to its target; false with an error message where
+// that fails, and the target is as it was. Frees the writer either way. Missing rows are a program's fault.
 bool image_writer_commit(ImageWriter *writer, MessageList *messages);
 void image_writer_abandon(ImageWriter *writer); // removes the file and frees the writer; NULL is accepted
 
