@@ -186,6 +186,25 @@ if [ -c /dev/full ]; then
     check 'a full disk behind standard output: exit status' test $? = 2
     check 'and one message' test "$(wc -l <err)" = 1
 fi
+# A scene's own files are not overwritten, by whatever name.
+printf 'P3 1 1 255 9 9 9\n' >globe.png
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >mesh.obj
+sed 's/radius: 1}/radius: 1, material: {image: globe.png}}\n  - mesh: {file: mesh.obj}/' ball.yaml >globe.yaml
+ln -s globe.yaml link.png
+ln globe.png hard.t.npy
+mkdir globe
+refused 1 "would overwrite 'globe.png', which the scene is read from; name another with -o" render globe.yaml $small
+refused 1 "would overwrite 'globe/../globe.png'" render globe.yaml $small -o globe/../globe.png
+refused 1 "would overwrite 'link.png'" render globe.yaml $small -o link.png
+refused 1 "would overwrite 'hard.t.npy'" render globe.yaml $small --aov normal,t -o hard.png
+refused 1 "would overwrite 'mesh.obj'" trace globe.yaml --rays rays -o mesh.obj
+check 'its picture is as it was' grep -q '^P3' globe.png
+check 'its mesh is as it was' grep -q '^v 0' mesh.obj
+check 'the scene is as it was' grep -q '^camera' globe.yaml
+ok 'another name' render globe.yaml $small -o globe/other.png
+rm globe.png hard.t.npy
+refused 1 "^globe.yaml:[0-9]+:[0-9]+: error: cannot read 'globe.png': No such file" check globe.yaml
+
 # Ctrl-C while a long render runs: started with the default action, which a background job of this shell has not.
 cp every.yaml long.yaml
 echo 'an earlier picture' >long.png

@@ -64,7 +64,7 @@ void message_add(MessageList *list, MessageSeverity severity, const char *format
     array_push(*list, message);
 }
 
-Message message_place(const Source *source, size_t offset)
+static Message message_place(const Source *source, size_t offset)
 {
     Message message = {0};
     if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
@@ -101,20 +101,7 @@ void message_add_at(MessageList *list, MessageSeverity severity, const Source *s
     array_push(*list, message);
 }
 
-void message_add_placed(MessageList *list, MessageSeverity severity, const Message *place, const char *format,
-                        ...)
-{
-    Message message = {.severity = severity, .line = place->line, .column = place->column};
-    if (place->file) message.file = memory_copy_text(place->file);
-    if (place->source_line) message.source_line = memory_copy_text(place->source_line);
-    va_list arguments;
-    va_start(arguments, format);
-    message.text = message_format(format, arguments);
-    va_end(arguments);
-    array_push(*list, message);
-}
-
-void message_free(Message *message)
+static void message_free(Message *message)
 {
     free(message->file);
     free(message->text);

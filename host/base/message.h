@@ -36,12 +36,6 @@ void message_add(MessageList *list, MessageSeverity severity, const char *format
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
 
-// A place to keep, for messages about it when the source is gone: a message without a text.
-Message message_place(const Source *source, size_t offset);
-void message_add_placed(MessageList *list, MessageSeverity severity, const Message *place, const char *format,
-                        ...) __attribute__((format(printf, 4, 5)));
-void message_free(Message *message);
-
 size_t message_count(const MessageList *list, MessageSeverity severity);
 
 // `file:line:column: error: text`, then the line and a caret where they are known.

@@ -4,10 +4,13 @@
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/render/features.h"
+#include "host/scene/report.h"
 #include <ctype.h>
+#include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { OPTION_JSON = OPTION_OWN };
 
@@ -142,6 +145,19 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
     json_print(json, stdout);
 }
 
+// Who renders the scene reads its images; here they need only be there.
+static bool images_are_there(const Scene *scene, MessageList *messages)
+{
+    const Source source = scene_source(scene);
+    Report report = report_open(&source, messages);
+    for (size_t i = 0; i < scene->images.count && !report_is_full(&report); i++) {
+        const SceneImage *image = &scene->images.items[i];
+        if (access(image->path, R_OK) != 0)
+            report_error(&report, image->offset, "cannot read '%s': %s", image->path, strerror(errno));
+    }
+    return report_close(&report);
+}
+
 int command_check(int argument_count, char **arguments)
 {
     SceneOptions scene_options = {0};
@@ -166,7 +182,7 @@ int command_check(int argument_count, char **arguments)
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};
-    bool loaded = scene_load(&scene, path, &scene_options, &messages);
+    bool loaded = scene_load(&scene, path, &scene_options, &messages) && images_are_there(&scene, &messages);
     if (as_json) {
         json_report(path, &scene, loaded, &messages);
         message_list_free(&messages);

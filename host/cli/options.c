@@ -180,6 +180,14 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
     return loaded;
 }
 
+bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path)
+{
+    if (!scene_was_read_from(scene, scene_path, path)) return true;
+    fprintf(stderr, "glint: would overwrite '%s', which the scene is read from; name another with -o\n",
+            path);
+    return false;
+}
+
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height)
 {
     return (RenderSettings){

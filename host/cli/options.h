@@ -74,6 +74,9 @@ enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
 extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 
+// Whether writing `path` would overwrite what the scene was read from; says so then.
+bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path);
+
 // What reading a command line gives where the subcommand is to go on; else it gives the exit status.
 enum { OPTIONS_READ = -1 };
 

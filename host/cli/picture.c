@@ -4,6 +4,7 @@
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
 #include "host/base/text.h"
+#include "host/cli/options.h"
 #include "host/cli/version.h"
 #include <pthread.h>
 #include <stdlib.h>
@@ -131,13 +132,25 @@ static ImageHeader header_of(const Picture *picture, uint32_t channels, char npy
 }
 
 // picture.png -> picture.NAME.npy
-static char *aov_path(const Picture *picture, const char *name)
+static char *aov_path(const PictureOptions *options, const char *name)
 {
     Text path = {0};
-    const char *dot = strrchr(picture->options->path, '.');
-    text_append(&path, picture->options->path, (size_t)(dot - picture->options->path));
+    const char *dot = strrchr(options->path, '.');
+    text_append(&path, options->path, (size_t)(dot - options->path));
     text_appendf(&path, ".%s.npy", name);
     return path.items;
+}
+
+bool picture_spares_scene(const PictureOptions *options, const Scene *scene, const char *scene_path)
+{
+    bool spares = output_spares_scene(options->path, scene, scene_path);
+    for (size_t i = 0; i < PICTURE_AOV_COUNT && spares; i++) {
+        if (!(options->aovs >> i & 1)) continue;
+        char *path = aov_path(options, picture_aov_names[i]);
+        spares = output_spares_scene(path, scene, scene_path);
+        free(path);
+    }
+    return spares;
 }
 
 static bool files_open(Picture *picture, MessageList *messages)
@@ -171,7 +184,7 @@ static bool files_open(Picture *picture, MessageList *messages)
             message_add(messages, MESSAGE_WARNING, "no shadow masks are written: the scene has no lights");
             continue;
         }
-        char *path = aov_path(picture, picture_aov_names[i]);
+        char *path = aov_path(picture->options, picture_aov_names[i]);
         picture->aovs[i] = image_writer_open(path, &aov_headers[i], messages);
         opened = picture->aovs[i] != NULL;
         free(path);

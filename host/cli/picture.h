@@ -22,6 +22,8 @@ typedef struct Picture Picture;
 char *
 picture_default_path(const char *scene_path); // the scene's name with .png, in this folder; caller frees
 bool picture_path_known(const char *path);    // false: the endings there are were printed
+// Whether none of the files is one that the scene was read from; which one is was printed.
+bool picture_spares_scene(const PictureOptions *options, const Scene *scene, const char *scene_path);
 unsigned picture_renderer_aovs(const PictureOptions *options);
 
 // Files are opened with the first band, when the kernels' hash is known.

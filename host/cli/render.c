@@ -234,7 +234,8 @@ int command_render(int argument_count, char **arguments)
     OpenDevice open;
     double start = clock_seconds();
     status = EXIT_USER;
-    if (picture_path_known(options.picture.path) && scene_open(&scene, options.scene, &options.common)) {
+    if (picture_path_known(options.picture.path) && scene_open(&scene, options.scene, &options.common) &&
+        picture_spares_scene(&options.picture, &scene, options.scene)) {
         double parse_seconds = clock_seconds() - start;
         if (device_open(&open, options.common.device)) {
             status = scene_render(&options, &scene, &open.compute, parse_seconds);

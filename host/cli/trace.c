@@ -194,7 +194,8 @@ int command_trace(int argument_count, char **arguments)
     RayList rays = {0};
     OpenDevice open;
     status = EXIT_USER;
-    if (scene_open(&scene, options.scene, &options.common) && rays_load(&rays, &options) &&
+    if (scene_open(&scene, options.scene, &options.common) &&
+        output_spares_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, options.common.device)) {
         status = rays_trace(&options, &scene, &rays, &open.compute);
         device_close(&open);

@@ -117,24 +117,25 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
     return list->texel_count > TEXELS_LARGEST ? "too many texels in all pictures" : NULL;
 }
 
-static bool image_add(LevelList *list, TextureSize *size, const SceneImage *scene_image, bool as_displayed,
+static bool image_add(LevelList *list, TextureSize *size, const Scene *scene, const SceneImage *scene_image,
                       MessageList *messages)
 {
+    const Source source = scene_source(scene);
     Image image;
     MessageList problems = {0};
     bool done = image_read(&image, scene_image->path, &problems);
     if (done) {
-        const char *problem = levels_add(list, &image, as_displayed);
+        const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
         *size = (TextureSize){image.width, image.height};
         image_free(&image);
         done = !problem;
         if (problem)
-            message_add_placed(messages, MESSAGE_ERROR, &scene_image->place, "cannot use '%s': %s",
-                               scene_image->path, problem);
+            message_add_at(messages, MESSAGE_ERROR, &source, scene_image->offset, "cannot use '%s': %s",
+                           scene_image->path, problem);
     }
     for (size_t i = 0; i < problems.count; i++)
-        message_add_placed(messages, problems.items[i].severity, &scene_image->place, "%s",
-                           problems.items[i].text);
+        message_add_at(messages, problems.items[i].severity, &source, scene_image->offset, "%s",
+                       problems.items[i].text);
     message_list_free(&problems);
     return done;
 }
@@ -180,8 +181,7 @@ bool textures_hang(FlatScene *flat, const Scene *scene, const FlattenSettings *s
     uint32_t *first_levels = memory_allocate_zeroed(count + 1, sizeof *first_levels);
     bool done = true;
     for (size_t i = 0; i < count && done; i++) {
-        done = image_add(&list, &sizes[i], &scene->images.items[i], scene->color_meaning == COLORS_DISPLAY,
-                         messages);
+        done = image_add(&list, &sizes[i], scene, &scene->images.items[i], messages);
         first_levels[i + 1] = (uint32_t)list.levels.count;
     }
     if (done) {

@@ -11,6 +11,7 @@ void mesh_free(Mesh *mesh)
     free(mesh->uvs);
     free(mesh->triangles);
     free(mesh->materials);
+    free(mesh->path);
     *mesh = (Mesh){0};
 }
 

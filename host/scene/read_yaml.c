@@ -1,4 +1,5 @@
 // The native format: the whole document and its camera. Reference: docs/scene-format.md.
+#include "host/base/memory.h"
 #include "host/scene/yaml_scene.h"
 
 #include <stdlib.h>
@@ -74,6 +75,10 @@ bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages)
     YamlReader reader = {
         .report = report_open(source, messages), .scene = scene, .default_material = UINT32_MAX};
     if (yaml_tree_read(&reader.tree, &reader.report)) document_read(&reader);
+    if (scene->images.count > 0) {
+        scene->file = memory_copy_text(source->file);
+        text_append(&scene->text, source->bytes, source->length);
+    }
     yaml_tree_free(&reader.tree);
     free(reader.names.items);
     return scene_finish(scene, &reader.report);

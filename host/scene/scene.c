@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 const char *const shape_names[SHAPE_COUNT] = {
     [SHAPE_SPHERE] = "sphere",     [SHAPE_PLANE] = "plane",       [SHAPE_DISC] = "disc",
@@ -76,12 +77,36 @@ void scene_free(Scene *scene)
     for (size_t i = 0; i < scene->meshes.count; i++)
         mesh_free(&scene->meshes.items[i]);
     free(scene->meshes.items);
-    for (size_t i = 0; i < scene->images.count; i++) {
+    for (size_t i = 0; i < scene->images.count; i++)
         free(scene->images.items[i].path);
-        message_free(&scene->images.items[i].place);
-    }
     free(scene->images.items);
+    free(scene->file);
+    text_free(&scene->text);
     *scene = (Scene){0};
+}
+
+Source scene_source(const Scene *scene)
+{
+    return (Source){scene->file, text_c(&scene->text), scene->text.count};
+}
+
+static bool is_same_file(const char *path, const struct stat *other)
+{
+    struct stat status;
+    return path && stat(path, &status) == 0 && status.st_dev == other->st_dev &&
+           status.st_ino == other->st_ino;
+}
+
+bool scene_was_read_from(const Scene *scene, const char *scene_path, const char *path)
+{
+    struct stat status;
+    if (stat(path, &status) != 0) return false;
+    bool is_read = is_same_file(scene_path, &status);
+    for (size_t i = 0; i < scene->images.count && !is_read; i++)
+        is_read = is_same_file(scene->images.items[i].path, &status);
+    for (size_t i = 0; i < scene->meshes.count && !is_read; i++)
+        is_read = is_same_file(scene->meshes.items[i].path, &status);
+    return is_read;
 }
 
 static bool ends_with(const char *path, const char *ending)

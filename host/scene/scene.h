@@ -2,7 +2,7 @@
 // Readers fill it; `flatten` (host/render) turns it into the device's arrays.
 #pragma once
 
-#include "host/base/message.h"
+#include "host/base/text.h"
 #include "host/scene/bounds.h"
 #include "host/scene/vector.h"
 #include <stdbool.h>
@@ -49,7 +49,7 @@ typedef struct {
 // A picture that lies on surfaces; who renders the scene reads it.
 typedef struct {
     char *path;
-    Message place; // of its name in the scene file, without a text
+    size_t offset; // of its name in the scene's text
 } SceneImage;
 
 typedef enum {
@@ -127,6 +127,7 @@ typedef struct {
     uint32_t (*triangles)[3];
     uint32_t *materials; // one for each triangle, or NULL: the object's
     size_t triangle_count;
+    char *path; // that it was read from, or NULL
 } Mesh;
 
 // How a format means its colors: linear light, or values a display takes as they are.
@@ -159,6 +160,8 @@ typedef struct {
         SceneImage *items;
         size_t count, capacity;
     } images;
+    char *file; // of a scene that has images, and
+    Text text;  // what was read from it: for messages about them, see scene_source
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own picture size, or 0
 } Scene;
@@ -177,6 +180,12 @@ bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
+
+// Of a scene that has images.
+Source scene_source(const Scene *scene);
+
+// Whether `path` is the file that the scene was read from, or one of its images or meshes, by whatever name.
+bool scene_was_read_from(const Scene *scene, const char *scene_path, const char *path);
 
 // Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32,
 // ior 1.5.

@@ -61,7 +61,7 @@ static bool read_image(YamlReader *reader, const Field *field, const YamlNode *n
         return false;
     }
     if (index == scene->images.count) {
-        SceneImage image = {path, message_place(reader->report.source, node->offset)};
+        SceneImage image = {path, node->offset};
         array_push(scene->images, image);
     } else {
         free(path);

@@ -60,6 +60,8 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
     };
     Object object = {.kind = SHAPE_MESH, .material = read.material};
     if (mesh_import(reader->scene, &import, &reader->report, read.file->offset, &object.as.mesh.index)) {
+        reader->scene->meshes.items[object.as.mesh.index].path = path;
+        path = NULL;
         if (object.material == UINT32_MAX) object.material = material_default_index(reader);
         if (material_fits(reader, mapping, &object)) array_push(reader->scene->objects, object);
     }
