@@ -4,6 +4,7 @@
 #include "host/cli/commands.h"
 #include "host/cli/version.h"
 #include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -69,6 +70,9 @@ static int command_run(int argument_count, char **arguments)
 
 int main(int argument_count, char **arguments)
 {
+    // what cannot be written is told as on a full disk, and nothing half written is left
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN);
     int status = command_run(argument_count, arguments);
     // a report that did not get out whole must not look like one that did
     if (fflush(stdout) == 0 && !ferror(stdout)) return status;

@@ -186,6 +186,29 @@ if [ -c /dev/full ]; then
     check 'a full disk behind standard output: exit status' test $? = 2
     check 'and one message' test "$(wc -l <err)" = 1
 fi
+if (ulimit -f 1024) 2>/dev/null; then
+    "$GLINT" render ball.yaml --size 1000x1000 -o warm.png --quiet 2>err # so that the kernel is built
+    (ulimit -f 1024 && env --default-signal=XFSZ "$GLINT" render ball.yaml --size 1000x1000 -o limit.ppm --quiet 2>err)
+    check 'a limit on the size of files: exit status' test $? = 1
+    check 'its message' grep -q "cannot write '.*limit.ppm': File too large" err
+    check 'nothing left of it' test -z "$(find . -name '*limit*')"
+fi
+
+# Who reads goes away: no signal ends glint half way.
+"$GLINT" check ball.yaml 2>err | :
+case ${PIPESTATUS[0]} in 0 | 2) pass ;; *) fail 'nobody reads the standard output' ;; esac
+seq -f '%g 0 -4 0 0 1' 100000 >many-rays
+"$GLINT" trace ball.yaml --rays many-rays 2>err | head -1 >out
+check 'head after trace: exit status' test "${PIPESTATUS[0]}" = 2
+check 'its message' test "$(cat err)" = 'glint: cannot write the standard output: Broken pipe'
+mkfifo pipe.ppm
+head -c 10 pipe.ppm >out &
+"$GLINT" render ball.yaml --size 400x300 --quiet --aov t -o pipe.ppm 2>err
+check 'a pipe that nobody reads: exit status' test $? = 1
+wait
+check 'its message' grep -q "cannot write '.*pipe.ppm': Broken pipe" err
+check 'nothing left beside it' test -z "$(find . -name '*pipe.t*')"
+
 # A scene's own files are not overwritten, by whatever name.
 printf 'P3 1 1 255 9 9 9\n' >globe.png
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >mesh.obj
@@ -205,30 +228,34 @@ ok 'another name' render globe.yaml $small -o globe/other.png
 rm globe.png hard.t.npy
 refused 1 "^globe.yaml:[0-9]+:[0-9]+: error: cannot read 'globe.png': No such file" check globe.yaml
 
-# Ctrl-C while a long render runs: started with the default action, which a background job of this shell has not.
+# Signals while a long render runs: started with the default action, which a background job of this shell has not.
 cp every.yaml long.yaml
-echo 'an earlier picture' >long.png
 "$GLINT" render every.yaml --size 64x64 -o warm.png --quiet 2>err
-python3 - "$GLINT" <<'E2' >interrupt.log 2>&1
-import signal, subprocess, sys, time
+cat >interrupt.py <<'E2'
+import glob, signal, subprocess, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL) # nohup has it ignored
 arguments = [sys.argv[1], 'render', 'long.yaml', '--size', '20000x20000', '--samples', '64', '-o', 'long.png']
 render = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True)
-import glob
 waited = 0
 while not glob.glob('.long.png.*') and waited < 120 and render.poll() is None:
     time.sleep(0.1)
     waited += 0.1
 assert glob.glob('.long.png.*'), 'it never began to write'
-render.send_signal(signal.SIGINT)
+for name in sys.argv[2:]:
+    render.send_signal(getattr(signal, name))
+    time.sleep(0.01)
 said = render.communicate(timeout=120)[1]
 print(said)
 assert render.returncode == 130, render.returncode
 assert 'interrupted' in said and 'long.png' in said
 E2
-[ $? = 0 ] && pass || { fail 'Ctrl-C'; cat interrupt.log; }
-check 'Ctrl-C: the earlier picture' test "$(cat long.png)" = 'an earlier picture'
-check 'Ctrl-C: nothing left beside it' test -z "$(find . -name '.long.png*')"
+for signals in SIGINT 'SIGINT SIGINT' SIGTERM SIGHUP; do
+    echo 'an earlier picture' >long.png
+    check "$signals" python3 interrupt.py "$GLINT" $signals
+    check "$signals: the earlier picture" test "$(cat long.png)" = 'an earlier picture'
+    check "$signals: nothing left beside it" test -z "$(find . -name '.long.png*')"
+done
 
 # Pictures in every format, at every precision.
 ok 'a picture named after its scene' render ball.yaml $small

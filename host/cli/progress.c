@@ -8,9 +8,10 @@
 
 static volatile sig_atomic_t interrupted;
 
+// Often two come at once, to the process and to its group; who sends a third has waited.
 static void interrupt_note(int signal_number)
 {
-    (void)signal_number;
+    if (interrupted) signal(signal_number, SIG_DFL);
     interrupted = 1;
 }
 
@@ -19,9 +20,13 @@ void progress_open(Progress *progress, bool quiet)
     double now = clock_seconds();
     *progress =
         (Progress){.visible = !quiet && isatty(STDERR_FILENO), .start_seconds = now, .shown_seconds = now};
-    struct sigaction action = {.sa_handler = interrupt_note, .sa_flags = (int)SA_RESETHAND};
+    const struct sigaction action = {.sa_handler = interrupt_note};
+    struct sigaction before;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    // nohup has it ignored
+    if (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+        sigaction(SIGHUP, &action, NULL);
 }
 
 void progress_show(Progress *progress, double fraction_done)

@@ -8,7 +8,8 @@ typedef struct {
     double start_seconds, shown_seconds;
 } Progress;
 
-// From here on an interrupt or a request to end is noted, not obeyed at once; a second one ends the process.
+// From here on an interrupt, a request to end or the terminal's end is noted, not obeyed at once; a third
+// ends the process.
 void progress_open(Progress *progress, bool quiet);
 // `fraction_done` is above 0 and at most 1, which is all; from it and the time spent follows the time left.
 void progress_show(Progress *progress, double fraction_done);
