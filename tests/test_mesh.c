@@ -188,6 +188,11 @@ static void material_is_white_where_the_file_has_none(void **state)
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"        \
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 " y                 \
     " 0\n3 0 1 " index "\n"
+// Four vertices, the unit square's first three in this order, and two faces.
+#define PLY_OF_FACES(first, second)                                                                          \
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"        \
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n" first \
+    "\n" second "\n"
 #define STL_OF(y)                                                                                            \
     "solid part\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 " y                    \
     " 0\nendloop\nendfacet\nendsolid part\n"
@@ -226,6 +231,67 @@ static void every_format_is_read(void **state)
     scene_free(&scene);
 }
 
+static void faces_without_corners_are_left_out(void **state)
+{
+    (void)state;
+    file_write("a.ply", PLY_OF_FACES("0", "4 0 1 3 2"));
+    Scene scene = scene_of_objects("  - mesh: {file: a.ply}\n");
+    assert_int_equal(scene.meshes.items[0].triangle_count, 2);
+    scene_free(&scene);
+}
+
+// Twice the area of all triangles; all have to turn left, seen from above.
+static double area_of(const Mesh *mesh)
+{
+    double area = 0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        const uint32_t *triangle = mesh->triangles[i];
+        Vector3 a = mesh->vertices[triangle[0]];
+        Vector3 normal = vector_cross(vector_subtract(mesh->vertices[triangle[1]], a),
+                                      vector_subtract(mesh->vertices[triangle[2]], a));
+        assert_true(normal.z > 0);
+        area += normal.z;
+    }
+    return area;
+}
+
+// A comb with more teeth than assimp cuts out in full.
+static void concave_polygon_is_cut_in_full(void **state)
+{
+    (void)state;
+    enum { TEETH = 100 };
+    Text text = {0}, face = {0};
+    text_appendf(&text, "v 0 0 0\nv %d 0 0\n", TEETH);
+    text_appendf(&face, "f 1 2");
+    for (int tooth = TEETH - 1; tooth >= 0; tooth--) {
+        text_appendf(&text, "v %d.75 0.5 0\nv %d.5 0.5 0\nv %d.5 2 0\nv %d 2 0\n", tooth, tooth, tooth,
+                     tooth);
+        for (int i = 0; i < 4; i++)
+            text_appendf(&face, " %d", 3 + 4 * (TEETH - 1 - tooth) + i);
+    }
+    text_appendf(&text, "%s\n", text_c(&face));
+    file_write("a.obj", text_c(&text));
+    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    assert_int_equal(scene.meshes.items[0].triangle_count, 4 * TEETH);
+    assert_number(area_of(&scene.meshes.items[0]), 287.0);
+    scene_free(&scene);
+    text_free(&text);
+    text_free(&face);
+}
+
+static void polygons_that_cannot_be_filled_are_told(void **state)
+{
+    (void)state;
+    file_write("a.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 3 3 0\nv 3 0 0\nv 4 0 0\nf 1 2 3 4\nf 1 2 5 6\n");
+    Text got = scene_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n", false);
+    assert_string_equal(
+        text_c(&got),
+        "4:18: warning: a.obj: triangles without area, which are never hit: 2\n"
+        "4:18: warning: a.obj: polygons that cross themselves or are far from flat, filled as far "
+        "as they can be: 1\n");
+    text_free(&got);
+}
+
 static void faults_name_file_and_vertex(void **state)
 {
     (void)state;
@@ -247,7 +313,14 @@ static void faults_name_file_and_vertex(void **state)
          "a.obj: line 4: a face names vertex '-4'; there are 3"},
         {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "a.obj: no triangles"},
         {"a.ply", PLY_OF("nan", "2"), "a.ply: vertex 2 (from 0) of '' is not finite or too large"},
-        {"a.ply", PLY_OF("1", "7"), "a.ply: triangle 0 (from 0) names vertex 7, which is not there"},
+        {"a.ply", PLY_OF("1", "7"), "a.ply: face 0 (from 0) names vertex 7, which is not there"},
+        {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 -1"),
+         "a.ply: face 1 (from 0) names vertex 4294967295, which is not there"},
+        {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 400000000"),
+         "a.ply: face 1 (from 0) names vertex 400000000, which is not there"},
+        {"a.ply", PLY_OF_FACES("5 0 1 3 2 400000000", "3 0 1 2"),
+         "a.ply: face 0 (from 0) names vertex 400000000, which is not there"},
+        {"a.ply", PLY_OF_FACES("0", "2 0 1"), "a.ply: no triangles"},
         {"a.stl", STL_OF("inf"), "a.stl: vertex 2 (from 0) of 'part' is not finite or too large"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -406,6 +479,9 @@ int main(void)
         cmocka_unit_test(materials_come_from_the_file),
         cmocka_unit_test(material_is_white_where_the_file_has_none),
         cmocka_unit_test(every_format_is_read),
+        cmocka_unit_test(faces_without_corners_are_left_out),
+        cmocka_unit_test(concave_polygon_is_cut_in_full),
+        cmocka_unit_test(polygons_that_cannot_be_filled_are_told),
         cmocka_unit_test(faults_name_file_and_vertex),
         cmocka_unit_test(scene_file_is_told_what_is_wrong),
         cmocka_unit_test(ids_count_the_triangles),

@@ -1,13 +1,14 @@
-// Mesh files through assimp. Its own joining of vertices and its making of normals stay unused: both go by
-// absolute distances and would bend small meshes.
+// Mesh files through assimp, as it reads them: what it would make of them stays unused. Its joining of
+// vertices and its making of normals go by absolute distances and would bend small meshes; its cutting of
+// polygons goes to vertices that are not there, and leaves out parts of concave ones.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/number.h"
+#include "host/scene/polygon.h"
 #include "host/scene/scene_build.h"
 
 #include <assimp/cimport.h>
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <errno.h>
 #include <stdarg.h>
@@ -16,7 +17,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-enum { MESH_TRIANGLES_LARGEST = 1 << 28 };
+enum { MESH_TRIANGLES_LARGEST = 1 << 28, MESH_POLYGON_LARGEST = 1 << 14 };
 
 // Three rows of a matrix, the last column the translation.
 typedef struct {
@@ -40,6 +41,12 @@ typedef struct {
         size_t count, capacity;
     } placed;
     uint32_t *materials; // of the scene, for each of the file's; UINT32_MAX: not there yet
+    struct {
+        Vector3 *items;
+        size_t count, capacity;
+    } corners; // of the polygon being cut
+    PolygonTriangles cut;
+    size_t crossed_count;
     Mesh mesh;
 } Importer;
 
@@ -163,7 +170,7 @@ static bool file_open(Importer *importer)
     struct stat status;
     if (stat(path, &status) != 0) return import_fails(importer, "%s", strerror(errno));
     if (!S_ISREG(status.st_mode)) return import_fails(importer, "not a regular file");
-    importer->file = aiImportFile(path, aiProcess_Triangulate);
+    importer->file = aiImportFile(path, 0);
     return importer->file || vertex_fails(importer, aiGetErrorString());
 }
 
@@ -269,33 +276,82 @@ static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
 }
 
 // A mirrored mesh is turned inside out again, so that its triangles keep their outer side.
-static bool triangles_add(Importer *importer, const Placed *placed)
+static void triangle_add(Importer *importer, const Placed *placed, bool mirrored, const unsigned corners[3])
 {
-    const struct aiMesh *from = placed->mesh;
     Mesh *mesh = &importer->mesh;
-    bool mirrored = affine_determinant(&placed->affine) < 0;
-    uint32_t first = (uint32_t)mesh->vertex_count;
-    for (unsigned i = 0; i < from->mNumFaces; i++) {
-        const struct aiFace *face = &from->mFaces[i];
-        if (face->mNumIndices != 3) continue; // points and lines
-        const unsigned *corners = face->mIndices;
-        for (int corner = 0; corner < 3; corner++) {
-            if (corners[corner] < from->mNumVertices) continue;
-            char fault[100];
-            snprintf(fault, sizeof fault, "triangle %u (from 0) names vertex %u, which is not there", i,
-                     corners[corner]);
-            return vertex_fails(importer, fault);
-        }
-        uint32_t *triangle = mesh->triangles[mesh->triangle_count];
-        bool has_area = face_has_area(from, corners);
-        triangle[0] = first + corners[0];
-        triangle[1] = has_area ? first + corners[mirrored ? 2 : 1] : triangle[0];
-        triangle[2] = has_area ? first + corners[mirrored ? 1 : 2] : triangle[0];
-        if (mesh->materials)
-            mesh->materials[mesh->triangle_count] = material_index(importer, from->mMaterialIndex);
-        mesh->triangle_count++;
+    uint32_t first = (uint32_t)mesh->vertex_count, *triangle = mesh->triangles[mesh->triangle_count];
+    bool has_area = face_has_area(placed->mesh, corners);
+    triangle[0] = first + corners[0];
+    triangle[1] = has_area ? first + corners[mirrored ? 2 : 1] : triangle[0];
+    triangle[2] = has_area ? first + corners[mirrored ? 1 : 2] : triangle[0];
+    if (mesh->materials)
+        mesh->materials[mesh->triangle_count] = material_index(importer, placed->mesh->mMaterialIndex);
+    mesh->triangle_count++;
+}
+
+// Cut from the second corner on, so that of a convex quadrilateral the diagonal starts at the first. One
+// without area, all in all, becomes a fan.
+static void polygon_add(Importer *importer, const Placed *placed, bool mirrored, const struct aiFace *face)
+{
+    const unsigned count = face->mNumIndices, *indices = face->mIndices;
+    importer->corners.count = 0;
+    for (unsigned i = 0; i < count; i++)
+        array_push(importer->corners, vector_of(&placed->mesh->mVertices[indices[(i + 1) % count]]));
+    PolygonTriangles *cut = &importer->cut;
+    PolygonStatus status = polygon_triangulate(importer->corners.items, count, cut);
+    importer->crossed_count += status == POLYGON_CROSSED;
+    for (unsigned i = 0; i + 2 < count && status == POLYGON_WITHOUT_AREA; i++)
+        triangle_add(importer, placed, mirrored,
+                     (const unsigned[3]){indices[0], indices[i + 1], indices[i + 2]});
+    for (size_t i = 0; i < cut->count; i++) {
+        const uint32_t *at = cut->items[i];
+        triangle_add(importer, placed, mirrored,
+                     (const unsigned[3]){indices[(at[0] + 1) % count], indices[(at[1] + 1) % count],
+                                         indices[(at[2] + 1) % count]});
+    }
+}
+
+static bool face_is_sound(Importer *importer, const struct aiMesh *mesh, unsigned number)
+{
+    const struct aiFace *face = &mesh->mFaces[number];
+    char fault[100];
+    if (face->mNumIndices > MESH_POLYGON_LARGEST)
+        return import_fails(importer, "face %u (from 0) has %u corners, more than %d", number,
+                            face->mNumIndices, MESH_POLYGON_LARGEST);
+    for (unsigned i = 0; i < face->mNumIndices; i++) {
+        if (face->mIndices[i] < mesh->mNumVertices) continue;
+        snprintf(fault, sizeof fault, "face %u (from 0) names vertex %u, which is not there", number,
+                 face->mIndices[i]);
+        return vertex_fails(importer, fault);
     }
     return true;
+}
+
+static bool faces_add(Importer *importer, const Placed *placed)
+{
+    const struct aiMesh *from = placed->mesh;
+    bool mirrored = affine_determinant(&placed->affine) < 0;
+    if (importer->materials && from->mMaterialIndex >= importer->file->mNumMaterials)
+        return import_fails(importer, "material %u (from 0) is not there", from->mMaterialIndex);
+    for (unsigned i = 0; i < from->mNumFaces; i++) {
+        const struct aiFace *face = &from->mFaces[i];
+        if (face->mNumIndices < 3) continue; // points and lines
+        if (!face_is_sound(importer, from, i)) return false;
+        if (face->mNumIndices == 3)
+            triangle_add(importer, placed, mirrored, face->mIndices);
+        else
+            polygon_add(importer, placed, mirrored, face);
+    }
+    return true;
+}
+
+// Of a mesh's faces, once they are cut, at the most.
+static size_t triangles_count(const struct aiMesh *mesh)
+{
+    size_t count = 0;
+    for (unsigned i = 0; i < mesh->mNumFaces; i++)
+        if (mesh->mFaces[i].mNumIndices >= 3) count += mesh->mFaces[i].mNumIndices - 2;
+    return count;
 }
 
 // Room for all placed meshes. `normals` and `uvs` are there where any of them has some.
@@ -306,7 +362,7 @@ static bool mesh_reserve(Importer *importer)
     for (size_t i = 0; i < importer->placed.count; i++) {
         const struct aiMesh *from = importer->placed.items[i].mesh;
         vertex_count += from->mNumVertices;
-        triangle_count += from->mNumFaces;
+        triangle_count += triangles_count(from);
         has_normals |= from->mNormals != NULL;
         has_uvs |= from->mTextureCoords[0] != NULL;
     }
@@ -328,7 +384,7 @@ static bool mesh_reserve(Importer *importer)
 
 static bool placed_add(Importer *importer, const Placed *placed)
 {
-    if (!vertices_add(importer, placed) || !triangles_add(importer, placed)) return false;
+    if (!vertices_add(importer, placed) || !faces_add(importer, placed)) return false;
     importer->mesh.vertex_count += placed->mesh->mNumVertices;
     return true;
 }
@@ -352,6 +408,8 @@ bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t 
     if (importer.file) aiReleaseImport(importer.file);
     free(importer.placed.items);
     free(importer.materials);
+    free(importer.corners.items);
+    free(importer.cut.items);
     if (!read) {
         mesh_free(&importer.mesh);
         return false;
@@ -362,6 +420,11 @@ bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t 
     if (degenerate_count > 0)
         report_warning(report, offset, "%s: triangles without area, which are never hit: %zu", import->path,
                        degenerate_count);
+    if (importer.crossed_count > 0)
+        report_warning(
+            report, offset,
+            "%s: polygons that cross themselves or are far from flat, filled as far as they can be: %zu",
+            import->path, importer.crossed_count);
     *index = (uint32_t)scene->meshes.count;
     array_push(scene->meshes, importer.mesh);
     return true;
