@@ -184,28 +184,31 @@ static void material_is_white_where_the_file_has_none(void **state)
     scene_free(&scene);
 }
 
-#define PLY_OF(y, index)                                                                                     \
-    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"        \
-    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 " y                 \
-    " 0\n3 0 1 " index "\n"
+#define PLY_HEADER(vertex_count, face_count)                                                                 \
+    "ply\nformat ascii 1.0\nelement vertex " vertex_count                                                    \
+    "\nproperty float x\nproperty float y\nproperty float z\nelement face " face_count                       \
+    "\nproperty list uchar int vertex_indices\n"
+#define PLY_OF(y, index) PLY_HEADER("3", "1") "end_header\n0 0 0\n1 0 0\n0 " y " 0\n3 0 1 " index "\n"
 // Four vertices, the unit square's first three in this order, and two faces.
 #define PLY_OF_FACES(first, second)                                                                          \
-    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"        \
-    "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n" first \
-    "\n" second "\n"
+    PLY_HEADER("4", "2") "end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n" first "\n" second "\n"
+#define GLTF_OF_NODES(nodes)                                                                                 \
+    "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [" nodes   \
+    "]}\n"
 #define STL_OF(y)                                                                                            \
     "solid part\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 " y                    \
     " 0\nendloop\nendfacet\nendsolid part\n"
 
 // One triangle, moved by its node.
-static const char gltf[] =
-    "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}],\n"
-    "\"nodes\": [{\"children\": [1], \"translation\": [1, 2, 3]}, {\"mesh\": 0, \"scale\": [2, 2, 2]}],\n"
-    "\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}],\n"
-    "\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\",\n"
-    "\"min\": [0, 0, 0], \"max\": [1, 1, 0]}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36}],\n"
-    "\"buffers\": [{\"byteLength\": 36, \"uri\": \"data:application/octet-stream;base64,"
-    "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}\n";
+#define GLTF_MEMBERS                                                                                         \
+    "\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}],\n"                     \
+    "\"nodes\": [{\"children\": [1], \"translation\": [1, 2, 3]}, {\"mesh\": 0, \"scale\": [2, 2, 2]}],\n"   \
+    "\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}],\n"                               \
+    "\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\",\n"       \
+    "\"min\": [0, 0, 0], \"max\": [1, 1, 0]}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36}],\n"    \
+    "\"buffers\": [{\"byteLength\": 36, \"uri\": \"data:application/octet-stream;base64,"                    \
+    "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}\n"
+static const char gltf[] = "{" GLTF_MEMBERS;
 
 static void every_format_is_read(void **state)
 {
@@ -321,6 +324,19 @@ static void faults_name_file_and_vertex(void **state)
         {"a.ply", PLY_OF_FACES("5 0 1 3 2 400000000", "3 0 1 2"),
          "a.ply: face 0 (from 0) names vertex 400000000, which is not there"},
         {"a.ply", PLY_OF_FACES("0", "2 0 1"), "a.ply: no triangles"},
+        {"a.ply", PLY_HEADER("3", "1"), "a.ply: line 9: the header lacks its end, a line 'end_header'"},
+        {"a.ply", PLY_HEADER("3", "1") "end_header too\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+         "a.ply: line 14: the header lacks its end, a line 'end_header'"},
+        {"a.ply", PLY_HEADER("99999999", "1") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+         "a.ply: line 3: the header promises more than the file holds"},
+        {"a.ply", PLY_HEADER("3\rcomment\relement face 99999999", "1") "end_header\r\n0 0 0\n",
+         "a.ply: line 3: the header promises more than the file holds"},
+        {"a.gltf", "{\"nodes\": {\"a\": {\"children\": [\"b\", \"b\"]}}}\n", "a.gltf: glTF 1.0, not 2.0"},
+        {"a.gltf", "{\"nod\\u0065s\": []}", "a.gltf: the key 'nod\\u0065s' is not a plain word"},
+        {"a.gltf", GLTF_OF_NODES("{\"children\": [1, 2]}, {\"children\": [2]}, {}"),
+         "a.gltf: node 2 (from 0) is a child twice"},
+        {"a.gltf", GLTF_OF_NODES("{\"children\": [1]}, {\"children\": [0]}"),
+         "a.gltf: nodes are nested more than 1000 deep, or in a circle"},
         {"a.stl", STL_OF("inf"), "a.stl: vertex 2 (from 0) of 'part' is not finite or too large"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -332,6 +348,73 @@ static void faults_name_file_and_vertex(void **state)
         text_free(&scene);
         text_free(&expected);
     }
+}
+
+static void nested_write(const char *before, const char *opening, const char *closing, size_t count,
+                         const char *after)
+{
+    Text text = {0};
+    text_appendf(&text, "%s", before);
+    for (size_t i = 0; i < count; i++)
+        text_appendf(&text, "%s", opening);
+    for (size_t i = 0; i < count; i++)
+        text_appendf(&text, "%s", closing);
+    text_appendf(&text, "%s", after);
+    file_write("a.gltf", text_c(&text));
+    text_free(&text);
+}
+
+static void assert_gltf_refused(const char *expected)
+{
+    Text message = {0};
+    text_appendf(&message, "4:18: error: a.gltf: %s\n", expected);
+    assert_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.gltf}\n", text_c(&message));
+    text_free(&message);
+}
+
+static void chain_write(size_t count, const char *scene_nodes)
+{
+    Text text = {0};
+    text_appendf(&text, "{\"asset\": {\"version\": \"2.0\"}, \"scenes\": [{\"nodes\": [%s]}], \"nodes\": [",
+                 scene_nodes);
+    for (size_t i = 1; i < count; i++)
+        text_appendf(&text, "{\"children\": [%zu]},\n", i);
+    text_appendf(&text, "{}]}\n");
+    file_write("a.gltf", text_c(&text));
+    text_free(&text);
+}
+
+static void gltf_of_any_depth_is_survived(void **state)
+{
+    (void)state;
+    static const char too_deep[] = "lists and objects are nested more than 64 deep";
+    nested_write("{\"extras\": [\"[\\\"[\\\\\", ", "[", "]", 62, "], " GLTF_MEMBERS);
+    Scene scene = scene_of_objects("  - mesh: {file: a.gltf}\n");
+    assert_int_equal(scene.meshes.items[0].triangle_count, 1);
+    scene_free(&scene);
+    nested_write("", "[", "]", 65, "");
+    assert_gltf_refused(too_deep);
+    nested_write("", "{\"a\":[", "", 1000000, "");
+    assert_gltf_refused(too_deep);
+    chain_write(1000, "0");
+    assert_gltf_refused("no triangles");
+    chain_write(1001, "0");
+    assert_gltf_refused("nodes are nested more than 1000 deep, or in a circle");
+    chain_write(100000, "0");
+    assert_gltf_refused("nodes are nested more than 1000 deep, or in a circle");
+}
+
+// A scene that names one node again and again.
+static void gltf_places_no_more_than_a_million_nodes(void **state)
+{
+    (void)state;
+    Text named = {0};
+    for (size_t i = 0; i < 1000; i++)
+        text_appendf(&named, "0, ");
+    text_appendf(&named, "999, 0");
+    chain_write(1000, text_c(&named));
+    assert_gltf_refused("more than 1000000 nodes, with those placed again");
+    text_free(&named);
 }
 
 static void scene_file_is_told_what_is_wrong(void **state)
@@ -483,6 +566,8 @@ int main(void)
         cmocka_unit_test(concave_polygon_is_cut_in_full),
         cmocka_unit_test(polygons_that_cannot_be_filled_are_told),
         cmocka_unit_test(faults_name_file_and_vertex),
+        cmocka_unit_test(gltf_of_any_depth_is_survived),
+        cmocka_unit_test(gltf_places_no_more_than_a_million_nodes),
         cmocka_unit_test(scene_file_is_told_what_is_wrong),
         cmocka_unit_test(ids_count_the_triangles),
         cmocka_unit_test(triangles_without_area_are_never_hit),

@@ -39,3 +39,7 @@ size_t mesh_degenerate_count(const Mesh *mesh);
 // What is wrong with an OBJ file's vertices or with a face that names them, as `line N: what`; false where
 // nothing is, or the file cannot be read.
 bool obj_find_fault(const char *path, char *fault, size_t size);
+
+// What a PLY or a glTF file holds that assimp would crash on, or never be done with, told likewise.
+bool ply_find_fault(const char *path, char *fault, size_t size);
+bool gltf_find_fault(const char *path, char *fault, size_t size);

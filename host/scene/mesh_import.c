@@ -170,6 +170,9 @@ static bool file_open(Importer *importer)
     struct stat status;
     if (stat(path, &status) != 0) return import_fails(importer, "%s", strerror(errno));
     if (!S_ISREG(status.st_mode)) return import_fails(importer, "not a regular file");
+    char fault[200];
+    if (ply_find_fault(path, fault, sizeof fault) || gltf_find_fault(path, fault, sizeof fault))
+        return import_fails(importer, "%s", fault);
     importer->file = aiImportFile(path, 0);
     return importer->file || vertex_fails(importer, aiGetErrorString());
 }
