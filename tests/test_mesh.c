@@ -175,6 +175,32 @@ static void materials_come_from_the_file(void **state)
     scene_free(&scene);
 }
 
+static void numbers_of_materials_are_finite(void **state)
+{
+    (void)state;
+    file_write("a.mtl", "newmtl red\nKd inf 1e39 nan\nKs 0 inf 0\nNs 1e39\nd nan\nNi 1e39\n");
+    file_write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n");
+    Text text = {0};
+    text_appendf(&text, CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n");
+    MessageList messages = {0};
+    Scene scene;
+    assert_true(scene_read_text(&scene, "scene.yaml", &text, false, &messages));
+    assert_int_equal(messages.count, 2); // the same is told once
+    assert_string_equal(messages.items[0].text,
+                        "a.obj: a color of material 'red' is not finite or too large: the default is taken");
+    assert_string_equal(messages.items[1].text,
+                        "a.obj: a number of material 'red' is not finite or too large: the default is taken");
+    const Material *red = material_of_triangle(&scene, 0);
+    assert_vector(red->color, 1, 1, 1);
+    assert_number(red->specular, 0);
+    assert_number(red->shininess, material_default().shininess);
+    assert_number(red->transmission, 0);
+    assert_number(red->ior, material_default().ior);
+    message_list_free(&messages);
+    text_free(&text);
+    scene_free(&scene);
+}
+
 static void material_is_white_where_the_file_has_none(void **state)
 {
     (void)state;
@@ -315,6 +341,13 @@ static void faults_name_file_and_vertex(void **state)
         {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 2 3\n",
          "a.obj: line 4: a face names vertex '-4'; there are 3"},
         {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "a.obj: no triangles"},
+        {"a.ply",
+         PLY_HEADER("3\nproperty float s\nproperty float t",
+                    "1") "end_header\n0 0 0 0 0\n0 0 1 0 0\n0 nan 0 1 0\n"
+                         "3 0 1 2\n",
+         "a.ply: a texture coordinate of vertex 2 (from 0) of '' is not finite or too large"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1e38 0\nf 1/1 2/1 3/1\n",
+         "a.obj: a texture coordinate of vertex 0 (from 0) of 'defaultobject' is not finite or too large"},
         {"a.ply", PLY_OF("nan", "2"), "a.ply: vertex 2 (from 0) of '' is not finite or too large"},
         {"a.ply", PLY_OF("1", "7"), "a.ply: face 0 (from 0) names vertex 7, which is not there"},
         {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 -1"),
@@ -560,6 +593,7 @@ int main(void)
         cmocka_unit_test(normals_do_not_see_the_cut_of_a_polygon),
         cmocka_unit_test(normals_of_the_file_are_taken),
         cmocka_unit_test(materials_come_from_the_file),
+        cmocka_unit_test(numbers_of_materials_are_finite),
         cmocka_unit_test(material_is_white_where_the_file_has_none),
         cmocka_unit_test(every_format_is_read),
         cmocka_unit_test(faces_without_corners_are_left_out),

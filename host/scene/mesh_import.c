@@ -188,34 +188,59 @@ static void node_place(Importer *importer, const struct aiNode *node, const Affi
         node_place(importer, node->mChildren[i], &affine);
 }
 
+static Vector3 vector_of(const struct aiVector3D *v)
+{
+    return (Vector3){v->x, v->y, v->z};
+}
+
+static bool is_ordinary(Vector3 v)
+{
+    return fabs(v.x) <= NUMBER_LARGEST && fabs(v.y) <= NUMBER_LARGEST && fabs(v.z) <= NUMBER_LARGEST;
+}
+
+static void default_taken(const Importer *importer, const struct aiMaterial *material, const char *what)
+{
+    struct aiString name = {0};
+    aiGetMaterialString(material, AI_MATKEY_NAME, &name);
+    name.data[strcspn(name.data, "\r\n")] = '\0';
+    report_warning(importer->report, importer->offset,
+                   "%s: a %s of material '%.40s' is not finite or too large: the default is taken",
+                   importer->import->path, what, name.data);
+}
+
 // Key, type and index are what assimp's AI_MATKEY_… stand for.
-static Color color_of(const struct aiMaterial *material, const char *key, unsigned type, unsigned index,
-                      Color otherwise)
+static Color color_of(const Importer *importer, const struct aiMaterial *material, const char *key,
+                      unsigned type, unsigned index, Color otherwise)
 {
     struct aiColor4D color;
     if (aiGetMaterialColor(material, key, type, index, &color) != aiReturn_SUCCESS) return otherwise;
-    return (Color){fmax(color.r, 0), fmax(color.g, 0), fmax(color.b, 0)};
+    if (is_ordinary((Vector3){color.r, color.g, color.b}))
+        return (Color){fmax(color.r, 0), fmax(color.g, 0), fmax(color.b, 0)};
+    default_taken(importer, material, "color");
+    return otherwise;
 }
 
-static double number_of(const struct aiMaterial *material, const char *key, unsigned type, unsigned index,
-                        double otherwise)
+static double number_of(const Importer *importer, const struct aiMaterial *material, const char *key,
+                        unsigned type, unsigned index, double otherwise)
 {
     ai_real number;
     if (aiGetMaterialFloatArray(material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
         return otherwise;
-    return isfinite(number) && number >= 0 ? number : otherwise;
+    if (fabs(number) <= NUMBER_LARGEST) return number >= 0 ? number : otherwise;
+    default_taken(importer, material, "number");
+    return otherwise;
 }
 
 // Highlights have the light's color here, so that of the file's only the strength is kept.
-static Material material_of(const struct aiMaterial *file_material)
+static Material material_of(const Importer *importer, const struct aiMaterial *file_material)
 {
     Material material = material_default();
-    Color specular = color_of(file_material, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
-    material.color = color_of(file_material, AI_MATKEY_COLOR_DIFFUSE, material.color);
+    Color specular = color_of(importer, file_material, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
+    material.color = color_of(importer, file_material, AI_MATKEY_COLOR_DIFFUSE, material.color);
     material.specular = (specular.x + specular.y + specular.z) / 3;
-    material.shininess = number_of(file_material, AI_MATKEY_SHININESS, material.shininess);
-    material.transmission = fmax(0, 1 - number_of(file_material, AI_MATKEY_OPACITY, 1));
-    double ior = number_of(file_material, AI_MATKEY_REFRACTI, 0);
+    material.shininess = number_of(importer, file_material, AI_MATKEY_SHININESS, material.shininess);
+    material.transmission = fmax(0, 1 - number_of(importer, file_material, AI_MATKEY_OPACITY, 1));
+    double ior = number_of(importer, file_material, AI_MATKEY_REFRACTI, 0);
     if (ior > 0) material.ior = ior;
     return material;
 }
@@ -229,19 +254,9 @@ static uint32_t material_index(Importer *importer, unsigned index)
     aiGetMaterialString(file_material, AI_MATKEY_NAME, &name);
     Material material = material_default();
     // what assimp makes up where the file has none
-    if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) material = material_of(file_material);
+    if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) material = material_of(importer, file_material);
     *known = scene_add_material(importer->scene, &material, name.data);
     return *known;
-}
-
-static Vector3 vector_of(const struct aiVector3D *v)
-{
-    return (Vector3){v->x, v->y, v->z};
-}
-
-static bool is_ordinary(Vector3 v)
-{
-    return fabs(v.x) <= NUMBER_LARGEST && fabs(v.y) <= NUMBER_LARGEST && fabs(v.z) <= NUMBER_LARGEST;
 }
 
 static bool vertices_add(Importer *importer, const Placed *placed)
@@ -265,6 +280,11 @@ static bool vertices_add(Importer *importer, const Placed *placed)
         if (mesh->uvs && from->mTextureCoords[0]) {
             mesh->uvs[index][0] = from->mTextureCoords[0][i].x;
             mesh->uvs[index][1] = from->mTextureCoords[0][i].y;
+            if (!is_ordinary((Vector3){mesh->uvs[index][0], mesh->uvs[index][1], 0}))
+                return import_fails(
+                    importer,
+                    "a texture coordinate of vertex %u (from 0) of '%.40s' is not finite or too large", i,
+                    from->mName.data);
         }
     }
     return true;
