@@ -49,11 +49,11 @@ static bool message_is_before(const Message *a, const Message *b)
     return a->line != b->line ? a->line < b->line : a->column < b->column;
 }
 
-// What an alias brings in several times is wrong once.
-static bool message_is_repeated(const MessageList *list, size_t first, size_t index)
+// What an alias brings in several times is wrong once: whether it is among the list's messages from `first`
+// up to `end`.
+static bool message_is_among(const Message *message, const MessageList *list, size_t first, size_t end)
 {
-    const Message *message = &list->items[index];
-    for (size_t i = first; i < index; i++) {
+    for (size_t i = first; i < end; i++) {
         const Message *other = &list->items[i];
         if (other->line == message->line && other->column == message->column &&
             !strcmp(other->text, message->text))
@@ -68,7 +68,7 @@ bool report_close(Report *report)
     size_t kept = report->first;
     for (size_t i = report->first; i < list->count; i++) {
         Message message = list->items[i];
-        if (message_is_repeated(list, report->first, i)) {
+        if (message_is_among(&message, list, report->first, kept)) {
             // its twin is told
             free(message.file);
             free(message.text);
