@@ -185,8 +185,8 @@ bool gltf_find_fault(const char *path, char *fault, size_t size)
     Text json = {0};
     bool faulty = false;
     if (json_read(&json, path, binary)) {
-        Search search = {
-            .at = text_c(&json), .end = text_c(&json) + json.count, .fault = fault, .size = size};
+        Search search = {.at = text_c(&json), .end = text_c(&json) + json.count, .size = size};
+        search.fault = fault;
         faulty = json_is_faulty(&search) || nodes_are_faulty(&search);
         free(search.children.items);
         free(search.scene_nodes.items);
