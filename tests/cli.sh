@@ -338,6 +338,20 @@ ok 'trace to a file, in double, from standard input' trace ball.yaml --rays - -o
 python 'the same' 'assert [float(x) for x in csv("hits.csv")[1]] == [0, 3, 0, 0, -1]'
 check 'nothing on standard output' test ! -s out
 
+# A device may take fewer work-items in a group than glint wishes for; of those here only PoCL can be told to.
+ok 'groups as wished for' render every.yaml --size 33x21 --quiet --lanes 1 --aov object,path -o whole.npy
+ok 'a trace in them' trace every.yaml --rays rays -o whole.csv
+for most in 32 16 1; do
+    export POCL_MAX_WORK_GROUP_SIZE=$most
+    ok "groups of $most" render every.yaml --size 33x21 --quiet --lanes 1 --aov object,path -o few.npy
+    ok "a trace in groups of $most" trace every.yaml --rays rays -o few.csv
+    unset POCL_MAX_WORK_GROUP_SIZE
+    for file in .npy .object.npy .path.npy .csv; do
+        check "groups of $most: $file is the same" cmp whole$file few$file
+    done
+    rm -f few*
+done
+
 # Times and facts for programs: JSON alone on standard output.
 ok '--timing=json' render ball.yaml $small --timing=json -o j.png
 check '--timing=json is JSON' python3 -m json.tool out

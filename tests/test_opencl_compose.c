@@ -1,4 +1,5 @@
-// The composed kernel text, its hash, and the judgement of event times: all without a device.
+// The composed kernel text, its hash, the judgement of event times, and work-groups cut
+// to fit: all without a device.
 #include "host/opencl/compose.h"
 #include <setjmp.h>
 #include <stdarg.h>
@@ -83,6 +84,26 @@ static void test_event_times(void **state)
     }
 }
 
+static void test_work_groups_fit(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t wish[2], largest, sides[2], fit[2];
+    } cases[] = {
+        {{8, 8}, 64, {64, 64}, {8, 8}},  {{8, 8}, SIZE_MAX, {SIZE_MAX, SIZE_MAX}, {8, 8}},
+        {{8, 8}, 63, {64, 64}, {8, 4}},  {{8, 8}, 16, {64, 64}, {4, 4}},
+        {{8, 8}, 3, {64, 64}, {2, 1}},   {{8, 8}, 1, {1, 1}, {1, 1}},
+        {{8, 8}, 64, {64, 1}, {8, 1}},   {{8, 8}, 64, {5, 64}, {4, 8}},
+        {{64, 1}, 48, {64, 1}, {32, 1}}, {{1, 1}, 1, {1, 1}, {1, 1}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t sides[2] = {cases[i].wish[0], cases[i].wish[1]};
+        work_group_fit(sides, 2, cases[i].largest, cases[i].sides);
+        assert_int_equal(sides[0], cases[i].fit[0]);
+        assert_int_equal(sides[1], cases[i].fit[1]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -90,6 +111,7 @@ int main(void)
         cmocka_unit_test(test_missing_files),
         cmocka_unit_test(test_every_embedded_file_composes),
         cmocka_unit_test(test_event_times),
+        cmocka_unit_test(test_work_groups_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -78,9 +78,15 @@ LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, doub
 // Why the event's times are not to be believed, or NULL where they are.
 const char *launch_time_doubt(const LaunchTime *time);
 
-// Enqueues over global (rounded up by the caller) and waits. `local` NULL: the runtime's choice.
-LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *global,
-                         const size_t *local);
+// Halves the longest side of a work-group, the last among equals, until it has at most `largest` work-items
+// and no side is longer than its own limit.
+void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const size_t *longest_sides);
+
+// Enqueues over `items` and waits. `group` is the work-group that is wished for: it is made to fit the device
+// and the kernel, and the work-items are rounded up to whole groups, so a kernel must not count on either.
+// NULL: the runtime's choice, nothing rounded.
+LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
+                         const size_t *group);
 // Waits for the event and reads it; host_start from clock_seconds() before the enqueue. Releases the event.
 LaunchTime event_time(cl_event event, double host_start);
 

@@ -33,6 +33,14 @@ static char *device_text(cl_device_id id, cl_device_info what)
         if (clGetDeviceInfo((id), (what), sizeof *(value), (value), NULL) != CL_SUCCESS) *(value) = 0;       \
     } while (0)
 
+// The first three, where the device tells of at most eight dimensions.
+static void device_sides(cl_device_id id, size_t longest[3])
+{
+    size_t sides[8] = {0};
+    if (clGetDeviceInfo(id, CL_DEVICE_MAX_WORK_ITEM_SIZES, sizeof sides, sides, NULL) != CL_SUCCESS) return;
+    memcpy(longest, sides, 3 * sizeof *sides);
+}
+
 static bool device_flag(cl_device_id id, cl_device_info what)
 {
     cl_bool flag = CL_FALSE;
@@ -66,6 +74,7 @@ static void device_describe(Device *device)
     device_number(id, CL_DEVICE_MAX_COMPUTE_UNITS, &device->compute_units);
     device_number(id, CL_DEVICE_MAX_CLOCK_FREQUENCY, &device->clock_mhz);
     device_number(id, CL_DEVICE_MAX_WORK_GROUP_SIZE, &device->largest_work_group);
+    device_sides(id, device->longest_group_sides);
     device_number(id, CL_DEVICE_GLOBAL_MEM_SIZE, &device->memory_bytes);
     device_number(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE, &device->largest_buffer_bytes);
     device_number(id, CL_DEVICE_LOCAL_MEM_SIZE, &device->local_memory_bytes);

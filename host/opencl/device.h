@@ -19,7 +19,7 @@ typedef struct {
     unsigned compute_units, clock_mhz;
     unsigned native_float_width, native_double_width; // 1 at least; double 0 without fp64
     uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes;
-    size_t largest_work_group;
+    size_t largest_work_group, longest_group_sides[3];
     double timer_resolution_seconds;
     bool fp64, denormals, fma_in_hardware;
     bool correctly_rounded; // -cl-fp32-correctly-rounded-divide-sqrt may be used

@@ -67,11 +67,54 @@ LaunchTime event_time(cl_event event, double host_start)
     return time;
 }
 
-LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *global,
-                         const size_t *local)
+void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const size_t *longest_sides)
 {
+    size_t items = 1;
+    for (cl_uint i = 0; i < dimensions; i++) {
+        while (sides[i] > 1 && sides[i] > longest_sides[i])
+            sides[i] /= 2;
+        items *= sides[i];
+    }
+    while (items > largest && items > 1) {
+        cl_uint longest = 0;
+        for (cl_uint i = 1; i < dimensions; i++)
+            if (sides[i] >= sides[longest]) longest = i;
+        items /= sides[longest];
+        sides[longest] /= 2;
+        items *= sides[longest];
+    }
+}
+
+// Devices may take a single work-item in a group, and a kernel with many variables fewer than its device.
+static void work_group_fit_kernel(const Device *device, cl_kernel kernel, cl_uint dimensions, size_t *sides)
+{
+    size_t largest = 0;
+    if (clGetKernelWorkGroupInfo(kernel, device->id, CL_KERNEL_WORK_GROUP_SIZE, sizeof largest, &largest,
+                                 NULL) != CL_SUCCESS ||
+        largest == 0)
+        largest = SIZE_MAX;
+    if (device->largest_work_group > 0 && device->largest_work_group < largest)
+        largest = device->largest_work_group;
+    size_t longest_sides[3];
+    for (cl_uint i = 0; i < 3; i++)
+        longest_sides[i] = device->longest_group_sides[i] > 0 ? device->longest_group_sides[i] : SIZE_MAX;
+    work_group_fit(sides, dimensions, largest, longest_sides);
+}
+
+LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
+                         const size_t *group)
+{
+    size_t global[3], local[3];
+    for (cl_uint i = 0; i < dimensions; i++) {
+        global[i] = items[i];
+        local[i] = group ? group[i] : 1;
+    }
+    if (group) work_group_fit_kernel(compute->device, kernel, dimensions, local);
+    for (cl_uint i = 0; i < dimensions; i++)
+        global[i] = (items[i] + local[i] - 1) / local[i] * local[i];
     double host_start = clock_seconds();
     cl_event event;
-    cl_must(clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, NULL, global, local, 0, NULL, &event));
+    cl_must(clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, NULL, global, group ? local : NULL, 0,
+                                   NULL, &event));
     return event_time(event, host_start);
 }

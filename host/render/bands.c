@@ -30,10 +30,10 @@ static TileShape item_shape(uint32_t lanes)
     return shape;
 }
 
-// Work-items along each side of a group. Neighboring pixels meet the same objects. But a work-item that
-// carries whole tiles of them makes a group of its own: PoCL lays out the private variables of a group's
-// items side by side, and those of 64, each with room for the rays that wait behind glass, are more than a
-// cache holds.
+// Work-items along each side of a group, fewer where the device takes fewer. Neighboring pixels meet the same
+// objects. But a work-item that carries whole tiles of them makes a group of its own: PoCL lays out the
+// private variables of a group's items side by side, and those of 64, each with room for the rays that wait
+// behind glass, are more than a cache holds.
 static size_t group_side(const Renderer *renderer)
 {
     bool on_cpu = renderer->compute->device->type & CL_DEVICE_TYPE_CPU;
@@ -93,11 +93,6 @@ static void film_close(Film *film)
     *film = (Film){0};
 }
 
-static size_t rounded_up(size_t value, size_t step)
-{
-    return (value + step - 1) / step * step;
-}
-
 typedef struct {
     uint32_t first_row, row_count;
 } BandRows;
@@ -106,11 +101,10 @@ static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows
 {
     TileShape item = item_shape(renderer->report.lanes);
     size_t side = group_side(renderer);
-    const size_t local[2] = {side, side};
-    const size_t global[2] = {
-        rounded_up((renderer->settings.region_width + item.width - 1) / item.width, side),
-        rounded_up((rows.row_count + item.height - 1) / item.height, side)};
-    return renderer_launch(renderer, kind, 2, global, local);
+    const size_t group[2] = {side, side};
+    const size_t items[2] = {(renderer->settings.region_width + item.width - 1) / item.width,
+                             (rows.row_count + item.height - 1) / item.height};
+    return renderer_launch(renderer, kind, 2, items, group);
 }
 
 static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint argument, BandRows rows)

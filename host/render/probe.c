@@ -66,9 +66,8 @@ static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count,
     kernel_argument(kernel, FLAT_COUNT + 1, sizeof count, &count);
     kernel_argument(kernel, FLAT_COUNT + 2, sizeof(cl_mem), &results);
     kernel_argument(kernel, FLAT_COUNT + 3, sizeof(cl_mem), &objects);
-    size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes;
-    size_t local = PROBE_GROUP, global = (items + local - 1) / local * local;
-    renderer_launch(renderer, KERNEL_TRACE, 1, &global, &local);
+    size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = PROBE_GROUP;
+    renderer_launch(renderer, KERNEL_TRACE, 1, &items, &group);
 
     const void *result = renderer_map(renderer, results, result_size);
     const uint32_t *object = renderer_map(renderer, objects, object_size);

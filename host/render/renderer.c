@@ -249,11 +249,11 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     return slot->kernel;
 }
 
-LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *global,
-                           const size_t *local)
+LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
+                           const size_t *group)
 {
     KernelSlot *slot = &renderer->kernels[kind];
-    LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, global, local);
+    LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, items, group);
     array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
     return time;
 }

@@ -28,9 +28,9 @@ size_t renderer_scalar_size(const Renderer *renderer);
 // The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first asked for.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 
-// Launches and notes the time in the report.
-LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *global,
-                           const size_t *local);
+// Launches (as kernel_launch does) and notes the time in the report.
+LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
+                           const size_t *group);
 
 // Maps a buffer for the host to read, noting the time; release with renderer_unmap.
 const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
