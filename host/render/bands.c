@@ -1,15 +1,13 @@
 // Rendering the region band by band: each launch short enough for a desktop to stay usable and for an
 // interrupt to be heard, memory that of a band.
 #include "host/base/clock.h"
+#include "host/render/pace.h"
 #include "host/render/renderer_state.h"
 #include "host/render/sample_pattern.h"
-#include <math.h>
 #include <stdlib.h>
 
 enum {
-    FIRST_LAUNCH_SAMPLES = 1 << 17,   // before any time is known
-    BAND_BYTES_LARGEST = 4 << 20,     // of one film
-    SAMPLES_OF_LAUNCH_LARGEST = 1024, // per pixel
+    BAND_BYTES_LARGEST = 4 << 20, // of one film
     GROUPS_OF_UNIT_LEAST = 4
 };
 
@@ -213,19 +211,6 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
     return go_on;
 }
 
-// How much of the picture the next launch takes, from the time that each pixel's sample took so far. It grows
-// fourfold at most: behind the sky there may be glass.
-typedef struct {
-    double target_seconds, seconds_per_sample; // 0: not known yet
-    double last_samples;                       // of the last launch
-} Pace;
-
-static uint64_t pace_samples(const Pace *pace)
-{
-    if (pace->seconds_per_sample <= 0) return FIRST_LAUNCH_SAMPLES;
-    return (uint64_t)fmin(pace->target_seconds / pace->seconds_per_sample, 4 * pace->last_samples);
-}
-
 // Rows of whole groups.
 static uint32_t rows_step(const Renderer *renderer)
 {
@@ -241,12 +226,12 @@ static uint32_t rows_least(const Renderer *renderer)
     return (wanted + of_row - 1) / of_row * rows_step(renderer);
 }
 
-static uint32_t pace_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
+static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
-    uint64_t rows = pace_samples(pace) / row_samples;
+    uint64_t rows = pace_band_samples(pace) / row_samples;
     uint32_t least = rows_least(renderer);
     if (rows < least) rows = least;
     rows -= rows % rows_step(renderer);
@@ -275,22 +260,18 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
     BandRows rows = {0};
     while (go_on && rows.first_row < settings->region_height) {
         uint32_t left = settings->region_height - rows.first_row;
-        rows.row_count = pace_rows(renderer, &pace, left < film.rows ? left : film.rows);
+        rows.row_count = band_rows(renderer, &pace, left < film.rows ? left : film.rows);
         uint64_t pixels = film_pixels(renderer, rows.row_count);
+        pace_begin_band(&pace);
         for (uint32_t first = 0; go_on && first < settings->sample_count;) {
-            uint64_t samples = pace_samples(&pace) / pixels;
-            samples = samples < 1                           ? 1
-                      : samples > SAMPLES_OF_LAUNCH_LARGEST ? SAMPLES_OF_LAUNCH_LARGEST
-                                                            : samples;
-            uint32_t last =
-                settings->sample_count - first < samples ? settings->sample_count : first + (uint32_t)samples;
-            double seconds = band_render(renderer, &film, rows, first, last);
-            pace.last_samples = (double)(pixels * (last - first));
-            pace.seconds_per_sample = seconds / pace.last_samples;
-            first = last;
+            uint32_t samples = pace_launch_samples(&pace, pixels, settings->sample_count - first);
+            double seconds = band_render(renderer, &film, rows, first, first + samples);
+            pace_note_launch(&pace, pixels, samples, seconds);
+            first += samples;
             go_on = !settings->stop || !settings->stop();
         }
         if (!go_on) break;
+        // not longer than a launch of one sample a pixel, which the band has had
         if (aovs & ~(unsigned)AOV_PATH) band_aovs(renderer, &film, aovs, rows);
         if (aovs & AOV_PATH) band_paths(renderer, &film, rows);
         go_on = band_deliver(renderer, &film, aovs, rows, sink, context);
