@@ -150,6 +150,11 @@ seq 100000 >bad-rays && refused 1 '^bad-rays:1:1: error: expected .*found 1$' tr
 check '20 errors and no more' test "$(grep -c 'bad-rays:[0-9]' err)" = 20
 check 'and that there are more' grep -q 'bad-rays: many errors: reading stopped' err
 echo '0 0 -4 0 -0 0' >bad-rays && refused 1 'direction cannot be 0 0 0' trace ball.yaml --rays bad-rays
+sed 's/position: \[3, 4, -5\]/position: [3e20, 4, -5]/' ball.yaml >far-light.yaml
+refused 1 'a light lies 3e.20 from the eye' render far-light.yaml $small -o far-light.png
+printf '0 0 -4 0 0 1e20\n0 0 -4 0 0 1e-20\n0 0 -4 0 0 3e38 0 3e-38\n0 0 -4 0 0 1\n' >lengths
+"$GLINT" trace ball.yaml --rays lengths >lengths.csv
+check 'directions of any length' awk -F, 'NR > 1 && ($1 != 0 || $5 != -1) { bad = 1 } END { exit bad || NR != 5 }' lengths.csv
 echo 'camera: 5' >bad.yaml && refused 1 '^bad.yaml:1:' check bad.yaml
 echo 'bogus 1' >bad.rt && refused 1 '^Error$' check bad.rt
 for ending in jpg PNGX ''; do refused 1 'must end in .png, .ppm, .exr or .npy' render ball.yaml -o "picture.$ending"; done

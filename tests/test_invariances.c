@@ -1,7 +1,7 @@
 // Random scenes of every shape, light and kind of material: what must not change a picture nor what lies
 // behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
 #include "host/base/array.h"
-#include "host/measure/scene_change.h"
+#include "host/scene/scene_change.h"
 #include "tests/frame.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
@@ -169,7 +169,7 @@ static void lanes_change_nothing(const Case *c)
 
 static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
 {
-    static const int exponents[] = {-10, 3, 10};
+    static const int exponents[] = {-60, -10, 3, 10, 60};
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         Scene scene = random_scene(seed);
         scene_scale(&scene, ldexp(1, exponents[i]));

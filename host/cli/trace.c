@@ -72,9 +72,14 @@ static int line_numbers(Report *report, size_t start, size_t end, double numbers
     }
 }
 
+static double farthest_of(Precision precision)
+{
+    return precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
+}
+
 static bool rays_read(RayList *rays, const Source *source, const CommonOptions *common, MessageList *messages)
 {
-    double farthest = common->precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
+    double farthest = farthest_of(common->precision);
     Report report = report_open(source, messages);
     for (size_t start = 0; start < source->length && !report_is_full(&report);) {
         const char *newline = memchr(source->bytes + start, '\n', source->length - start);
@@ -148,6 +153,19 @@ static bool hits_write(const char *path, const ProbeHit *hits, size_t count, boo
     return written;
 }
 
+// A ray in lengths of 2^exponent of its own: its direction's largest component lies within 0.5 and 1, so that
+// the square of its length neither vanishes nor overflows. Exact, and so are the answers.
+static ProbeRay ray_scaled(ProbeRay ray, double farthest, int *exponent)
+{
+    double *d = ray.direction;
+    frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
+    for (int axis = 0; axis < 3; axis++)
+        d[axis] = ldexp(d[axis], -*exponent);
+    ray.tmin = ldexp(ray.tmin, *exponent);
+    ray.tmax = fmin(ldexp(ray.tmax, *exponent), farthest);
+    return ray;
+}
+
 static int rays_trace(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
 {
     const RenderSettings settings = settings_whole(&options->common, 1, 1);
@@ -155,10 +173,19 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     messages_tell(&messages, NULL);
     if (!renderer) return EXIT_USER;
+    ProbeRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
     ProbeHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
-    renderer_trace(renderer, rays->items, rays->count, hits);
+    int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
+    double farthest = farthest_of(options->common.precision);
+    for (size_t i = 0; i < rays->count; i++)
+        scaled[i] = ray_scaled(rays->items[i], farthest, &exponents[i]);
+    renderer_trace(renderer, scaled, rays->count, hits);
+    for (size_t i = 0; i < rays->count; i++)
+        hits[i].t = ldexp(hits[i].t, -exponents[i]);
     bool written = hits_write(options->output, hits, rays->count, renderer_report(renderer)->wide);
+    free(exponents);
     free(hits);
+    free(scaled);
     renderer_close(renderer);
     return written ? EXIT_DONE : EXIT_USER;
 }

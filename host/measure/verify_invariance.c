@@ -1,6 +1,6 @@
 // A scene of every shape, scaled, mirrored and turned: the picture may change in the known way only.
-#include "host/measure/scene_change.h"
 #include "host/measure/verify_run.h"
+#include "host/scene/scene_change.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // Rendering the region band by band: each launch short enough for a desktop to stay usable and for an
 // interrupt to be heard, memory that of a band.
 #include "host/base/clock.h"
+#include "host/base/memory.h"
 #include "host/render/pace.h"
 #include "host/render/renderer_state.h"
 #include "host/render/sample_pattern.h"
@@ -169,6 +170,20 @@ static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
     band_launch(renderer, KERNEL_PATH, rows);
 }
 
+// Lengths of the device in the scene's own, in memory of the caller's, or NULL where they are so already.
+static void *lengths_restored(const Renderer *renderer, const void *lengths, size_t count)
+{
+    if (renderer->unit == 1 || !lengths) return NULL;
+    bool wide = renderer->report.wide;
+    void *restored = memory_allocate(count, renderer_scalar_size(renderer));
+    for (size_t i = 0; i < count; i++)
+        if (wide)
+            ((double *)restored)[i] = ((const double *)lengths)[i] * renderer->unit;
+        else
+            ((float *)restored)[i] = ((const float *)lengths)[i] * (float)renderer->unit;
+    return restored;
+}
+
 static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows, BandSink sink,
                          void *context)
 {
@@ -193,19 +208,23 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
     for (size_t i = 0; i < PART_COUNT; i++)
         if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
             mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
+    void *t = lengths_restored(renderer, mapped[1], pixels),
+         *position = lengths_restored(renderer, mapped[3], 3 * pixels);
     // in the order of the parts
     Band band = {.first_row = rows.first_row,
                  .row_count = rows.row_count,
                  .colors = mapped[0],
-                 .t = mapped[1],
+                 .t = t ? t : mapped[1],
                  .normal = mapped[2],
-                 .position = mapped[3],
+                 .position = position ? position : mapped[3],
                  .object = mapped[4],
                  .shadow = mapped[5],
                  .ray = mapped[6],
                  .path = mapped[7]};
     double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
     bool go_on = sink(context, &band, done);
+    free(t);
+    free(position);
     for (size_t i = 0; i < PART_COUNT; i++)
         if (mapped[i]) renderer_unmap(renderer, parts[i].buffer, mapped[i]);
     return go_on;

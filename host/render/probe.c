@@ -1,6 +1,8 @@
 // Explicit rays.
 #include "host/base/memory.h"
 #include "host/render/renderer_state.h"
+#include <float.h>
+#include <math.h>
 #include <stdlib.h>
 
 enum { PROBE_GROUP = 64, PROBE_RAYS_OF_LAUNCH = 1 << 18 };
@@ -25,7 +27,7 @@ static void vector_at(const void *scalars, size_t index, bool wide, double vecto
 }
 
 // The scalars of one hit, from `index` on.
-static ProbeHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object)
+static ProbeHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object, double unit)
 {
     ProbeHit hit = {.object = object,
                     .t = scalar_at(scalars, index + RESULT_T, wide),
@@ -37,18 +39,26 @@ static ProbeHit hit_at(const void *scalars, size_t index, bool wide, uint32_t ob
     vector_at(scalars, index + RESULT_MIRRORED_DIRECTION, wide, hit.mirrored_direction);
     vector_at(scalars, index + RESULT_PASSED_ORIGIN, wide, hit.passed_origin);
     vector_at(scalars, index + RESULT_PASSED_DIRECTION, wide, hit.passed_direction);
+    hit.t *= unit;
+    for (size_t axis = 0; axis < 3; axis++) {
+        hit.position[axis] *= unit;
+        hit.mirrored_origin[axis] *= unit;
+        hit.passed_origin[axis] *= unit;
+    }
     return hit;
 }
 
 static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count, ProbeHit *hits)
 {
     bool wide = renderer->report.wide;
+    double unit = renderer->unit, farthest = wide ? DBL_MAX : (double)FLT_MAX;
     size_t scalar = renderer_scalar_size(renderer);
     void *values = memory_allocate((size_t)count * RAY_SCALARS, scalar);
     for (uint32_t i = 0; i < count; i++) {
-        const double ray[RAY_SCALARS] = {rays[i].origin[0],    rays[i].origin[1],    rays[i].origin[2],
-                                         rays[i].direction[0], rays[i].direction[1], rays[i].direction[2],
-                                         rays[i].tmin,         rays[i].tmax};
+        const double *origin = rays[i].origin, *direction = rays[i].direction;
+        const double ray[RAY_SCALARS] = {
+            origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
+            direction[1],     direction[2],     rays[i].tmin / unit, fmin(rays[i].tmax / unit, farthest)};
         for (size_t k = 0; k < RAY_SCALARS; k++)
             scalar_set(values, i * RAY_SCALARS + k, wide, ray[k]);
     }
@@ -72,7 +82,7 @@ static void probe_some(Renderer *renderer, const ProbeRay *rays, uint32_t count,
     const void *result = renderer_map(renderer, results, result_size);
     const uint32_t *object = renderer_map(renderer, objects, object_size);
     for (uint32_t i = 0; i < count; i++)
-        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, wide, object[i]);
+        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, wide, object[i], unit);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     cl_must(clFinish(compute->queue));

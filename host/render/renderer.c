@@ -5,6 +5,7 @@
 #include "host/render/hierarchy.h"
 #include "host/render/renderer_state.h"
 #include "host/render/textures.h"
+#include "host/scene/scene_change.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,6 +87,51 @@ static bool scene_fits(const FlatScene *flat, const Renderer *renderer, MessageL
     return true;
 }
 
+static double distance_largest(Vector3 from, Vector3 to)
+{
+    Vector3 way = vector_subtract(to, from);
+    return fmax(fabs(way.x), fmax(fabs(way.y), fabs(way.z)));
+}
+
+// The unit of lengths on the device. In float a torus a trillion units large, or a trillionth, is lost, as
+// the third and fourth powers of lengths overflow or vanish; other shapes are at 1e19 and 1e-19. So a scene
+// that reaches as far, or no farther than that, is brought to where its reach and its smallest object lie on
+// the two sides of 1. Powers of two are exact: the picture is that of the scene as it is.
+static double scene_unit(const Scene *scene, const RenderSettings *settings)
+{
+    const int kept = 30; // exponents up to there are no trouble
+    Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    size_t unbounded_count;
+    Bounds bounds = scene_bounds(scene, &unbounded_count);
+    if (settings->precision == PRECISION_DOUBLE || bounds_is_empty(&bounds)) return 1;
+    int farthest, smallest;
+    frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
+    frexp(scene_smallest_size(scene), &smallest);
+    if (abs(farthest) <= kept) return 1;
+    int middle = (farthest + smallest) / 2;
+    return farthest > 0 && middle < 0 ? 1 : ldexp(1, middle);
+}
+
+// Whether the squared way to each light fits a float.
+static bool lights_are_near_enough(const Scene *scene, const Renderer *renderer, MessageList *messages)
+{
+    const double farthest = 1e18;
+    Vector3 eye = renderer->settings.shift_to_eye ? scene->camera.position : (Vector3){0};
+    if (renderer->report.wide) return true;
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        double away = distance_largest(eye, light->position);
+        if (light->kind == LIGHT_DIRECTIONAL || away <= farthest) continue;
+        message_add(
+            messages, MESSAGE_ERROR,
+            "a light lies %.3g from the eye, farther than precision %s can square (%.3g): a directional "
+            "light shines from as far, and double sees it",
+            away * renderer->unit, precision_names[renderer->settings.precision], farthest * renderer->unit);
+        return false;
+    }
+    return true;
+}
+
 // Whether the device has room for the arrays, as far as it says.
 static bool device_has_room(const FlatScene *flat, const Renderer *renderer, MessageList *messages)
 {
@@ -150,6 +196,32 @@ static void prelude_write(Renderer *renderer)
         renderer->options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
 }
 
+// Makes the flat arrays, in the scene's unit, and the renderer's unit; false, without arrays, on a user's
+// fault.
+static bool scene_lay(FlatScene *flat, const Scene *scene, Renderer *renderer, MessageList *messages)
+{
+    const RenderSettings *settings = &renderer->settings;
+    double start = clock_seconds();
+    renderer->unit = scene_unit(scene, settings);
+    Scene scaled = {0};
+    if (renderer->unit != 1) {
+        scaled = scene_scaled(scene, 1 / renderer->unit);
+        scene = &scaled;
+    }
+    bool lit = lights_are_near_enough(scene, renderer, messages), whole = false;
+    if (lit) {
+        const FlattenSettings flattening = {settings->width,        settings->height,
+                                            settings->sample_count, settings->bounce_count,
+                                            settings->shift_to_eye, renderer->report.wide};
+        flatten(flat, scene, &flattening);
+        whole = textures_hang(flat, scene, &flattening, messages) && scene_fits(flat, renderer, messages);
+        if (!whole) flat_scene_free(flat);
+    }
+    scene_scaled_free(&scaled);
+    renderer->report.flatten_seconds = clock_seconds() - start;
+    return whole;
+}
+
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
@@ -165,28 +237,20 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     report->features = features_of(scene) | settings->extra_features;
     report->build_from_cache = true;
 
-    double start = clock_seconds();
     FlatScene flat;
-    const FlattenSettings flattening = {settings->width,        settings->height,
-                                        settings->sample_count, settings->bounce_count,
-                                        settings->shift_to_eye, report->wide};
-    flatten(&flat, scene, &flattening);
-    bool textured = textures_hang(&flat, scene, &flattening, messages);
-    report->flatten_seconds = clock_seconds() - start;
-    if (!textured || !scene_fits(&flat, renderer, messages)) {
-        flat_scene_free(&flat);
+    if (!scene_lay(&flat, scene, renderer, messages)) {
         free(renderer);
         return NULL;
     }
     size_t bounded_count = hierarchy_bounded_count(&flat);
     bool hangs = settings->bvh == BVH_ON || (settings->bvh == BVH_AUTO && bounded_count >= BVH_WORTHWHILE);
     if (hangs && bounded_count > 0) {
-        start = clock_seconds();
+        double start = clock_seconds();
         hierarchy_hang(&flat, report->lanes);
         report->features |= FEATURE_BVH;
         report->bvh_seconds = clock_seconds() - start;
     }
-    start = clock_seconds();
+    double start = clock_seconds();
     balls_lay(&flat, report->wide);
     report->flatten_seconds += clock_seconds() - start;
     if (!device_has_room(&flat, renderer, messages)) {

@@ -20,6 +20,7 @@ struct Renderer {
     const char *options;
     cl_mem arrays[FLAT_COUNT];
     size_t light_count;
+    double unit; // a power of two: lengths on the device count so many of the scene's
     KernelSlot kernels[KERNEL_COUNT];
 };
 

@@ -79,3 +79,16 @@ Bounds scene_bounds(const Scene *scene, size_t *unbounded_count)
     }
     return bounds;
 }
+
+double scene_smallest_size(const Scene *scene)
+{
+    double smallest = INFINITY;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        if (!object_is_bounded(&scene->objects.items[i])) continue;
+        Bounds bounds = object_bounds(scene, &scene->objects.items[i]);
+        Vector3 size = vector_subtract(bounds.max, bounds.min);
+        double largest_side = fmax(size.x, fmax(size.y, size.z));
+        if (largest_side > 0) smallest = fmin(smallest, largest_side);
+    }
+    return isinf(smallest) ? 0 : smallest;
+}

@@ -1,4 +1,7 @@
-#include "host/measure/scene_change.h"
+#include "host/scene/scene_change.h"
+#include "host/base/memory.h"
+#include <stdlib.h>
+#include <string.h>
 
 enum { VECTORS_LARGEST = 6 };
 
@@ -47,7 +50,7 @@ static size_t object_vectors(Object *object, Vector3 *vectors[VECTORS_LARGEST])
     return count;
 }
 
-// Every vector that is a place or reaches from one to another; scenes with meshes are not for this.
+// Every vector that is a place or reaches from one to another, but for those of meshes.
 static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
 {
     change(&scene->camera.position, factor);
@@ -83,8 +86,47 @@ void scene_scale(Scene *scene, double factor)
         if (object->kind == SHAPE_CONE) object->as.cone.radius[0] *= factor;
         if (object->kind == SHAPE_CONE) object->as.cone.radius[1] *= factor;
     }
-    for (size_t i = 0; i < scene->materials.count; i++)
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        for (size_t k = 0; k < scene->meshes.items[i].vertex_count; k++)
+            vector_grow(&scene->meshes.items[i].vertices[k], factor);
+    for (size_t i = 0; i < scene->materials.count; i++) {
         scene->materials.items[i].checker_size *= factor;
+        scene->materials.items[i].image_size *= factor;
+    }
+}
+
+static void *copy_of(const void *items, size_t count, size_t size)
+{
+    void *copy = memory_allocate(count + 1, size);
+    if (count > 0) memcpy(copy, items, count * size);
+    return copy;
+}
+
+Scene scene_scaled(const Scene *scene, double factor)
+{
+    Scene scaled = *scene;
+    scaled.lights.items = copy_of(scene->lights.items, scene->lights.count, sizeof *scene->lights.items);
+    scaled.materials.items =
+        copy_of(scene->materials.items, scene->materials.count, sizeof *scene->materials.items);
+    scaled.objects.items = copy_of(scene->objects.items, scene->objects.count, sizeof *scene->objects.items);
+    scaled.meshes.items = copy_of(scene->meshes.items, scene->meshes.count, sizeof *scene->meshes.items);
+    for (size_t i = 0; i < scene->meshes.count; i++) {
+        const Mesh *mesh = &scene->meshes.items[i];
+        scaled.meshes.items[i].vertices = copy_of(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
+    }
+    scene_scale(&scaled, factor);
+    return scaled;
+}
+
+void scene_scaled_free(Scene *scaled)
+{
+    for (size_t i = 0; i < scaled->meshes.count; i++)
+        free(scaled->meshes.items[i].vertices);
+    free(scaled->lights.items);
+    free(scaled->materials.items);
+    free(scaled->objects.items);
+    free(scaled->meshes.items);
+    *scaled = (Scene){0};
 }
 
 static void vector_mirror(Vector3 *vector, double factor)
