@@ -1,8 +1,7 @@
 // What a band's samples cost is known only from its own launches: one band may be sky, which costs next to
-// nothing, and the next glass, a thousand times as dear. So the time that a sample took decides how many rows
-// a band gets, but not how many samples its first launch has: those are few, one a pixel unless even many
-// would be over at once. The band's later launches go by its own time, which all of its pixels have a part
-// in, and may grow the faster for it.
+// nothing, and the next glass, thousands of times as dear. So the time that a sample took decides how many
+// rows a band gets, but its first launch has one sample a pixel. Its later launches go by its own time, which
+// all of its pixels have a part in, and may grow the faster for it.
 #include "host/render/pace.h"
 
 #include <math.h>
@@ -12,7 +11,6 @@ enum {
     LAUNCH_SAMPLES_LARGEST = 1024,  // of each pixel
     BAND_GROWTH_LARGEST = 4,
     LAUNCH_GROWTH_LARGEST = 16, // within a band
-    FIRST_OF_BAND_PART = 64     // of the target: what is so much dearer still keeps to it
 };
 
 uint64_t pace_band_samples(const Pace *pace)
@@ -31,8 +29,8 @@ void pace_begin_band(Pace *pace)
 static double samples_wanted(const Pace *pace)
 {
     if (pace->launch_samples <= 0 || pace->launch_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
+    if (pace->begins_band) return 0; // one a pixel
     double of_target = pace->target_seconds * pace->launch_samples / pace->launch_seconds;
-    if (pace->begins_band) return of_target / FIRST_OF_BAND_PART;
     return fmin(of_target, LAUNCH_GROWTH_LARGEST * pace->launch_samples);
 }
 
