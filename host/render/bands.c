@@ -170,17 +170,14 @@ static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
     band_launch(renderer, KERNEL_PATH, rows);
 }
 
-// Lengths of the device in the scene's own, in memory of the caller's, or NULL where they are so already.
-static void *lengths_restored(const Renderer *renderer, const void *lengths, size_t count)
+// Lengths of the device in the scene's own, in memory of the caller's, or NULL where they are so already, as
+// at `double` they always are.
+static float *lengths_restored(const Renderer *renderer, const void *lengths, size_t count)
 {
     if (renderer->unit == 1 || !lengths) return NULL;
-    bool wide = renderer->report.wide;
-    void *restored = memory_allocate(count, renderer_scalar_size(renderer));
+    float *restored = memory_allocate(count, sizeof *restored);
     for (size_t i = 0; i < count; i++)
-        if (wide)
-            ((double *)restored)[i] = ((const double *)lengths)[i] * renderer->unit;
-        else
-            ((float *)restored)[i] = ((const float *)lengths)[i] * (float)renderer->unit;
+        restored[i] = ((const float *)lengths)[i] * (float)renderer->unit;
     return restored;
 }
 
@@ -208,8 +205,8 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
     for (size_t i = 0; i < PART_COUNT; i++)
         if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
             mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
-    void *t = lengths_restored(renderer, mapped[1], pixels),
-         *position = lengths_restored(renderer, mapped[3], 3 * pixels);
+    float *t = lengths_restored(renderer, mapped[1], pixels),
+          *position = lengths_restored(renderer, mapped[3], 3 * pixels);
     // in the order of the parts
     Band band = {.first_row = rows.first_row,
                  .row_count = rows.row_count,
@@ -290,7 +287,7 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
             go_on = !settings->stop || !settings->stop();
         }
         if (!go_on) break;
-        // not longer than a launch of one sample a pixel, which the band has had
+        // one ray a pixel, as the band's first launch had
         if (aovs & ~(unsigned)AOV_PATH) band_aovs(renderer, &film, aovs, rows);
         if (aovs & AOV_PATH) band_paths(renderer, &film, rows);
         go_on = band_deliver(renderer, &film, aovs, rows, sink, context);

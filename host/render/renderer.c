@@ -94,9 +94,9 @@ static double distance_largest(Vector3 from, Vector3 to)
 }
 
 // The unit of lengths on the device. In float a torus a trillion units large, or a trillionth, is lost, as
-// the third and fourth powers of lengths overflow or vanish; other shapes are at 1e19 and 1e-19. So a scene
-// that reaches as far, or no farther than that, is brought to where its reach and its smallest object lie on
-// the two sides of 1. Powers of two are exact: the picture is that of the scene as it is.
+// the third and fourth powers of lengths overflow or vanish; other shapes are at 1e19 and 1e-19. So where the
+// farthest point lies beyond 2^30, or within 2^-30, lengths are counted so that it and the smallest object
+// lie on the two sides of 1. Powers of two are exact: the picture is that of the scene as it is.
 static double scene_unit(const Scene *scene, const RenderSettings *settings)
 {
     const int kept = 30; // exponents up to there are no trouble
@@ -106,8 +106,8 @@ static double scene_unit(const Scene *scene, const RenderSettings *settings)
     if (settings->precision == PRECISION_DOUBLE || bounds_is_empty(&bounds)) return 1;
     int farthest, smallest;
     frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
-    frexp(scene_smallest_size(scene), &smallest);
     if (abs(farthest) <= kept) return 1;
+    frexp(scene_smallest_size(scene), &smallest);
     int middle = (farthest + smallest) / 2;
     return farthest > 0 && middle < 0 ? 1 : ldexp(1, middle);
 }
