@@ -42,11 +42,10 @@ static inline Patch plane_crossing_patch(Vector point, scalar4 normal, const Ray
 {
     Vector unit = IS_COMPENSATED ? vector_normalize(vector_of(normal))
                                  : vector_scale(vector_of(normal), (real)(normal.w));
-    Vector from_point = ray_point_from(ray, point, t);
-    from_point = vector_fma(unit, -vector_dot(unit, from_point), from_point);
-    Patch patch = patch_make(vector_add(from_point, point), unit,
-                             vector_magnitude(from_point) + vector_magnitude(point));
-    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
+    Vector crossing = ray_point(ray, t), to_point = vector_subtract(point, crossing);
+    Patch patch = patch_make(vector_fma(unit, vector_dot(unit, to_point), crossing), unit,
+                             vector_magnitude_along(unit, to_point));
+    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t, vector_magnitude(to_point));
     return patch;
 }
 

@@ -170,17 +170,18 @@ static inline Patch patch_make(Vector position, Vector normal, real size)
 }
 
 // Puts the point where the ray is at t, if origin and way there are far smaller than the numbers of the
-// shape, which its own form would lose bits to: on a planet, meters. For shapes whose t is then exact enough:
-// off by at most 13 u of origin and way along the normal (of a sphere at `single` with a device's worst
-// quotients and roots; 3 u without) and, from what the sums of exact products still lose, 6 u^2 of the size.
-static inline void patch_move_to_ray(Patch *patch, const Ray *ray, real t)
+// shape, of that magnitude, which its own form would lose bits to: on a planet, meters. For shapes whose t is
+// then exact enough: off by at most 13 u of origin and way along the normal (of a sphere at `single` with a
+// device's worst quotients and roots; 3 u without) and, from what the sums of exact products still lose, 6
+// u^2 of the size.
+static inline void patch_move_to_ray(Patch *patch, const Ray *ray, real t, real magnitude)
 {
-    real way = vector_magnitude(ray->direction) * fabs(t), limit = patch->size * (real)(0x1p-4f);
+    real way = vector_magnitude(ray->direction) * fabs(t), limit = magnitude * (real)(0x1p-4f);
     if (RARELY(lanes_any(way < limit))) {
         real reach = vector_magnitude(ray->origin) + way;
         mask beside = reach < limit;
         patch->position = vector_select(beside, ray_point(ray, t), patch->position);
-        patch->size = lanes_select(beside, fma((real)(UNIT_ROUNDOFF), patch->size, reach), patch->size);
+        patch->size = lanes_select(beside, fma((real)(UNIT_ROUNDOFF), magnitude, reach), patch->size);
     }
 }
 

@@ -300,7 +300,7 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
 
     real size = vector_magnitude(p) + vector_magnitude(base) + radius;
     Patch patch = patch_make(vector_add(place, base), normal, size);
-    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
+    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t, patch.size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
         // of the two surfaces the one whose crossing is nearer to t; at the rim the side

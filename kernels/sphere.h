@@ -124,7 +124,7 @@ static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
     real radius = (real)(sphere->center_radius.w);
     Vector normal = sphere_normal(center, radius, ray, t);
     Patch patch = patch_make(vector_fma(normal, radius, center), normal, radius + vector_magnitude(center));
-    if (!IS_FAST) patch_move_to_ray(&patch, ray, t);
+    if (!IS_FAST) patch_move_to_ray(&patch, ray, t, patch.size);
     return patch;
 }
 

@@ -87,9 +87,13 @@ static inline Roots triangle_slab(real a, real b, real c, real slack, real inver
     return (Roots){real_min(low, high), real_max(low, high)};
 }
 
-static inline real triangle_reach(real a, real b, real c)
+// The largest of their coordinates along each axis.
+static inline Vector corners_reach(Corners corners)
 {
-    return real_max(real_max(fabs(a), fabs(b)), fabs(c));
+    Vector a = corners.a, b = corners.b, c = corners.c;
+    return (Vector){real_max(real_max(fabs(a.x), fabs(b.x)), fabs(c.x)),
+                    real_max(real_max(fabs(a.y), fabs(b.y)), fabs(c.y)),
+                    real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
 }
 
 static inline real roots_hold(Roots roots, real t)
@@ -103,8 +107,7 @@ static inline real roots_hold(Roots roots, real t)
 static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real distance_)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
-    Vector reach = {triangle_reach(a.x, b.x, c.x), triangle_reach(a.y, b.y, c.y),
-                    triangle_reach(a.z, b.z, c.z)};
+    Vector reach = corners_reach((Corners){a, b, c});
     real slack = (real)(16 * UNIT_ROUNDOFF) * vector_magnitude(reach);
     real t = distance_;
     t = roots_hold(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
@@ -211,10 +214,13 @@ static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
 static inline Patch triangle_crossing_patch(Corners corners, Vector normal, TriangleWeights weights,
                                             const Ray *ray, real t)
 {
-    real size = real_max(real_max(vector_magnitude(corners.a), vector_magnitude(corners.b)),
-                         vector_magnitude(corners.c));
-    Patch patch = patch_make(triangle_blend(weights, corners), vector_normalize(normal), size);
-    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t);
+    Vector unit = vector_normalize(normal), reach = corners_reach(corners);
+    Patch patch = patch_make(triangle_blend(weights, corners), unit, vector_magnitude_along(unit, reach));
+    if (IS_COMPENSATED) {
+        real magnitude = real_max(real_max(vector_magnitude(corners.a), vector_magnitude(corners.b)),
+                                  vector_magnitude(corners.c));
+        patch_move_to_ray(&patch, ray, t, magnitude);
+    }
     return patch;
 }
 

@@ -93,6 +93,13 @@ static inline real vector_magnitude(Vector a)
     return fabs(a.x) + fabs(a.y) + fabs(a.z);
 }
 
+// What of it counts along a unit vector: how far errors in proportion to coordinates may put a point off a
+// surface of that normal. Those along the surface leave it there.
+static inline real vector_magnitude_along(Vector unit, Vector a)
+{
+    return fma(fabs(unit.x), fabs(a.x), fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
+}
+
 // Vectors of pairs, for the compensated forms.
 typedef struct {
     Pair x, y, z;

@@ -70,7 +70,8 @@ static void darkens_an_eclipse_in_meters(void **state)
 }
 
 // As the reference has it, but for pixels at an edge.
-static void hold_to_reference(const Scene *scene, const RenderSettings *settings, const char *what)
+static void hold_to_reference(const Scene *scene, const RenderSettings *settings, double error,
+                              const char *what)
 {
     Frame frame = frame_render(&probe_compute, scene, settings, AOV_T | AOV_SHADOW);
     unsigned open = 0, dark = 0;
@@ -80,7 +81,7 @@ static void hold_to_reference(const Scene *scene, const RenderSettings *settings
         ReferenceColor expected = reference_color(scene, &ray);
         bool at_edge = isfinite(frame.t[i]) && expected.margin <= 0x1p-16 * frame.t[i];
         double seen = frame.colors[3 * (size_t)i];
-        if (!at_edge && fabs(seen - expected.color.x) > 0x1p-17)
+        if (!at_edge && fabs(seen - expected.color.x) > error)
             fail_msg("%s, %s, seed %u: pixel %u,%u is %g, not %g", what, precision_names[settings->precision],
                      settings->perturb_seed, x, y, seen, expected.color.x);
         open += at_edge;
@@ -95,17 +96,28 @@ static void hold_to_reference(const Scene *scene, const RenderSettings *settings
 typedef struct {
     const char *name, *shape;
     Precision from; // held from this precision on
+    double error;   // of a color
 } Ground;
 
+#define COLOR_ERROR 0x1p-17
+// where a float's rounding puts places centimeters aside along the ground
+#define ASIDE_ERROR 0x1p-10
+
 static const Ground grounds[] = {
-    {"planet", "sphere: {center: [0, -4194304, 0], radius: 4194304}", PRECISION_SINGLE},
-    {"hollow planet", "sphere: {center: [0, 4194304, 0], radius: 4194304}", PRECISION_SINGLE},
-    {"cylinder", "cylinder: {point: [0, -4194304, 0], axis: [0, 0, 1], radius: 4194304}", PRECISION_STRICT},
+    {"planet", "sphere: {center: [0, -4194304, 0], radius: 4194304}", PRECISION_SINGLE, COLOR_ERROR},
+    {"hollow planet", "sphere: {center: [0, 4194304, 0], radius: 4194304}", PRECISION_SINGLE, COLOR_ERROR},
+    {"cylinder", "cylinder: {point: [0, -4194304, 0], axis: [0, 0, 1], radius: 4194304}", PRECISION_STRICT,
+     COLOR_ERROR},
     {"cone", "cone: {from: [0, -4194304, -4194304], to: [0, -4194304, 4194304], radius: [4177920, 4210688]}",
-     PRECISION_STRICT},
-    {"disc", "disc: {center: [-2097152, 65536, 0], normal: [1, 32, 0], radius: 4194304}", PRECISION_STRICT},
+     PRECISION_STRICT, COLOR_ERROR},
+    {"disc", "disc: {center: [-2097152, 65536, 0], normal: [1, 32, 0], radius: 4194304}", PRECISION_STRICT,
+     COLOR_ERROR},
     {"triangle", "triangle: {vertices: [[-4194304, 0, 4194304], [-4194304, 0, -4194304], [4194304, 0, 0]]}",
-     PRECISION_STRICT},
+     PRECISION_STRICT, COLOR_ERROR},
+    {"large triangle", "triangle: {vertices: [[-32768, 0, 32768], [-32768, 0, -32768], [32768, 0, 0]]}",
+     PRECISION_SINGLE, ASIDE_ERROR},
+    {"plane by a far point", "plane: {point: [4194304, 0, -4194304], normal: [0, 0.5, 0]}", PRECISION_SINGLE,
+     COLOR_ERROR},
 };
 
 // Marbles of a centimeter keep their shadows, and the ground has none of its own under a sun a twentieth of a
@@ -130,9 +142,9 @@ static void keeps_small_shadows_on(const Ground *ground)
     for (Precision precision = ground->from; precision < PRECISION_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         RenderSettings settings = frame_settings(128, 96, precision);
-        hold_to_reference(&scene, &settings, ground->name);
+        hold_to_reference(&scene, &settings, ground->error, ground->name);
         settings.perturb_seed = 1;
-        if (precision == PRECISION_SINGLE) hold_to_reference(&scene, &settings, ground->name);
+        if (precision == PRECISION_SINGLE) hold_to_reference(&scene, &settings, ground->error, ground->name);
     }
     scene_free(&scene);
 }
