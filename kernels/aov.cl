@@ -14,7 +14,7 @@ static KERNEL_BODY void tile_describe(const Scene *scene, const Tile *tile, glob
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
-    Surface surface = surface_at(scene, &ray, &hit);
+    Surface surface = surface_seen(scene, &ray, &hit);
     const Vector nothing = {(real)(0), (real)(0), (real)(0)};
     film_store_color(directions, tile, ray.direction);
     film_store(ts, tile, 1, 0, hit_distance(&hit));

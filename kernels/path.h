@@ -50,7 +50,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
         Color3 seen = background;
         bool any_found = lanes_any(surface.found);
         if (any_found) {
-            surface = surface_at(scene, &ray, &hit);
+            surface = surface_seen(scene, &ray, &hit);
             if (!SIGNS_PATHS) seen = vector_select(surface.found, surface_color(scene, &surface), background);
         }
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {

@@ -57,8 +57,9 @@ static inline void rays_count(const Scene *scene, uint what, mask rays)
 // A ray's way through the scene: to its closest hit, or only to whether anything blocks it.
 typedef struct {
     Hit hit;
-    mask open; // the lanes that are looking: not those that found enough, nor those whose turn is later
-    bool any;  // a hit takes light from a lane, all of it unless the object is transparent
+    mask open;   // the lanes that are looking: not those that found enough, nor those whose turn is later
+    bool any;    // a hit takes light from a lane, all of it unless the object is transparent
+    bool opaque; // only what passes no light counts
     integer optical_depth; // that the lanes met, in steps of -log2
 } Search;
 
@@ -82,6 +83,11 @@ static inline integer optical_depth_of(const Scene *scene, uint id)
 #endif
 }
 
+static inline bool object_is_opaque(const Scene *scene, uint id)
+{
+    return scene->materials[scene->objects[id].kind_index_material.z].reflection_transmission_ior.y == 0;
+}
+
 // Takes an object's light away from the lanes that meet it; a lane without light is closed.
 static inline void search_darken(Search *search, const Scene *scene, mask found, uint id)
 {
@@ -102,6 +108,7 @@ static inline void search_darken(Search *search, const Scene *scene, mask found,
 // order.
 static inline void search_take(Search *search, const Scene *scene, mask found, real t, uint id)
 {
+    if (HAS_TRANSMISSION && search->opaque && !object_is_opaque(scene, id)) return;
     if (search->any) {
         search_darken(search, scene, found & search->open & (t < search->hit.t), id);
         return;
@@ -340,9 +347,9 @@ static inline void search_plainly(Search *search, const Scene *scene, Ray *ray)
     SHAPE_LIST(SEARCH_PLAINLY)
 }
 
-static OUT_OF_LINE Search scene_search(const Scene *scene, Ray *ray, bool any)
+static OUT_OF_LINE Search scene_search(const Scene *scene, Ray *ray, bool any, bool opaque)
 {
-    Search search = {{ray->far, (integer)(-1)}, ray->active, any, (integer)(0)};
+    Search search = {{ray->far, (integer)(-1)}, ray->active, any, opaque, (integer)(0)};
     search_plainly(&search, scene, ray);
     if (HAS_BVH) search_hierarchy(&search, scene, ray);
     return search;
@@ -350,7 +357,12 @@ static OUT_OF_LINE Search scene_search(const Scene *scene, Ray *ray, bool any)
 
 static inline Hit closest_hit(const Scene *scene, Ray *ray)
 {
-    return scene_search(scene, ray, false).hit;
+    return scene_search(scene, ray, false, false).hit;
+}
+
+static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
+{
+    return scene_search(scene, ray, false, true).hit;
 }
 
 static inline mask hit_found(const Hit *hit)
@@ -362,7 +374,7 @@ static inline mask hit_found(const Hit *hit)
 // opaque. What is transparent passes its transmission, unbent, once for each object.
 static inline real transmittance(const Scene *scene, Ray *ray)
 {
-    Search search = scene_search(scene, ray, true);
+    Search search = scene_search(scene, ray, true, false);
     const real none = (real)(0), all = (real)(1);
     if (!HAS_TRANSMISSION) return lanes_select(search.open, all, none);
     const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);

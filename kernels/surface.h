@@ -193,4 +193,43 @@ static inline Vector surface_leave(const Surface *surface, bool through)
     return vector_fma(surface->normal, through ? -distance_ : distance_, surface->position);
 }
 
+// Whether something opaque may be in the same place.
+static inline mask place_may_touch(const Scene *scene, Vector place)
+{
+    Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
+    return (place.x >= low.x) & (place.x <= high.x) & (place.y >= low.y) & (place.y <= high.y) &
+           (place.z >= low.z) & (place.z <= high.z);
+}
+
+// The opaque surfaces in the same place as a transparent one, within the bound on its error: a ray that
+// passed it would start beyond them. Returns the lanes whose hits they become.
+static inline mask hit_take_opaque(const Scene *scene, const Surface *surface, Hit *hit)
+{
+    mask transparent = surface->found & (surface->transmission > (real)(0));
+    transparent = transparent & place_may_touch(scene, surface->position);
+    if (!lanes_any(transparent)) return mask_none();
+    Ray inward = ray_make_unit(surface_leave(surface, false), vector_negate(surface->normal), transparent);
+    inward.near = surface->error;
+    inward.far = (real)(3) * surface->error;
+    Hit opaque = closest_opaque_hit(scene, &inward);
+    mask found = hit_found(&opaque);
+    hit->object = lanes_select(found, opaque.object, hit->object);
+    return found;
+}
+
+// What the ray meets, where an opaque surface goes before a transparent one in the same place: glass that
+// stands on a floor shows the floor. Rays that leave it start beyond either.
+static inline Surface surface_seen(const Scene *scene, const Ray *ray, Hit *hit)
+{
+    real error = (real)(0);
+    for (;;) {
+        Surface surface = surface_at(scene, ray, hit);
+        surface.error = real_max(surface.error, error);
+        if (!HAS_TRANSMISSION) return surface;
+        mask taken = hit_take_opaque(scene, &surface, hit);
+        if (!lanes_any(taken)) return surface;
+        error = lanes_select(taken, surface.error, (real)(0));
+    }
+}
+
 #endif

@@ -225,12 +225,15 @@ typedef struct {
     scalar4 bounds; // of what hangs in the hierarchy: xyz: center, w: no point lies farther from it, summed
                     // over the axes
     scalar4 bounds_low, bounds_high; // its corners
-    scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
-    uint4 picture;                   // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;                   // x: of a ray, at most
-    uint4 balls;                     // x: of each apex; 0: there are none
-    uint4 counts[2];                 // of each KIND_…, in its order
-    uint4 bounded_counts[2];         // as many of them, from the first, hang in the hierarchy
+    // corners of a box around all places where something transparent may touch something opaque; low is above
+    // high where nothing does
+    scalar4 contact_low, contact_high;
+    scalar4 sample;          // x: width of a sample's share of a pixel, at distance 1
+    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;           // x: of a ray, at most
+    uint4 balls;             // x: of each apex; 0: there are none
+    uint4 counts[2];         // of each KIND_…, in its order
+    uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
 } SceneHeader;
 
 #endif

@@ -173,6 +173,29 @@ static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted)
     return true;
 }
 
+// The opaque surface in the same place as a transparent one, that goes before it. As near as this counts.
+#define CONTACT_PART ((Quad)1e-9L)
+
+static void hit_take_opaque(const Scene *scene, const ReferenceRay *ray, ReferenceHit *hit)
+{
+    Quad reach = CONTACT_PART * (hit->t * quad3_length(ray->direction) + 1);
+    ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        if (scene->materials.items[object->material].transmission > 0) continue;
+        if (!reference_hit_object(object, &inward).found) continue;
+        ReferenceRay around = *ray;
+        Quad part = 2 * reach / (hit->cosine * quad3_length(ray->direction));
+        around.tmin = hit->t - part;
+        around.tmax = hit->t + part;
+        ReferenceHit opaque = reference_hit_object(object, &around);
+        if (!opaque.found) continue;
+        opaque.object = (uint32_t)i;
+        *hit = opaque;
+        return;
+    }
+}
+
 static void add_path(const Scene *scene, const ReferenceRay *ray, double weight, unsigned bounces_left,
                      double blur, Random *random, Color *sum)
 {
@@ -182,6 +205,8 @@ static void add_path(const Scene *scene, const ReferenceRay *ray, double weight,
         *sum = vector_add(*sum, vector_scale(scene->background, weight));
         return;
     }
+    if (scene->materials.items[scene->objects.items[hit.object].material].transmission > 0)
+        hit_take_opaque(scene, ray, &hit);
     Surface surface = surface_at(scene, ray, &hit, blur, random);
     *sum = vector_add(*sum, vector_scale(surface_color(scene, &surface, 0).color, weight));
     if (bounces_left == 0) return;

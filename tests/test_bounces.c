@@ -90,6 +90,32 @@ static Trial trials[] = {
      "  - torus: {center: [1.75, 1.25, 0], axis: [0, 0.5, 1], major: 0.75, minor: 0.25, material: water}\n"
      "  - disc: {center: [0.5, 2.5, 0], normal: [0, 0.25, 1], radius: 0.5, material: mirror}\n",
      6},
+    // Listed before the floor, so that at the same distance the glass would go first.
+    {"glass on the floor",
+     STAGE CAMERA
+     "objects:\n"
+     "  - box: {min: [-1.5, 0, -0.5], max: [-0.25, 1, 0.75], material: clear}\n"
+     "  - cylinder: {from: [0.75, 0, 0.5], to: [0.75, 1.25, 0.5], radius: 0.5, material: glass}\n"
+     "  - cone: {from: [2, 0, 0], to: [2, 1.25, 0], radius: [0.5, 0.25], material: water}\n"
+     "  - sphere: {center: [0.25, 0.5, 1.75], radius: 0.5, material: glass}\n"
+     "  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: tiles}\n",
+     6},
+    {"glass on a mirror that is tilted",
+     STAGE CAMERA "objects:\n"
+                  "  - cylinder: {from: [-0.75, 0.75, 0], to: [-0.9375, 1.5, 0.75], radius: 0.5, "
+                  "material: clear}\n"
+                  "  - cone: {from: [0.25, 1, 0], to: [0.0625, 1.75, 0.75], radius: [0.375, 0.25], "
+                  "material: water}\n"
+                  "  - plane: {point: [-0.75, 0.75, 0], normal: [-0.1875, 0.75, 0.75], material: mirror}\n",
+     6},
+    {"glass between walls",
+     STAGE CAMERA FLOOR "  - triangle: {vertices: [[-1, 0.5, 1], [1, 0.5, 1], [1, 2, 1]], material: clear}\n"
+                        "  - triangle: {vertices: [[-1, 0.5, 1], [1, 2, 1], [-1, 2, 1]], material: clear}\n"
+                        "  - box: {min: [-1, 0.5, 0], max: [0, 2, 1], material: red}\n"
+                        "  - box: {min: [1, 0.5, -1], max: [2, 1.5, 0], material: clear}\n"
+                        "  - box: {min: [1, 0.5, -2], max: [2, 1.75, -1], material: red}\n"
+                        "  - box: {min: [2, 0.5, -1.5], max: [2.5, 2, 0.5], material: mirror}\n",
+     6},
     {"eye in glass",
      STAGE "camera: {position: [0.25, 1.25, 0.5], look_at: [0, 0.5, -4], up: [0, 1, 0], fov: 60}\n" FLOOR
            "  - sphere: {center: [0, 1.25, 0], radius: 1, material: clear}\n"

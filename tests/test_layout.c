@@ -31,6 +31,8 @@ typedef struct {
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds)                         \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds_low)                     \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds_high)                    \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, contact_low)                    \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, contact_high)                    \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \

@@ -2,6 +2,7 @@
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/render/balls.h"
+#include "host/render/contact.h"
 #include "host/render/hierarchy.h"
 #include "host/render/renderer_state.h"
 #include "host/render/textures.h"
@@ -215,6 +216,7 @@ static bool scene_lay(FlatScene *flat, const Scene *scene, Renderer *renderer, M
                                             settings->shift_to_eye, renderer->report.wide};
         flatten(flat, scene, &flattening);
         whole = textures_hang(flat, scene, &flattening, messages) && scene_fits(flat, renderer, messages);
+        if (whole && renderer->report.features & FEATURE_TRANSMISSION) contact_mark(flat);
         if (!whole) flat_scene_free(flat);
     }
     scene_scaled_free(&scaled);

@@ -1,0 +1,172 @@
+// The box around where transparent and opaque things may touch: what lies outside it is never asked for an
+// opaque surface in the same place, so it must hold all such places, and is of use where it holds little
+// else.
+#include "host/render/contact.h"
+#include "tests/scene_reading.h"
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#define STAGE                                                                                                \
+    "camera: {position: [0, 0, 0], look_at: [0, 0, -1]}\n"                                                   \
+    "materials:\n"                                                                                           \
+    "  glass: {transmission: 0.75, ior: 1.5}\n"                                                              \
+    "  chalk: {color: [1, 1, 1]}\n"                                                                          \
+    "objects:\n"
+#define FLOOR        "  - plane: {point: [7, -1, 3], normal: [0, 1, 0], material: chalk}\n"
+#define GLASS_SPHERE "  - sphere: {center: [0, 0, -4], radius: 1, material: glass}\n"
+
+typedef struct {
+    const char *name, *objects;
+    bool touch;
+    Vector3 low, high; // within a 256th
+} Trial;
+
+#define APART                                                                                                \
+    false, {0, 0, 0},                                                                                        \
+    {                                                                                                        \
+        0, 0, 0                                                                                              \
+    }
+#define ENDLESS ((double)FLT_MAX)
+
+static Trial trials[] = {
+    {"sphere on a floor", GLASS_SPHERE FLOOR, true, {-1, -1, -5}, {1, -1, -3}},
+    {"sphere over a floor", "  - sphere: {center: [0, 0.125, -4], radius: 1, material: glass}\n" FLOOR,
+     APART},
+    {"nothing opaque", GLASS_SPHERE, APART},
+    {"all opaque", "  - sphere: {center: [0, 0, -4], radius: 1, material: chalk}\n" FLOOR, APART},
+    {"beside a box",
+     GLASS_SPHERE "  - box: {min: [1, 0, -8], max: [2, 3, -4.5], material: chalk}\n",
+     true,
+     {1, 0, -5},
+     {1, 1, -4.5}},
+    {"far from a box and on a floor",
+     GLASS_SPHERE FLOOR "  - box: {min: [3, 0, -8], max: [4, 3, -4.5], material: chalk}\n",
+     true,
+     {-1, -1, -5},
+     {1, -1, -3}},
+    {"two floors' places are joined",
+     GLASS_SPHERE FLOOR "  - plane: {point: [0, 1, 0], normal: [0, -2, 0], material: chalk}\n",
+     true,
+     {-1, -1, -5},
+     {1, 1, -3}},
+    // y = x - 0.5 from x = -0.5 to 1 and y = -1 to 0.5
+    {"a tilted plane",
+     GLASS_SPHERE "  - plane: {point: [0.5, 0, 0], normal: [-1, 1, 0], material: chalk}\n",
+     true,
+     {-0.5, -1, -5},
+     {1, 0.5, -3}},
+    {"a tilted plane that passes by",
+     GLASS_SPHERE "  - plane: {point: [2.25, 0, 0], normal: [-1, 1, 0], material: chalk}\n", APART},
+    {"a disc",
+     GLASS_SPHERE "  - disc: {center: [0, -0.5, -4], normal: [0, 1, 0], radius: 0.5, material: chalk}\n",
+     true,
+     {-0.5, -0.5, -4.5},
+     {0.5, -0.5, -3.5}},
+    {"a sphere in water",
+     "  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: glass}\n"
+     "  - sphere: {center: [0, 0.25, -4], radius: 1, material: chalk}\n",
+     true,
+     {-1, 0, -5},
+     {1, 0, -3}},
+    {"water over a floor", FLOOR "  - plane: {point: [0, 1, 0], normal: [0, 1, 0], material: glass}\n",
+     APART},
+    {"water on a floor",
+     FLOOR "  - plane: {point: [0, -1, 0], normal: [0, 2, 0], material: glass}\n",
+     true,
+     {-ENDLESS, -1, -ENDLESS},
+     {ENDLESS, -1, ENDLESS}},
+    {"an endless cylinder",
+     GLASS_SPHERE "  - cylinder: {point: [0, 0, 0], axis: [1, 0, 0], radius: 1, material: chalk}\n",
+     true,
+     {-1, -1, -5},
+     {1, 1, -3}},
+};
+enum { TRIAL_COUNT = sizeof trials / sizeof *trials };
+
+static Bounds contact_of(const Scene *scene)
+{
+    FlatScene flat;
+    flatten(&flat, scene, &(FlattenSettings){.width = 1, .height = 1, .sample_count = 1});
+    contact_mark(&flat);
+    const SceneHeader *header = flat.arrays[FLAT_HEADER].items;
+    Bounds contact = {vector3_of(&header->contact_low), vector3_of(&header->contact_high)};
+    flat_scene_free(&flat);
+    return contact;
+}
+
+// At or beyond, by no more than a 256th.
+static void check_beyond(const char *name, double value, double bound)
+{
+    if (fabs(bound) == ENDLESS) {
+        assert_true(value >= fabs(bound));
+    } else if (!(value >= bound && value <= bound + 0x1p-8)) {
+        fail_msg("%s: reaches %.9g, not %g", name, value, bound);
+    }
+}
+
+static void holds_where_they_touch(void **state)
+{
+    const Trial *trial = *state;
+    Text text = {0};
+    text_appendf(&text, STAGE "%s", trial->objects);
+    Scene scene = scene_of_text("contact.yaml", text_c(&text));
+    Bounds contact = contact_of(&scene);
+    assert_int_equal(bounds_is_empty(&contact), !trial->touch);
+    if (trial->touch) {
+        check_beyond(trial->name, -contact.min.x, -trial->low.x);
+        check_beyond(trial->name, -contact.min.y, -trial->low.y);
+        check_beyond(trial->name, -contact.min.z, -trial->low.z);
+        check_beyond(trial->name, contact.max.x, trial->high.x);
+        check_beyond(trial->name, contact.max.y, trial->high.y);
+        check_beyond(trial->name, contact.max.z, trial->high.z);
+    }
+    scene_free(&scene);
+    text_free(&text);
+}
+
+// So many pairs that what is opaque counts as one box, and, where much is endless, as everywhere.
+static void many_pairs_hold_as_much(void **state)
+{
+    (void)state;
+    enum { SPHERE_COUNT = 1500 };
+    for (int endless = 0; endless <= 1; endless++) {
+        Text text = {0};
+        text_appendf(&text, STAGE);
+        for (int i = 0; i < SPHERE_COUNT; i++) {
+            text_appendf(&text, "  - sphere: {center: [%d, 0, -4], radius: 0.5, material: glass}\n", 4 * i);
+            if (endless)
+                text_appendf(&text, "  - plane: {point: [0, %d, 0], normal: [0, 1, 0], material: chalk}\n",
+                             -8 - i);
+            else
+                text_appendf(&text, "  - sphere: {center: [%d, 1, -4], radius: 0.5, material: chalk}\n",
+                             4 * i);
+        }
+        Scene scene = scene_of_text("contact.yaml", text_c(&text));
+        Bounds contact = contact_of(&scene);
+        if (endless) {
+            assert_true(contact.max.y >= ENDLESS && contact.min.y <= -ENDLESS);
+        } else {
+            double reach = 4.0 * (SPHERE_COUNT - 1) + 0.5;
+            assert_true(contact.min.x <= -0.5 && contact.max.x >= reach);
+            // the scene's size is what nearness goes by
+            assert_true(contact.min.y <= 0.5 && contact.min.y >= 0.5 - reach * 0x1p-12);
+            assert_true(contact.max.y >= 0.5 && contact.max.y <= 0.5 + reach * 0x1p-12);
+        }
+        scene_free(&scene);
+        text_free(&text);
+    }
+}
+
+int main(void)
+{
+    struct CMUnitTest tests[TRIAL_COUNT + 1];
+    for (size_t i = 0; i < TRIAL_COUNT; i++)
+        tests[i] = (struct CMUnitTest){trials[i].name, holds_where_they_touch, NULL, NULL, &trials[i]};
+    tests[TRIAL_COUNT] = (struct CMUnitTest)cmocka_unit_test(many_pairs_hold_as_much);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
