@@ -1,6 +1,7 @@
 // Meshes: read from files, placed in the world, their vertices joined and made smooth.
 #pragma once
 
+#include "host/base/text.h"
 #include "host/scene/report.h"
 #include "host/scene/scene.h"
 
@@ -40,6 +41,9 @@ size_t mesh_degenerate_count(const Mesh *mesh);
 // nothing is, or the file cannot be read.
 bool obj_find_fault(const char *path, char *fault, size_t size);
 
-// What a PLY or a glTF file holds that assimp would crash on, or never be done with, told likewise.
-bool ply_find_fault(const char *path, char *fault, size_t size);
+// What a glTF file holds that assimp would crash on, or never be done with, told likewise.
 bool gltf_find_fault(const char *path, char *fault, size_t size);
+
+// Reads a PLY file and writes it anew, as assimp reads it right. False where it promises more than it holds
+// or is not PLY: then the fault is told as `line N: what` or, in a binary file's body, as `byte N: what`.
+bool ply_read(Text *clean, const char *path, char *fault, size_t size);

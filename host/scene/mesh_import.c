@@ -11,6 +11,7 @@
 #include <assimp/cimport.h>
 #include <assimp/scene.h>
 #include <errno.h>
+#include <limits.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -159,6 +160,18 @@ static bool vertex_fails(Importer *importer, const char *otherwise)
                         obj_find_fault(importer->import->path, fault, sizeof fault) ? fault : otherwise);
 }
 
+static bool ply_open(Importer *importer)
+{
+    char fault[200];
+    Text clean = {0};
+    bool read = ply_read(&clean, importer->import->path, fault, sizeof fault);
+    if (read && clean.count > UINT_MAX) read = snprintf(fault, sizeof fault, "larger than 4 GiB") < 0;
+    if (read) importer->file = aiImportFileFromMemory(text_c(&clean), (unsigned)clean.count, 0, "ply");
+    text_free(&clean);
+    return read ? importer->file || import_fails(importer, "%s", aiGetErrorString())
+                : import_fails(importer, "%s", fault);
+}
+
 static bool file_open(Importer *importer)
 {
     static const char *const endings[] = {".obj", ".ply", ".stl", ".gltf", ".glb"};
@@ -170,9 +183,9 @@ static bool file_open(Importer *importer)
     struct stat status;
     if (stat(path, &status) != 0) return import_fails(importer, "%s", strerror(errno));
     if (!S_ISREG(status.st_mode)) return import_fails(importer, "not a regular file");
+    if (!strcasecmp(ending, ".ply")) return ply_open(importer);
     char fault[200];
-    if (ply_find_fault(path, fault, sizeof fault) || gltf_find_fault(path, fault, sizeof fault))
-        return import_fails(importer, "%s", fault);
+    if (gltf_find_fault(path, fault, sizeof fault)) return import_fails(importer, "%s", fault);
     importer->file = aiImportFile(path, 0);
     return importer->file || vertex_fails(importer, aiGetErrorString());
 }

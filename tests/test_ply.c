@@ -1,0 +1,311 @@
+// PLY files: the layouts that are read, as one square, and what is told of those that promise more than they
+// hold.
+#include "host/scene/vector.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#define SCENE                                                                                                \
+    "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \
+    "objects:\n  - mesh: {file: a.ply}\n"
+
+#define XYZ   "property float x\nproperty float y\nproperty float z\n"
+#define FACES "element face 2\nproperty list uchar int vertex_indices\n"
+#define ASCII "ply\nformat ascii 1.0\n"
+#define END   "end_header\n"
+
+// The square's corners and two triangles, a line each.
+#define CORNERS   "0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
+#define TRIANGLES "3 0 1 2\n3 1 3 2\n"
+#define HEADER    ASCII "element vertex 4\n" XYZ FACES END
+
+static const double corners[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+static const uint32_t triangles[2][3] = {{0, 1, 2}, {1, 3, 2}};
+
+static char folder[] = "/tmp/glint-ply-XXXXXX";
+
+static int folder_open(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static int folder_close(void **state)
+{
+    (void)state;
+    unlink("a.ply");
+    return chdir("/") == 0 ? rmdir(folder) : -1;
+}
+
+static void file_write(const Text *text)
+{
+    FILE *file = fopen("a.ply", "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(text_c(text), 1, text->count, file), text->count);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void assert_square(const Text *text)
+{
+    file_write(text);
+    Scene scene = scene_of_text("scene.yaml", SCENE);
+    assert_int_equal(scene.meshes.count, 1);
+    const Mesh *mesh = &scene.meshes.items[0];
+    assert_int_equal(mesh->triangle_count, 2);
+    for (size_t i = 0; i < 6; i++) {
+        const double *corner = corners[triangles[i / 3][i % 3]];
+        Vector3 vertex = mesh->vertices[mesh->triangles[i / 3][i % 3]];
+        assert_vector(vertex, corner[0], corner[1], corner[2]);
+    }
+    scene_free(&scene);
+}
+
+static void assert_refused(const Text *text, const char *message)
+{
+    Text expected = {0};
+    file_write(text);
+    text_appendf(&expected, "4:18: error: a.ply: %s\n", message);
+    assert_messages("scene.yaml", SCENE, text_c(&expected));
+    text_free(&expected);
+}
+
+static void ascii_layouts_are_read(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {
+        HEADER CORNERS TRIANGLES,
+        // no newline at the end, after a longer line
+        HEADER CORNERS "3 0 1 2 17\n3 1 3 2",
+        HEADER "\n" CORNERS "\n\n\n" TRIANGLES "\n\nand more\n",
+        HEADER "  0 0 0 \n\t1\t0  0\n+0 1. -.0e-5\n1E0 100e-2 0\n 3 0 1 2\t\n3 +1 3 2 0 0\n",
+        "ply\ncomment 7 of all\nformat ascii 1.0\ncomment 5\ncomment vertex 3\nobj_info none\n"
+        "element vertex 4\nproperty float x\nobj_info a\n property  float\ty\ncomment b\nproperty float z\n"
+        "element  face 2\nproperty  list uchar  int vertex_index\nend_header \n" CORNERS TRIANGLES,
+        ASCII "element vertex 4\nproperty uchar red\nproperty float32 z\nproperty float64 y\n"
+              "property int8 kind\nproperty double x\nproperty float confidence\n" FACES END
+              "255 0 0 -1 0 .5\n0 0 0 1 1 nan\n7 0 1 2 0 1e-9\n0 0 1 3 1 -inf\n" TRIANGLES,
+        ASCII "element camera 2\nproperty float fov\nelement vertex 4\n" XYZ
+              "element edge 1\nproperty int vertex1\nproperty int vertex2\nelement group 2\n"
+              "property list uint float of\nelement empty 9000000000\n" FACES END "50\n60\n" CORNERS
+              "0 1\n2 0.5 -1\n0\n" TRIANGLES,
+        ASCII "element vertex 4\n" XYZ "property list uchar float x\nproperty list float int near\n"
+              "element face 2\nproperty list uint8 float32 texcoord\nproperty ushort flags\n"
+              "property list short uint vertex_indices\n" END
+              "0 0 0 0 0\n1 0 0 1 7 2 1 2\n0 1 0 0 0\n1 1 0 0 0\n"
+              "6 0 0 1 0 0 1 65535 3 0 1 2\n0 1 3 1 3 2\nand more\n",
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        for (int ends = 0; ends < 3; ends++) {
+            static const char *const line_ends[] = {"\n", "\r\n", "\r"};
+            Text text = {0};
+            for (const char *at = texts[i]; *at; at++)
+                text_append(&text, *at == '\n' ? line_ends[ends] : at,
+                            *at == '\n' ? strlen(line_ends[ends]) : 1);
+            assert_square(&text);
+            text_free(&text);
+        }
+    }
+}
+
+typedef struct {
+    const char *name;
+    size_t size;
+    bool real;
+} Type;
+
+static const Type types[] = {
+    {"char", 1, false},  {"uchar", 1, false},  {"short", 2, false},  {"ushort", 2, false},
+    {"int", 4, false},   {"uint", 4, false},   {"float", 4, true},   {"double", 8, true},
+    {"int8", 1, false},  {"uint8", 1, false},  {"int16", 2, false},  {"uint16", 2, false},
+    {"int32", 4, false}, {"uint32", 4, false}, {"float32", 4, true}, {"float64", 8, true},
+};
+
+static void number_append(Text *text, double number, const Type *type, bool big)
+{
+    uint64_t bits = type->real ? 0 : (uint64_t)(int64_t)number;
+    float narrow = (float)number;
+    uint32_t narrow_bits;
+    memcpy(&narrow_bits, &narrow, sizeof narrow_bits);
+    if (type->real && type->size == 4) bits = narrow_bits;
+    if (type->real && type->size == 8) memcpy(&bits, &number, sizeof bits);
+    for (size_t i = 0; i < type->size; i++) {
+        char byte = (char)(bits >> 8 * (big ? type->size - 1 - i : i));
+        text_append(text, &byte, 1);
+    }
+}
+
+// With numbers of this type beside the coordinates and as lengths of lists, and elements assimp does not
+// know.
+static Text binary_square(const Type *type, bool big, const char *line_end)
+{
+    const Type *single = &types[6], *whole = &types[4];
+    Text text = {0};
+    text_appendf(&text,
+                 "ply%sformat binary_%s_endian 1.0%selement group 1%sproperty list %s double of%s"
+                 "element vertex 4%sproperty %s kind%sproperty float x%sproperty float y%sproperty float z%s"
+                 "element face 2%sproperty list %s %s other%sproperty list %s int vertex_index%send_header%s",
+                 line_end, big ? "big" : "little", line_end, line_end, type->name, line_end, line_end,
+                 type->name, line_end, line_end, line_end, line_end, line_end, type->name, type->name,
+                 line_end, type->name, line_end, line_end);
+    number_append(&text, 1, type, big);
+    number_append(&text, 0.5, &types[7], big);
+    for (size_t i = 0; i < 4; i++) {
+        number_append(&text, 10, type, big); // for most types the body starts with a newline then
+        for (size_t axis = 0; axis < 3; axis++)
+            number_append(&text, corners[i][axis], single, big);
+    }
+    for (size_t i = 0; i < 2; i++) {
+        number_append(&text, 1, type, big);
+        number_append(&text, 9, type, big);
+        number_append(&text, 3, type, big);
+        for (size_t k = 0; k < 3; k++)
+            number_append(&text, triangles[i][k], whole, big);
+    }
+    return text;
+}
+
+static void binary_layouts_are_read(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
+        for (int big = 0; big < 2; big++) {
+            for (int returns = 0; returns < 2; returns++) {
+                Text text = binary_square(&types[i], big, returns ? "\r\n" : "\n");
+                assert_square(&text);
+                text_free(&text);
+            }
+        }
+    }
+}
+
+static void faults_name_line_and_row(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *message;
+    } cases[] = {
+        {HEADER CORNERS "3 0 1 2\n2000000000 1 3 2\n",
+         "line 15: face 1 (from 0) promises 2000000000 numbers of 'vertex_indices', the line holds 3 more"},
+        {HEADER CORNERS "3 0 1\n3 1 3 2\n",
+         "line 14: face 0 (from 0) promises 3 numbers of 'vertex_indices', the line holds 2 more"},
+        {HEADER CORNERS "3 0 1 2\n", "line 15: the file ends before face 1 (from 0) of 2"},
+        {HEADER CORNERS, "line 14: the file ends before face 0 (from 0) of 2"},
+        {HEADER "0 0 0\n1 0\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: vertex 1 (from 0) lacks its 'z'"},
+        {HEADER "0 0 0\n1 x 0\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: 'x' is no number of type float"},
+        {HEADER "0 0 0\n1 0 1.5.5\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: '1.5.5' is no number of type float"},
+        {HEADER CORNERS "3 0 1 2\n-1 1 3 2\n", "line 15: '-1' is no number of type uchar"},
+        {HEADER CORNERS "3 0 1 2\n3 1 3 1.5\n", "line 15: '1.5' is no number of type int"},
+        {HEADER CORNERS "3 0 1 2\n3 1 3 4294967298\n", "line 15: '4294967298' is no number of type int"},
+        {ASCII "element vertex 4\n" XYZ "element face 2\nproperty list int int vertex_indices\n" END CORNERS
+               "3 0 1 2\n-3 1 3 2\n",
+         "line 15: '-3' is no length of a list"},
+        {ASCII "element vertex 4\n" XYZ "element face 2\nproperty list float int vertex_indices\n" END CORNERS
+               "3 0 1 2\n2.5 1 3 2\n",
+         "line 15: '2.5' is no length of a list"},
+        {ASCII "element vertex 4\n" XYZ "element face 1\nproperty list uchar float texcoord\n"
+               "property list uchar int vertex_index\n" END CORNERS "6 0 0 1 0 0 1 1 0\n",
+         "line 15: face 0 (from 0) has 1 corners, but 3 texture coordinates"},
+        {ASCII "element vertex 4\nproperty int64 x\n" END, "line 4: 'int64' is no type of PLY"},
+        {ASCII "element vertex 4\nproperty list uchar half x\n" END, "line 4: 'half' is no type of PLY"},
+        {ASCII "element vertex 4\nproperty float\n" END, "line 4: a property without a name"},
+        {ASCII XYZ END, "line 3: a property before the first element"},
+        {ASCII "element vertex -4\n" END, "line 3: '-4' is no number of 'vertex'"},
+        {ASCII "element vertex 4\n" XYZ "element vertex 4\n" XYZ END,
+         "line 11: the header tells of 'vertex' twice"},
+        {ASCII "element vertex 4\n" XYZ
+               "element tristrips 1\nproperty list int int vertex_indices\n" END CORNERS "4 0 1 2 3\n",
+         "line 9: strips of triangles (tristrips) are not read, only faces"},
+        {"ply\nformat binary 1.0\n" END, "line 2: 'binary' is no format of PLY"},
+        {"ply\nelement vertex 0\n" END, "line 3: the header lacks its format"},
+        {"solid\n", "line 1: no PLY file, which starts with a line 'ply'"},
+        {"", "line 1: no PLY file, which starts with a line 'ply'"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Text text = {0};
+        text_appendf(&text, "%s", cases[i].text);
+        assert_refused(&text, cases[i].message);
+        text_free(&text);
+    }
+}
+
+#define BINARY(count_type)                                                                                   \
+    "ply\nformat binary_big_endian 1.0\nelement vertex 4\n" XYZ "element face 2\nproperty list " count_type  \
+    " int vertex_indices\n" END
+
+// A square's bytes with this as the second triangle's number of corners.
+static Text binary_with_count(const char *header, double count, const Type *type)
+{
+    Text text = {0};
+    text_appendf(&text, "%s", header);
+    for (size_t i = 0; i < 12; i++)
+        number_append(&text, corners[i / 3][i % 3], &types[6], true);
+    for (size_t i = 0; i < 2; i++) {
+        number_append(&text, i == 0 ? 3 : count, type, true);
+        for (size_t k = 0; k < 3; k++)
+            number_append(&text, triangles[i][k], &types[4], true);
+    }
+    return text;
+}
+
+static void binary_faults_name_byte_and_row(void **state)
+{
+    (void)state;
+    static const char *const headers[] = {BINARY("uchar"), BINARY("int"), BINARY("double")};
+    static const struct {
+        size_t header;
+        double count;
+        size_t type;
+        const char *promise;
+    } cases[] = {{1, 2000000000, 4, "2000000000"},
+                 {1, -1, 4, "-1"},
+                 {1, 4, 4, "4"},
+                 {0, 4, 1, "4"},
+                 {2, NAN, 7, "nan"},
+                 {2, 2.5, 7, "2.5"},
+                 {2, 1e300, 7, "1e+300"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const Type *type = &types[cases[i].type];
+        Text text = binary_with_count(headers[cases[i].header], cases[i].count, type), message = {0};
+        text_appendf(
+            &message,
+            "byte %zu: face 1 (from 0) promises %s numbers of 'vertex_indices', the file holds 3 more",
+            text.count - type->size - 12, cases[i].promise);
+        assert_refused(&text, text_c(&message));
+        text_free(&text);
+        text_free(&message);
+    }
+}
+
+// Wherever a file ends before its time it is refused, and told where.
+static void binary_file_cut_short_is_refused(void **state)
+{
+    (void)state;
+    Text whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
+    assert_square(&whole);
+    for (size_t size = strlen(BINARY("uchar")); size < whole.count; size++) {
+        Text cut = {0};
+        text_append(&cut, text_c(&whole), size);
+        file_write(&cut);
+        Text messages = scene_messages("scene.yaml", SCENE, false);
+        assert_non_null(strstr(text_c(&messages), "4:18: error: a.ply: byte "));
+        text_free(&messages);
+        text_free(&cut);
+    }
+    text_free(&whole);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ascii_layouts_are_read),           cmocka_unit_test(binary_layouts_are_read),
+        cmocka_unit_test(faults_name_line_and_row),         cmocka_unit_test(binary_faults_name_byte_and_row),
+        cmocka_unit_test(binary_file_cut_short_is_refused),
+    };
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
+}
