@@ -269,6 +269,35 @@ static void faces_without_corners_are_left_out(void **state)
     scene_free(&scene);
 }
 
+// Vertices and texture coordinates that no triangle has are neither refused nor in the mesh.
+static void what_no_face_uses_does_not_count(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *text;
+    } cases[] = {
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 1e38\nv 9 9 9\nvt nan nan\nvt 0 0\n"
+                  "f 1/2 2/2 3/2\nl 2/1 4/1 5/2\n"},
+        {"a.ply", PLY_HEADER("5\nproperty float s\nproperty float t",
+                             "2") "end_header\n0 0 nan 0 0\n0 0 0 0 0\n0 0 1 0 0\n0 0 0 1 0\ninf 0 9 9 9\n"
+                                  "3 1 2 3\n2 0 4\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        file_write(cases[i].name, cases[i].text);
+        Text objects = {0};
+        text_appendf(&objects, "  - mesh: {file: %s}\n", cases[i].name);
+        Scene scene = scene_of_objects(text_c(&objects));
+        assert_int_equal(scene.meshes.items[0].triangle_count, 1);
+        assert_int_equal(scene.meshes.items[0].vertex_count, 3);
+        size_t unbounded_count;
+        Bounds bounds = scene_bounds(&scene, &unbounded_count);
+        assert_vector(bounds.min, 0, 0, 0);
+        assert_vector(bounds.max, 1, 1, 0);
+        scene_free(&scene);
+        text_free(&objects);
+    }
+}
+
 // Twice the area of all triangles; all have to turn left, seen from above.
 static double area_of(const Mesh *mesh)
 {
@@ -340,6 +369,12 @@ static void faults_name_file_and_vertex(void **state)
          "a.obj: line 4: a face names vertex '0'; there are 3"},
         {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 2 3\n",
          "a.obj: line 4: a face names vertex '-4'; there are 3"},
+        {"a.obj", "v nan 0 0\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 2 3 9\n",
+         "a.obj: line 5: a face names vertex '9'; there are 4"},
+        {"a.obj", "v nan 0 0\nv 0 0 0\nv 1 nan 0\nv 0 1 0\nf -3 -2 -1\n",
+         "a.obj: line 3: vertex 3: 'nan' for y is not a finite number"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 -\nf 1 2 3\n",
+         "a.obj: line 4: vertex 4: '-' for z is not a finite number"},
         {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "a.obj: no triangles"},
         {"a.ply",
          PLY_HEADER("3\nproperty float s\nproperty float t",
@@ -597,6 +632,7 @@ int main(void)
         cmocka_unit_test(material_is_white_where_the_file_has_none),
         cmocka_unit_test(every_format_is_read),
         cmocka_unit_test(faces_without_corners_are_left_out),
+        cmocka_unit_test(what_no_face_uses_does_not_count),
         cmocka_unit_test(concave_polygon_is_cut_in_full),
         cmocka_unit_test(polygons_that_cannot_be_filled_are_told),
         cmocka_unit_test(faults_name_file_and_vertex),

@@ -57,10 +57,12 @@ static void vertex_move(Mesh *mesh, size_t to, size_t from)
     if (mesh->uvs) memcpy(mesh->uvs[to], mesh->uvs[from], sizeof *mesh->uvs);
 }
 
-// The vertices that stay move forward in place; `joined[i]` becomes where vertex i has gone.
+static const uint32_t none = UINT32_MAX;
+
+// The vertices that stay move forward in place; `joined[i]`, none where vertex i is not used, becomes where
+// it has gone.
 static size_t vertices_join(Mesh *mesh, uint32_t *joined)
 {
-    const uint32_t none = UINT32_MAX;
     size_t slot_count = 16;
     while (slot_count < 2 * mesh->vertex_count)
         slot_count *= 2;
@@ -68,6 +70,7 @@ static size_t vertices_join(Mesh *mesh, uint32_t *joined)
     memset(slots, 0xff, slot_count * sizeof *slots);
     size_t kept = 0;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
+        if (joined[i] == none) continue;
         size_t slot = vertex_hash(mesh, i) & (slot_count - 1);
         while (slots[slot] != none && !vertices_equal(mesh, slots[slot], i))
             slot = (slot + 1) & (slot_count - 1);
@@ -85,6 +88,10 @@ void mesh_join_vertices(Mesh *mesh)
 {
     if (mesh->vertex_count == 0) return;
     uint32_t *joined = memory_allocate(mesh->vertex_count, sizeof *joined);
+    memset(joined, 0xff, mesh->vertex_count * sizeof *joined);
+    for (size_t i = 0; i < mesh->triangle_count; i++)
+        for (int corner = 0; corner < 3; corner++)
+            joined[mesh->triangles[i][corner]] = 0;
     mesh->vertex_count = vertices_join(mesh, joined);
     for (size_t i = 0; i < mesh->triangle_count; i++)
         for (int corner = 0; corner < 3; corner++)

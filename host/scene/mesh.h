@@ -23,12 +23,13 @@ typedef struct {
 } MeshImport;
 
 // Adds the file's triangles to the scene as one more mesh; *index is its place. False, reported at `offset`:
-// the file is no mesh that can be read, or a vertex is not finite, beyond NUMBER_LARGEST or missing.
+// the file is no mesh that can be read, or a vertex of a face is not finite, beyond NUMBER_LARGEST or
+// missing.
 bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t offset, uint32_t *index);
 
 void mesh_free(Mesh *mesh); // and zeroes
 
-// Vertices that agree in all their numbers become one; 0 and -0 agree.
+// Vertices that agree in all their numbers become one, and those of no triangle go; 0 and -0 agree.
 void mesh_join_vertices(Mesh *mesh);
 
 // Gives the vertices normals: of the triangles around them, by angle. Zero where no triangle has an area.
@@ -37,8 +38,8 @@ void mesh_make_normals(Mesh *mesh);
 // How many triangles have no area.
 size_t mesh_degenerate_count(const Mesh *mesh);
 
-// What is wrong with an OBJ file's vertices or with a face that names them, as `line N: what`; false where
-// nothing is, or the file cannot be read.
+// What is wrong with an OBJ file's vertices or with a face that names them, as `line N: what`, first with
+// what faces use; false where nothing is, or the file cannot be read.
 bool obj_find_fault(const char *path, char *fault, size_t size);
 
 // What a glTF file holds that assimp would crash on, or never be done with, told likewise.

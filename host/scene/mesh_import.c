@@ -272,7 +272,7 @@ static uint32_t material_index(Importer *importer, unsigned index)
     return *known;
 }
 
-static bool vertices_add(Importer *importer, const Placed *placed)
+static void vertices_add(Importer *importer, const Placed *placed)
 {
     const struct aiMesh *from = placed->mesh;
     Mesh *mesh = &importer->mesh;
@@ -280,12 +280,6 @@ static bool vertices_add(Importer *importer, const Placed *placed)
     for (unsigned i = 0; i < from->mNumVertices; i++) {
         size_t index = mesh->vertex_count + i;
         mesh->vertices[index] = affine_point(&placed->affine, vector_of(&from->mVertices[i]));
-        if (!is_ordinary(mesh->vertices[index])) {
-            char fault[100];
-            snprintf(fault, sizeof fault, "vertex %u (from 0) of '%.40s' is not finite or too large", i,
-                     from->mName.data);
-            return vertex_fails(importer, fault);
-        }
         if (mesh->normals && from->mNormals) {
             Vector3 normal = vector_normalize(affine_direction(&for_normals, vector_of(&from->mNormals[i])));
             mesh->normals[index] = is_ordinary(normal) ? normal : (Vector3){0, 0, 0};
@@ -293,14 +287,8 @@ static bool vertices_add(Importer *importer, const Placed *placed)
         if (mesh->uvs && from->mTextureCoords[0]) {
             mesh->uvs[index][0] = from->mTextureCoords[0][i].x;
             mesh->uvs[index][1] = from->mTextureCoords[0][i].y;
-            if (!is_ordinary((Vector3){mesh->uvs[index][0], mesh->uvs[index][1], 0}))
-                return import_fails(
-                    importer,
-                    "a texture coordinate of vertex %u (from 0) of '%.40s' is not finite or too large", i,
-                    from->mName.data);
         }
     }
-    return true;
 }
 
 // Asked before the transform, which would give what is nothing in the file a rounding's width.
@@ -347,6 +335,24 @@ static void polygon_add(Importer *importer, const Placed *placed, bool mirrored,
     }
 }
 
+// What no face uses may be anything.
+static bool corner_is_sound(Importer *importer, const struct aiMesh *from, unsigned vertex)
+{
+    const Mesh *mesh = &importer->mesh;
+    size_t index = mesh->vertex_count + vertex;
+    char fault[100];
+    if (!is_ordinary(mesh->vertices[index])) {
+        snprintf(fault, sizeof fault, "vertex %u (from 0) of '%.40s' is not finite or too large", vertex,
+                 from->mName.data);
+        return vertex_fails(importer, fault);
+    }
+    if (mesh->uvs && !is_ordinary((Vector3){mesh->uvs[index][0], mesh->uvs[index][1], 0}))
+        return import_fails(
+            importer, "a texture coordinate of vertex %u (from 0) of '%.40s' is not finite or too large",
+            vertex, from->mName.data);
+    return true;
+}
+
 static bool face_is_sound(Importer *importer, const struct aiMesh *mesh, unsigned number)
 {
     const struct aiFace *face = &mesh->mFaces[number];
@@ -355,10 +361,12 @@ static bool face_is_sound(Importer *importer, const struct aiMesh *mesh, unsigne
         return import_fails(importer, "face %u (from 0) has %u corners, more than %d", number,
                             face->mNumIndices, MESH_POLYGON_LARGEST);
     for (unsigned i = 0; i < face->mNumIndices; i++) {
-        if (face->mIndices[i] < mesh->mNumVertices) continue;
-        snprintf(fault, sizeof fault, "face %u (from 0) names vertex %u, which is not there", number,
-                 face->mIndices[i]);
-        return vertex_fails(importer, fault);
+        if (face->mIndices[i] >= mesh->mNumVertices) {
+            snprintf(fault, sizeof fault, "face %u (from 0) names vertex %u, which is not there", number,
+                     face->mIndices[i]);
+            return vertex_fails(importer, fault);
+        }
+        if (!corner_is_sound(importer, mesh, face->mIndices[i])) return false;
     }
     return true;
 }
@@ -420,7 +428,8 @@ static bool mesh_reserve(Importer *importer)
 
 static bool placed_add(Importer *importer, const Placed *placed)
 {
-    if (!vertices_add(importer, placed) || !faces_add(importer, placed)) return false;
+    vertices_add(importer, placed);
+    if (!faces_add(importer, placed)) return false;
     importer->mesh.vertex_count += placed->mesh->mNumVertices;
     return true;
 }

@@ -1,5 +1,6 @@
 // Where the fault in an OBJ file lies that assimp refused or brought in: assimp names no line, and its
 // vertices are not the file's.
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/scene/line.h"
 #include "host/scene/mesh.h"
@@ -11,6 +12,8 @@
 typedef struct {
     Line line;
     size_t line_number, vertex_count, all_vertex_count;
+    const bool *used; // by faces: each vertex from 1
+    bool unused_too;  // whether the others count
     char *fault;
     size_t size;
 } Search;
@@ -32,13 +35,18 @@ static bool vertex_is_faulty(Search *search)
     return false;
 }
 
-// A negative index counts back from the last vertex before the face.
+// From 1, 0 where there is no such vertex. A negative index counts back from the last vertex before the face.
+static size_t vertex_of(Word word, size_t vertex_count, size_t all_vertex_count)
+{
+    long long index = strtoll(word.text, NULL, 10);
+    long long counted = index < 0 ? (long long)vertex_count + 1 + index : index;
+    return counted >= 1 && counted <= (long long)all_vertex_count ? (size_t)counted : 0;
+}
+
 static bool face_is_faulty(Search *search)
 {
     for (Word word = line_word(&search->line); word.length > 0; word = line_word(&search->line)) {
-        long long index = strtoll(word.text, NULL, 10);
-        long long counted = index < 0 ? (long long)search->vertex_count + 1 + index : index;
-        if (counted >= 1 && counted <= (long long)search->all_vertex_count) continue;
+        if (vertex_of(word, search->vertex_count, search->all_vertex_count)) continue;
         snprintf(search->fault, search->size, "line %zu: a face names vertex '%.*s'; there are %zu",
                  search->line_number, word_shown(word), word.text, search->all_vertex_count);
         return true;
@@ -54,20 +62,46 @@ static size_t vertices_count(Line line)
     return count;
 }
 
-static bool fault_search(Search *search)
+static void used_mark(bool *used, Line line, size_t all_vertex_count)
 {
-    search->all_vertex_count = vertices_count(search->line);
-    while (line_next(&search->line, '#')) {
-        search->line_number++;
-        Word keyword = line_word(&search->line);
+    size_t vertex_count = 0;
+    while (line_next(&line, '#')) {
+        Word keyword = line_word(&line);
+        vertex_count += word_is(keyword, "v");
+        if (!word_is(keyword, "f")) continue;
+        for (Word word = line_word(&line); word.length > 0; word = line_word(&line))
+            used[vertex_of(word, vertex_count, all_vertex_count)] = true;
+    }
+}
+
+static bool lines_search(Search search)
+{
+    while (line_next(&search.line, '#')) {
+        search.line_number++;
+        Word keyword = line_word(&search.line);
         if (word_is(keyword, "v")) {
-            search->vertex_count++;
-            if (vertex_is_faulty(search)) return true;
-        } else if (word_is(keyword, "f") && face_is_faulty(search)) {
+            search.vertex_count++;
+            bool counts = search.unused_too || search.used[search.vertex_count];
+            if (counts && vertex_is_faulty(&search)) return true;
+        } else if (word_is(keyword, "f") && face_is_faulty(&search)) {
             return true;
         }
     }
     return false;
+}
+
+// A vertex that no face uses may be what assimp stumbles over, but is so only where nothing else is wrong.
+static bool fault_search(Search *search)
+{
+    search->all_vertex_count = vertices_count(search->line);
+    bool *used = memory_allocate_zeroed(search->all_vertex_count + 1, sizeof *used);
+    used_mark(used, search->line, search->all_vertex_count);
+    search->used = used;
+    bool found = lines_search(*search);
+    search->unused_too = true;
+    found = found || lines_search(*search);
+    free(used);
+    return found;
 }
 
 bool obj_find_fault(const char *path, char *fault, size_t size)
