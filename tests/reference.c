@@ -408,7 +408,9 @@ static int polynomial_zeros(const Quad *coefficients, int degree, Quad low, Quad
 }
 
 // In the frame of the axis, from the ray's closest approach to the center on: the zeros of
-// (|p|^2 + R^2 - r^2)^2 - 4 R^2 (x^2 + y^2), and where it turns.
+// (|p|^2 + R^2 - r^2)^2 - 4 R^2 (x^2 + y^2), and where it turns. Where r > R some have |p|^2 + R^2 - r^2
+// below 0, at r from the circle's far side: they lie within the solid. On the axis itself they coincide with
+// others, and the polynomial touches 0 only, which leaves the hit open.
 static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad major = object->as.torus.major, minor = object->as.torus.minor;
@@ -437,6 +439,7 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
     }
     int count = polynomial_zeros(quartic, 4, -reach, reach, zeros);
     for (int i = 0; i < count; i++) {
+        if (polynomial_value(sum, 2, zeros[i]) < 0) continue;
         Quad3 at = quad3_add(p, quad3_scale(q, zeros[i]));
         Quad rho = quad_root(at.x * at.x + at.y * at.y), out = 1 - major / rho;
         Quad3 normal = quad3_add(quad3_add(quad3_scale(across, at.x * out), quad3_scale(beside, at.y * out)),

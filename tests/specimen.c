@@ -3,7 +3,7 @@
 const char *const specimen_names[SPECIMEN_COUNT] = {
     "sphere",           "plane",       "disc",       "box",          "capped cylinder", "open cylinder",
     "endless cylinder", "capped cone", "open cone",  "pointed cone", "endless cone",    "triangle",
-    "smooth triangle",  "torus",       "thin torus", "fat torus",
+    "smooth triangle",  "torus",       "thin torus", "fat torus",    "spindle torus",
 };
 
 // SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
@@ -113,6 +113,7 @@ static Specimen make_torus(SpecimenKind kind, Random *random, Vector3 center, do
     double minor = major * random_between(random, 0.1, 0.6);
     if (kind == SPECIMEN_TORUS_THIN) minor = major * 0.01;
     if (kind == SPECIMEN_TORUS_FAT) minor = major * 0.9;
+    if (kind == SPECIMEN_TORUS_SPINDLE) minor = major * random_between(random, 1.1, 3);
     Vector3 axis = random_coin(random) ? world_axis(random) : on_grid(random_unit(random));
     return (Specimen){.kind = kind,
                       .object = {.kind = SHAPE_TORUS, .as.torus = {center, axis, major, minor}},
@@ -152,6 +153,7 @@ Specimen specimen_make(SpecimenKind kind, Random *random)
     case SPECIMEN_TORUS:
     case SPECIMEN_TORUS_THIN:
     case SPECIMEN_TORUS_FAT:
+    case SPECIMEN_TORUS_SPINDLE:
         return make_torus(kind, random, center, size);
     default:
         return make_round(kind, random, center, size);

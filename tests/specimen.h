@@ -21,6 +21,7 @@ typedef enum {
     SPECIMEN_TORUS,
     SPECIMEN_TORUS_THIN,
     SPECIMEN_TORUS_FAT,
+    SPECIMEN_TORUS_SPINDLE, // whose tube is wider than its circle: no hole
     SPECIMEN_COUNT
 } SpecimenKind;
 
@@ -49,5 +50,6 @@ typedef struct {
 
 // Aimed at the specimen and slightly past it from 1.001 to 10^4 times its reach; from inside; along the
 // world's axes with zeros of either sign; along its own axis; at its outline. At a torus also from inside its
-// tube, from within its hole, and in the plane of its circle.
+// tube, from within its hole, or where a spindle's
+// tube lies in itself, and in the plane of its circle.
 SpecimenRay specimen_ray(const Specimen *specimen, Random *random);

@@ -194,6 +194,7 @@ static void knows_tori(void **state)
     (void)state;
     const Object ring = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 3}, 1, 0.25}};
     const Object wire = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 1e-3}};
+    const Object spindle = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 2}};
     const Vector3 x = {1, 0, 0}, z = {0, 0, 1}, down = {0, 0, -1};
     const Known known[] = {
         {"far", ring, {0.9, 0, -1000}, z, 999.77087122566},
@@ -209,6 +210,14 @@ static void knows_tori(void **state)
         {"top", ring, {-5, 0, 0.25 + 0x1p-25}, x, MISS},
         {"wire", wire, {1.0005, 0, -10}, z, 9.9991339536194},
         {"wire", wire, {1.0011, 0, -10}, z, MISS},
+        // The solid alone counts: from outside, from the tube, from where it lies in itself, across a dimple.
+        {"spindle", spindle, {-5, 0, 0}, x, 2},
+        {"spindle", spindle, {-2, 0, 0}, x, 5},
+        {"spindle", spindle, {0, 0, 0}, x, 3},
+        {"spindle", spindle, {0.25, 0, 0}, z, 1.8540496217739157},
+        {"spindle", spindle, {0.25, 0, 5}, down, 3.1459503782260843},
+        {"spindle", spindle, {-1, 0, 1.875}, x, 0.6959705453537527},
+        {"spindle", spindle, {-0.125, 0, 1.875}, x, 0.4290294546462473},
     };
     check(known, COUNT(known));
 }

@@ -73,7 +73,9 @@ def curvature(thing, point):
     if isinstance(shape, exact.Plane) or isinstance(shape, exact.Box):
         return 0.0
     if isinstance(shape, exact.Torus):
-        return 1 / min(shape.radius, shape.major_radius - shape.radius)
+        hole = shape.major_radius - shape.radius
+        off_axis = hole if hole > 0 else sqrt(max(as_float(shape.flat(subtract(point, shape.center))), 1e-60))
+        return 1 / min(shape.radius, off_axis)
     if isinstance(shape, exact.Sphere):
         return 1 / shape.radius
     base = shape.center if isinstance(shape, exact.DoubleCone) else shape.base

@@ -329,8 +329,10 @@ class Torus(Shape):
         return dot(p, p) - dot(p, self.axis) ** 2 / self.along
 
     def contains(self, point):
+        # the sum is below 0 only where the tube of a spindle, minor > major, reaches beyond the axis
         p = subtract(point, self.center)
-        return (dot(p, p) + self.major**2 - self.minor**2) ** 2 <= 4 * self.major**2 * self.flat(p)
+        sum_ = dot(p, p) + self.major**2 - self.minor**2
+        return sum_ <= 0 or sum_**2 <= 4 * self.major**2 * self.flat(p)
 
     def normal(self, point):
         p = subtract(point, self.center)

@@ -51,6 +51,12 @@ SHAPES = {
         "cone: {apex: [0, 1, -3], axis: [1, 4, 0], angle: 20, material: tiles}",
     ],
     "torus": ["torus: {center: [0, 0.5, 0], axis: [1, 2, 2], major: 1, minor: 0.375, material: red}"],
+    # Tubes wider than their circles; the transparent one has a ball in it, where it lies in itself.
+    "spindle": [
+        "torus: {center: [-1, 0.5, 0], axis: [1, 2, 2], major: 0.375, minor: 0.75, material: red}",
+        "torus: {center: [1, 0.5, 0.5], axis: [0, 1, 4], major: 0.25, minor: 0.75, material: veil}",
+        "sphere: {center: [1, 0.5, 0.5], radius: 0.25, material: red}",
+    ],
     "triangle": [
         "triangle: {vertices: [[-1.5, -0.25, 0], [0.5, -0.25, 0.5], [-0.5, 1.5, 0]], material: red}",
         "triangle: {vertices: [[0.5, -0.25, 0], [1.75, 0, 0.5], [1, 1.5, 0]], "
@@ -80,7 +86,7 @@ SHAPES["shapes"] = [
     "sphere: {center: [0.5, 0.625, 1.5], radius: 0.25, material: veil}",
 ]
 SHAPES["glass"] = [SHAPES["mirrors"][0], SHAPES["mirrors"][1], SHAPES["mirrors"][2], SHAPES["veils"][2]]
-SHORT = "shapes", "glass"
+SHORT = "shapes", "glass", "spindle"
 BOUNCES = 2
 KINDS = "t", "normal", "object", "shadow", "ray", "color"
 
