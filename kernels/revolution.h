@@ -180,39 +180,46 @@ static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask gr
     crossings->side.far = lanes_select(crossings->outer, nappe.far, side.far);
 }
 
+// Lines that may cross the endless surface: those with roots, those inside a cone but for a stretch between
+// its nappes, and those along the side.
+static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
+{
+    return (quadric->discriminant >= (real)(0)) | (quadric->a <= (real)(0));
+}
+
 // A root is taken as q / a only where that is below the largest number; a = 0 is a ray along the side, which
 // has one root, c / q, and one infinitely far.
-static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray)
+static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray,
+                                                       const RevolutionQuadric *quadric)
 {
-    RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     RevolutionCrossings crossings;
-    crossings.m = quadric.m;
-    crossings.q = quadric.q;
+    crossings.m = quadric->m;
+    crossings.q = quadric->q;
 
-    real root = real_sqrt(real_max(quadric.discriminant, (real)(0)));
-    mask ahead = quadric.b < (real)(0);
-    real q = lanes_select(ahead, root - quadric.b, -(root + quadric.b));
+    real root = real_sqrt(real_max(quadric->discriminant, (real)(0)));
+    mask ahead = quadric->b < (real)(0);
+    real q = lanes_select(ahead, root - quadric->b, -(root + quadric->b));
     mask zero = q == (real)(0);
-    mask within = fabs(q) * (real)(SMALLEST_RATIO) < fabs(quadric.a);
-    mask positive_ratio = (q > (real)(0)) == (quadric.a >= (real)(0));
-    real q_over_a = lanes_select(within, real_divide(q, lanes_select(within, quadric.a, (real)(1))),
+    mask within = fabs(q) * (real)(SMALLEST_RATIO) < fabs(quadric->a);
+    mask positive_ratio = (q > (real)(0)) == (quadric->a >= (real)(0));
+    real q_over_a = lanes_select(within, real_divide(q, lanes_select(within, quadric->a, (real)(1))),
                                  lanes_select(positive_ratio, (real)(LARGEST), (real)(-LARGEST)));
-    real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric.c, lanes_select(zero, (real)(1), q)));
+    real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric->c, lanes_select(zero, (real)(1), q)));
     if (sloped && !IS_COMPENSATED) {
-        c_over_q = lanes_select(quadric.exact, c_over_q, revolution_polish(&quadric, c_over_q));
+        c_over_q = lanes_select(quadric->exact, c_over_q, revolution_polish(quadric, c_over_q));
         // where a is nearly 0 a step may lead through infinity, and what lay outside the roots would lie
         // inside
-        real polished = revolution_polish(&quadric, q_over_a);
+        real polished = revolution_polish(quadric, q_over_a);
         mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
-        q_over_a = lanes_select(same_side & !quadric.exact, polished, q_over_a);
+        q_over_a = lanes_select(same_side & !quadric->exact, polished, q_over_a);
     }
     crossings.side = (Roots){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
-    crossings.outer = quadric.a < (real)(0);
-    crossings.real_roots = (quadric.discriminant >= (real)(0)) | crossings.outer;
+    crossings.outer = quadric->a < (real)(0);
+    crossings.real_roots = (quadric->discriminant >= (real)(0)) | crossings.outer;
 
     // a ray along a cylinder's axis, or along a cone's through its apex: inside all the way, or never
-    mask along = (quadric.a == (real)(0)) & zero;
-    mask inside = along & (quadric.c <= (real)(0));
+    mask along = (quadric->a == (real)(0)) & zero;
+    mask inside = along & (quadric->c <= (real)(0));
     crossings.side.near = lanes_select(along, (real)(-LARGEST), crossings.side.near);
     crossings.side.far = lanes_select(along, (real)(LARGEST), crossings.side.far);
     crossings.real_roots = (crossings.real_roots & !along) | inside;
@@ -220,7 +227,7 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     crossings.slab = (Roots){(real)(-LARGEST), (real)(LARGEST)};
     if (shape->id.y & REVOLUTION_FINITE) {
         crossings.slab = revolution_slab(shape, ray);
-        revolution_keep_nappe(&crossings, quadric.h > (real)(0));
+        revolution_keep_nappe(&crossings, quadric->h > (real)(0));
     }
     return crossings;
 }
@@ -245,9 +252,12 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
 // the ends.
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
-    RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray);
+    RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
+    mask hit = RAY_ACTIVE(ray) & revolution_line_crosses(&quadric);
+    if (!lanes_any(hit)) return hit;
+    RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     Roots side = crossings.side, slab = crossings.slab;
-    mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
+    hit = hit & crossings.real_roots;
     if (shape->id.y & REVOLUTION_CAPPED) {
         real near = real_max(side.near, slab.near);
         real far = real_min(side.far, slab.far);
@@ -268,7 +278,8 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
 // On a cap the point is put on the cap's plane, else on the side along its normal.
 static inline Patch revolution_patch(const Revolution *shape, bool sloped, const Ray *ray, real t)
 {
-    RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray);
+    RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
+    RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     real length_ = (real)(shape->range.y), squared_axis = (real)(shape->range.z);
     Vector p = ray_point_from(ray, base, t);
