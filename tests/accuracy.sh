@@ -48,19 +48,7 @@ run() {
     if [ $got = "$want" ]; then pass; else fail "$what: exit status $got, expected $want: $(cat "$scratch/errors")"; fi
 }
 
-# Four balls that mirror each other, the eye between them: each bounce makes an error larger, until the path is another.
-cat >"$scratch/balls.yaml" <<'EOF'
-camera: {position: [0, 0, 0], look_at: [1, 1, 1], fov: 80}
-background: [1, 1, 1]
-lights: [{point: {position: [0, 0, 0]}}]
-materials: {mirror: {color: [0, 0, 0], reflection: 1}}
-objects:
-  - sphere: {center: [1, 1, 1], radius: 1.40625, material: mirror}
-  - sphere: {center: [1, -1, -1], radius: 1.40625, material: mirror}
-  - sphere: {center: [-1, 1, -1], radius: 1.40625, material: mirror}
-  - sphere: {center: [-1, -1, 1], radius: 1.40625, material: mirror}
-EOF
-run 0 "paths that part" "$scratch/balls.yaml" "${small[@]}" --bounces 16 --precision single,double --json
+run 0 "paths that part" tests/scenes/mirror-balls.yaml "${small[@]}" --bounces 16 --precision single,double --json
 holds "paths that part are counted" 'variants[0]["errors"]["path"]["edge"] > 0'
 
 # The reference's own file: what is compared in colors is as before, and no count is made up.

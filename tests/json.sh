@@ -73,8 +73,9 @@ fi
 sed 's/2000002, 2999995/2000001.7, 2999995/' scenes/far-planet.yaml >"$scratch/planet.yaml"
 prints 0 accuracy accuracy "$scratch/planet.yaml" scenes/mirror-glass.yaml "$scratch/strong.yaml" --size 96x64 "${quick[@]}" \
     --precision single,double --perturb 1 --save "$scratch/saved" --json
+prints 0 paths accuracy tests/scenes/mirror-balls.yaml --size 96x64 "${quick[@]}" --bounces 16 --precision single,double --json
 prints 0 itself accuracy "$scratch/plain.yaml" "${small[@]}" --seconds 0.1 --precision double --json
 prints 0 file accuracy "$scratch/planet.yaml" --size 96x64 "${quick[@]}" --precision single --json \
     --reference "$scratch/saved/0-planet-reference.color.npy"
-members 'glint accuracy' {accuracy,itself,file}.json
+members 'glint accuracy' {accuracy,paths,itself,file}.json
 finish
