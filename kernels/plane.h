@@ -45,7 +45,7 @@ static inline Patch plane_crossing_patch(Vector point, scalar4 normal, const Ray
     Vector crossing = ray_point(ray, t), to_point = vector_subtract(point, crossing);
     Patch patch = patch_make(vector_fma(unit, vector_dot(unit, to_point), crossing), unit,
                              vector_magnitude_along(unit, to_point));
-    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t, vector_magnitude(to_point));
+    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t, patch.size);
     return patch;
 }
 

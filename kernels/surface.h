@@ -24,6 +24,7 @@ typedef struct {
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
     real error;            // the position is at most this far from the true surface
+    real behind;           // a ray that passes the surface starts so far behind it
     Color3 color, diffuse;
     real ambient, specular, shininess;
     real reflection, transmission, ior;
@@ -181,6 +182,7 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
         vector_select(shading_away, vector_negate(patch.shading_normal), patch.shading_normal);
     surface.error =
         (real)(UNIT_ROUNDOFF)*fma((real)(16), patch.size, (real)(4) * vector_magnitude(patch.position));
+    surface.behind = surface.error + surface.error;
     return surface;
 }
 
@@ -189,8 +191,8 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
 // of the surface.
 static inline Vector surface_leave(const Surface *surface, bool through)
 {
-    real distance_ = surface->error + surface->error;
-    return vector_fma(surface->normal, through ? -distance_ : distance_, surface->position);
+    return vector_fma(surface->normal, through ? -surface->behind : surface->error + surface->error,
+                      surface->position);
 }
 
 // Whether something opaque may be in the same place.
@@ -201,34 +203,41 @@ static inline mask place_may_touch(const Scene *scene, Vector place)
            (place.z >= low.z) & (place.z <= high.z);
 }
 
-// The opaque surfaces in the same place as a transparent one, within the bound on its error: a ray that
-// passed it would start beyond them. Returns the lanes whose hits they become.
-static inline mask hit_take_opaque(const Scene *scene, const Surface *surface, Hit *hit)
+// Looks for something opaque just behind transparent surfaces, before or little beyond where a ray that
+// passes them starts. What lies within the surface's error is in the same place: returns the lanes whose hits
+// it becomes. Farther ones a ray that passes starts halfway to.
+static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
 {
     mask transparent = surface->found & (surface->transmission > (real)(0));
     transparent = transparent & place_may_touch(scene, surface->position);
     if (!lanes_any(transparent)) return mask_none();
+    real error = surface->error, before = error + error;
     Ray inward = ray_make_unit(surface_leave(surface, false), vector_negate(surface->normal), transparent);
-    inward.near = surface->error;
-    inward.far = (real)(3) * surface->error;
+    inward.near = error;
+    inward.far = before + (real)(3) * error;
     Hit opaque = closest_opaque_hit(scene, &inward);
     mask found = hit_found(&opaque);
-    hit->object = lanes_select(found, opaque.object, hit->object);
-    return found;
+    real gap = opaque.t - before;
+    mask touches = found & (gap <= error);
+    surface->behind = lanes_select(found & !touches, (real)(0.5f) * gap, surface->behind);
+    hit->object = lanes_select(touches, opaque.object, hit->object);
+    return touches;
 }
 
 // What the ray meets, where an opaque surface goes before a transparent one in the same place: glass that
 // stands on a floor shows the floor. Rays that leave it start beyond either.
 static inline Surface surface_seen(const Scene *scene, const Ray *ray, Hit *hit)
 {
-    real error = (real)(0);
-    for (;;) {
+    real error = (real)(0), behind = (real)(LARGEST);
+    for (bool asked = false;; asked = true) {
         Surface surface = surface_at(scene, ray, hit);
         surface.error = real_max(surface.error, error);
-        if (!HAS_TRANSMISSION) return surface;
-        mask taken = hit_take_opaque(scene, &surface, hit);
-        if (!lanes_any(taken)) return surface;
-        error = lanes_select(taken, surface.error, (real)(0));
+        surface.behind = real_min(surface.behind, behind);
+        if (!HAS_TRANSMISSION || asked) return surface;
+        mask touches = surface_find_opaque(scene, &surface, hit);
+        if (!lanes_any(touches)) return surface;
+        error = lanes_select(touches, surface.error, (real)(0));
+        behind = surface.behind;
     }
 }
 

@@ -173,26 +173,26 @@ static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted)
     return true;
 }
 
-// The opaque surface in the same place as a transparent one, that goes before it. As near as this counts.
+// The opaque surface in the same place as a transparent one, that goes before it. As near as this counts, in
+// parts of the ray's way.
 #define CONTACT_PART ((Quad)1e-9L)
 
 static void hit_take_opaque(const Scene *scene, const ReferenceRay *ray, ReferenceHit *hit)
 {
-    Quad reach = CONTACT_PART * (hit->t * quad3_length(ray->direction) + 1);
-    ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
+    Quad length = quad3_length(ray->direction), reach = CONTACT_PART * hit->t * length;
+    const ReferenceHit transparent = *hit;
+    const ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
+    ReferenceRay around = *ray;
+    around.tmin = hit->t - 2 * reach / (hit->cosine * length);
+    around.tmax = hit->t + 2 * reach / (hit->cosine * length);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (scene->materials.items[object->material].transmission > 0) continue;
         if (!reference_hit_object(object, &inward).found) continue;
-        ReferenceRay around = *ray;
-        Quad part = 2 * reach / (hit->cosine * quad3_length(ray->direction));
-        around.tmin = hit->t - part;
-        around.tmax = hit->t + part;
         ReferenceHit opaque = reference_hit_object(object, &around);
-        if (!opaque.found) continue;
-        opaque.object = (uint32_t)i;
+        if (!opaque.found || (hit->object != transparent.object && opaque.t >= hit->t)) continue;
         *hit = opaque;
-        return;
+        hit->object = (uint32_t)i;
     }
 }
 

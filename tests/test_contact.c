@@ -31,6 +31,7 @@ typedef struct {
     {                                                                                                        \
         0, 0, 0                                                                                              \
     }
+#define WIDE    (2 * 2000 * 0x1p-14)
 #define ENDLESS ((double)FLT_MAX)
 
 static Trial trials[] = {
@@ -73,13 +74,23 @@ static Trial trials[] = {
      true,
      {-1, 0, -5},
      {1, 0, -3}},
-    {"water over a floor", FLOOR "  - plane: {point: [0, 1, 0], normal: [0, 1, 0], material: glass}\n",
-     APART},
-    {"water on a floor",
-     FLOOR "  - plane: {point: [0, -1, 0], normal: [0, 2, 0], material: glass}\n",
+    // their errors grow with the distance, where they are no longer told apart
+    {"water over a floor",
+     FLOOR "  - plane: {point: [0, -0.5, 0], normal: [0, 2, 0], material: glass}\n",
      true,
-     {-ENDLESS, -1, -ENDLESS},
-     {ENDLESS, -1, ENDLESS}},
+     {-ENDLESS, -ENDLESS, -ENDLESS},
+     {ENDLESS, ENDLESS, ENDLESS}},
+    {"an endless glass cylinder on a floor",
+     FLOOR "  - cylinder: {point: [0, 999, 0], axis: [1, 0, 0.25], radius: 1000, material: glass}\n",
+     true,
+     {-ENDLESS, -ENDLESS, -ENDLESS},
+     {ENDLESS, ENDLESS, ENDLESS}},
+    {"a sphere under a wide endless cylinder, not told apart by numbers so large",
+     "  - sphere: {center: [0, -1.03125, -4], radius: 1, material: glass}\n"
+     "  - cylinder: {point: [0, 1000, 0], axis: [0, 0, 1], radius: 1000, material: chalk}\n",
+     true,
+     {-1 - WIDE, -2.03125 - WIDE, -5 - WIDE},
+     {1 + WIDE, -0.03125 + WIDE, -3 + WIDE}},
     {"an endless cylinder",
      GLASS_SPHERE "  - cylinder: {point: [0, 0, 0], axis: [1, 0, 0], radius: 1, material: chalk}\n",
      true,

@@ -6,8 +6,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-// As near as this, in parts of the scene's size, surfaces count as touching: eight times what the kernels
-// allow for at float, 2 * (16 + 4) u of a point's coordinates summed.
+// As near as this, in parts of how far the scene reaches, surfaces count as touching. The kernels look five
+// errors ahead at most (kernels/surface.h), of 16 u of a shape's numbers and 4 u of a point's, each the sum
+// of three coordinates: 5 * (16 * 7 + 4 * 3) u = 620 u at float for a cylinder, whose numbers are most.
 #define NEARNESS 0x1p-14
 
 // More pairs than this are not held against each other, some 20 ms of them: a box around all opaque
@@ -20,6 +21,7 @@ typedef struct {
     Bounds box;
     Vector3 normal; // 0: not flat
     double offset;
+    double reach; // how far from the origin, mostly the eye, its numbers are
 } Extent;
 
 typedef struct {
@@ -27,9 +29,28 @@ typedef struct {
     size_t count;
 } ExtentList;
 
+static bool extent_is_bounded(const Extent *extent)
+{
+    return isfinite(extent->box.min.x);
+}
+
 static Bounds everywhere(void)
 {
     return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
+}
+
+static double largest_coordinate(Vector3 v)
+{
+    return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+}
+
+static double extent_reach(const Extent *extent, size_t kind, const void *primitive)
+{
+    if (extent_is_bounded(extent))
+        return fmax(largest_coordinate(extent->box.min), largest_coordinate(extent->box.max));
+    if (kind == KIND_PLANES) return fabs(extent->offset);
+    const Revolution *endless = primitive;
+    return largest_coordinate(vector3_of(&endless->base_radius)) + endless->base_radius.w / endless->range.y;
 }
 
 static Extent extent_of(size_t kind, const void *primitive)
@@ -44,7 +65,9 @@ static Extent extent_of(size_t kind, const void *primitive)
         extent.normal = vector3_of(&((const Disc *)primitive)->normal);
         point = vector3_of(&((const Disc *)primitive)->center_radius);
     }
+    if (!vector_is_zero(extent.normal)) extent.normal = vector_normalize(extent.normal);
     extent.offset = vector_dot(extent.normal, point);
+    extent.reach = extent_reach(&extent, kind, primitive);
     return extent;
 }
 
@@ -77,14 +100,13 @@ static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
 {
     const double normal[3] = {flat->normal.x, flat->normal.y, flat->normal.z};
     double low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
-    double slack = margin * (fabs(normal[0]) + fabs(normal[1]) + fabs(normal[2]));
     for (unsigned axis = 0; axis < 3; axis++) {
         if (normal[axis] == 0) continue;
         unsigned next = (axis + 1) % 3, last = (axis + 2) % 3;
         Interval a = interval_scale(low[next], high[next], normal[next]);
         Interval b = interval_scale(low[last], high[last], normal[last]);
-        Interval along = interval_scale(flat->offset - slack - a.high - b.high,
-                                        flat->offset + slack - a.low - b.low, 1 / normal[axis]);
+        Interval along = interval_scale(flat->offset - margin - a.high - b.high,
+                                        flat->offset + margin - a.low - b.low, 1 / normal[axis]);
         low[axis] = fmax(low[axis], along.low);
         high[axis] = fmin(high[axis], along.high);
         if (low[axis] > high[axis]) return bounds_empty();
@@ -92,9 +114,11 @@ static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
     return (Bounds){{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-// A box around where two may touch.
+// A box around where two may touch. What is endless errs the more the farther it is seen: two such are never
+// told apart.
 static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
 {
+    if (!extent_is_bounded(a) && !extent_is_bounded(b)) return everywhere();
     Bounds both = a->box;
     bounds_grow(&both, margin);
     both = bounds_meet(both, b->box);
@@ -103,14 +127,6 @@ static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
     if (!vector_is_zero(a->normal)) both = bounds_near_plane(both, a, margin);
     if (!vector_is_zero(b->normal) && !bounds_is_empty(&both)) both = bounds_near_plane(both, b, margin);
     return both;
-}
-
-// How far from the origin, and from the eye where that is it, a primitive reaches, as far as it has an end.
-static double extent_reach(const Extent *extent)
-{
-    Vector3 reach = vector_max(vector_scale(extent->box.min, -1), extent->box.max);
-    double largest = fmax(reach.x, fmax(reach.y, reach.z));
-    return isfinite(largest) ? largest : fabs(extent->offset);
 }
 
 // The primitives that pass light, or those that do not. Returns how far any reaches.
@@ -126,7 +142,7 @@ static double extents_collect(ExtentList *list, const FlatScene *flat, bool tran
             const FlatMaterial *material = &materials[entries[flat_id(array, i)].kind_index_material.z];
             if (transparent != (material->reflection_transmission_ior.y > 0)) continue;
             list->items[list->count] = extent_of(kind, flat_array_at(array, i));
-            largest = fmax(largest, extent_reach(&list->items[list->count++]));
+            largest = fmax(largest, list->items[list->count++].reach);
         }
     }
     return largest;
@@ -138,7 +154,7 @@ static void extents_join_bounded(ExtentList *list)
     Bounds all = bounds_empty();
     size_t count = 0;
     for (size_t i = 0; i < list->count; i++) {
-        if (isfinite(list->items[i].box.min.x))
+        if (extent_is_bounded(&list->items[i]))
             all = bounds_join(all, list->items[i].box);
         else
             list->items[count++] = list->items[i];
@@ -147,8 +163,25 @@ static void extents_join_bounded(ExtentList *list)
     list->count = count;
 }
 
-static Bounds lists_meet(const ExtentList *transparent, ExtentList *opaque, double margin)
+// Leaves out what is far from all of the others.
+static void extents_keep_near(ExtentList *list, const ExtentList *others, double margin)
 {
+    Bounds around = bounds_empty();
+    for (size_t i = 0; i < others->count; i++)
+        around = bounds_join(around, others->items[i].box);
+    bounds_grow(&around, margin);
+    size_t count = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        Bounds near = bounds_meet(list->items[i].box, around);
+        if (!bounds_is_empty(&near)) list->items[count++] = list->items[i];
+    }
+    list->count = count;
+}
+
+static Bounds lists_meet(ExtentList *transparent, ExtentList *opaque, double margin)
+{
+    extents_keep_near(opaque, transparent, margin);
+    extents_keep_near(transparent, opaque, margin);
     if (transparent->count == 0) return bounds_empty();
     if (opaque->count > PAIRS_LARGEST / transparent->count) extents_join_bounded(opaque);
     if (opaque->count > PAIRS_LARGEST / transparent->count) return everywhere();
