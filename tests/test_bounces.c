@@ -100,6 +100,11 @@ static Trial trials[] = {
      "  - sphere: {center: [0.25, 0.5, 1.75], radius: 0.5, material: glass}\n"
      "  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: tiles}\n",
      6},
+    // More than the bound on the error of the glass, less than twice that.
+    {"glass just over the floor",
+     STAGE CAMERA FLOOR "  - box: {min: [-1.5, 0.000003, -0.5], max: [-0.25, 1, 0.75], material: clear}\n"
+                        "  - box: {min: [0.5, 0.000003, -1], max: [1.75, 1.5, 0], material: water}\n",
+     6},
     {"glass on a mirror that is tilted",
      STAGE CAMERA "objects:\n"
                   "  - cylinder: {from: [-0.75, 0.75, 0], to: [-0.9375, 1.5, 0.75], radius: 0.5, "
