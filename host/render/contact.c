@@ -11,9 +11,9 @@
 // of three coordinates: 5 * (16 * 7 + 4 * 3) u = 620 u at float for a cylinder, whose numbers are most.
 #define NEARNESS 0x1p-14
 
-// More pairs than this are not held against each other, some 20 ms of them: a box around all opaque
+// More pairs than this, 5 to 30 ms of them, are not held against each other: a box around all opaque
 // primitives that have one takes their place.
-#define PAIRS_LARGEST ((size_t)1 << 21)
+#define PAIRS_LARGEST ((size_t)1 << 19)
 
 // Where a primitive is: in its box, infinite where it has none; what is flat also in its plane, normal . p =
 // offset.
