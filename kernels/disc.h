@@ -18,7 +18,7 @@ static inline DiscCrossing disc_crossing(Vector center, Vector normal, const Ray
                           vector_cross(normal, vector_cross(f, ray->direction))};
 }
 
-static COMPENSATED_FORM DiscCrossing disc_crossing_exactly(Vector center, Vector normal, const Ray *ray)
+static inline DiscCrossing disc_crossing_exactly(Vector center, Vector normal, const Ray *ray)
 {
     PairVector f = pair_vector_difference(ray->origin, center);
     return (DiscCrossing){

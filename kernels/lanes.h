@@ -43,18 +43,13 @@ typedef int scalar_integer;
 // compiled.
 #define OUT_OF_LINE __attribute__((noinline))
 
-// For a large function with little in hand, though it is called from one place: clang optimises a function by
-// itself, then again as a part of each that it is inlined into, level by level. One lane is mostly a GPU's,
-// where what is inlined stays in registers.
-#if LANES == 1
-#define COMPILED_ONCE inline
-#else
-#define COMPILED_ONCE OUT_OF_LINE
-#endif
-
 // What a kernel does once it knows its work-item. PoCL compiles a kernel's own text three times, for each way
 // to launch it, and what it calls out of line once.
-#define KERNEL_BODY COMPILED_ONCE
+#if LANES == 1
+#define KERNEL_BODY inline
+#else
+#define KERNEL_BODY OUT_OF_LINE
+#endif
 
 #define JOIN_TOKENS(a, b) a##b
 #define JOIN(a, b)        JOIN_TOKENS(a, b)

@@ -10,13 +10,6 @@
 // Whether intersections use the compensated forms.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
 
-// For a compensated form: elsewhere few rays need it.
-#if IS_COMPENSATED
-#define COMPENSATED_FORM inline
-#else
-#define COMPENSATED_FORM COMPILED_ONCE
-#endif
-
 // Where a device's own quotients and roots are inexact (REPAIRS_DIVIDE, at `strict`, in floats) they are
 // taken of the operands' mantissas alone, so that nothing on the way is too large or too small, brought
 // within an ulp by a Newton step, and then chosen among three neighbors by comparisons that are exact. A

@@ -16,8 +16,8 @@ typedef struct {
     mask exact; // each of these is rounded about once
 } RevolutionQuadric;
 
-static COMPILED_ONCE RevolutionQuadric revolution_quadric_exactly(const Revolution *shape, bool sloped,
-                                                                  const Ray *ray)
+static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *shape, bool sloped,
+                                                           const Ray *ray)
 {
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     Vector d = ray->direction;

@@ -267,8 +267,8 @@ static inline uint node_open(const Scene *scene, uint index, uint lanes, const B
 }
 
 // Down the tree; a packet visits what any of its open lanes meets. `open`: these, as bits.
-static COMPILED_ONCE void search_bvh(Search *search, const Scene *scene, const Ray *ray, uint open,
-                                     const Beam *beam, const BoxRays *rays, LaidRays *laid)
+static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray, uint open, const Beam *beam,
+                              const BoxRays *rays, LaidRays *laid)
 {
     real limit = search_limit(search);
     scalar beam_limit = beam->limit;
@@ -294,7 +294,7 @@ static COMPILED_ONCE void search_bvh(Search *search, const Scene *scene, const R
 
 // Rays of one packet mostly run to the same sides; where they do not, those that do go together, and all
 // those with few to go with after them.
-static COMPILED_ONCE void search_hierarchy(Search *search, const Scene *scene, Ray *ray)
+static inline void search_hierarchy(Search *search, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
     global const Ball *balls = ray_balls(scene, ray);

@@ -133,9 +133,9 @@ static inline scalar4 picture_filtered(const Scene *scene, uint4 image, scalar u
 
 // The picture's color where the lanes in `wanted` meet a surface, `distance_` along from the eye. What is
 // seen at a slant counts as at most 2^10 times longer.
-static COMPILED_ONCE Vector picture_color(const Scene *scene, uint kind, const Material *material,
-                                          PicturePoint point, const Patch *patch, const Ray *ray,
-                                          real distance_, mask wanted)
+static inline Vector picture_color(const Scene *scene, uint kind, const Material *material,
+                                   PicturePoint point, const Patch *patch, const Ray *ray, real distance_,
+                                   mask wanted)
 {
     real cosine = real_max(fabs(vector_dot(patch->normal, ray->direction)), (real)(0x1p-10f));
     real width = distance_ * (real)(scene->header->sample.x);

@@ -123,7 +123,7 @@ static inline void torus_places(const TorusLine *line, real squared_distance, re
     places[4] = span;
 }
 
-static COMPILED_ONCE mask torus_hit(const Torus *torus, const Ray *ray, real *t)
+static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
 {
     real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
     real closest_t;

@@ -115,12 +115,12 @@ static inline PairVector pair_vector_of(Vector a)
     return (PairVector){pair_of(a.x), pair_of(a.y), pair_of(a.z)};
 }
 
-static COMPENSATED_FORM Pair pair_vector_dot(PairVector a, PairVector b)
+static inline Pair pair_vector_dot(PairVector a, PairVector b)
 {
     return pair_add(pair_add(pair_multiply(a.x, b.x), pair_multiply(a.y, b.y)), pair_multiply(a.z, b.z));
 }
 
-static COMPENSATED_FORM Pair pair_vector_dot_vector(PairVector a, Vector b)
+static inline Pair pair_vector_dot_vector(PairVector a, Vector b)
 {
     return pair_add(pair_add(pair_scale(a.x, b.x), pair_scale(a.y, b.y)), pair_scale(a.z, b.z));
 }
