@@ -241,6 +241,12 @@ static void test_output_commit(void **state)
     unlink("new");
 }
 
+static void output_write_new(OutputFile *output, const char *path, MessageList *messages)
+{
+    assert_true(output_open(output, path, messages));
+    assert_true(output_write(output, "new", 3, messages));
+}
+
 static void test_output_replaces_what_a_link_leads_to(void **state)
 {
     (void)state;
@@ -249,8 +255,7 @@ static void test_output_replaces_what_a_link_leads_to(void **state)
     file_write("real", "old");
     assert_int_equal(chmod("real", 0604), 0);
     assert_int_equal(symlink("real", "link"), 0);
-    assert_true(output_open(&output, "link", &messages));
-    assert_true(output_write(&output, "new", 3, &messages));
+    output_write_new(&output, "link", &messages);
     check_content("link", "old");
     assert_true(output_commit(&output, &messages));
     check_content("real", "new");
@@ -271,8 +276,7 @@ static void test_output_makes_what_a_link_leads_to(void **state)
     assert_int_equal(mkdir("folder", 0700), 0);
     assert_int_equal(symlink("folder/link", "link"), 0);
     assert_int_equal(symlink("../made", "folder/link"), 0);
-    assert_true(output_open(&output, "link", &messages));
-    assert_true(output_write(&output, "new", 3, &messages));
+    output_write_new(&output, "link", &messages);
     assert_true(output_commit(&output, &messages));
     check_content("made", "new");
     struct stat status;
@@ -322,8 +326,7 @@ static void test_output_settle(void **state)
     MessageList messages = {0};
     OutputFile output;
     file_write("kept", "old");
-    assert_true(output_open(&output, "kept", &messages));
-    assert_true(output_write(&output, "new", 3, &messages));
+    output_write_new(&output, "kept", &messages);
     assert_true(output_settle(&output, &messages));
     check_content(output.temporary, "new");
     check_content("kept", "old");
@@ -363,8 +366,7 @@ static void test_output_abandon(void **state)
     MessageList messages = {0};
     OutputFile output;
     file_write("kept", "old");
-    assert_true(output_open(&output, "kept", &messages));
-    assert_true(output_write(&output, "new", 3, &messages));
+    output_write_new(&output, "kept", &messages);
     char temporary[64];
     snprintf(temporary, sizeof temporary, "%s", output.temporary);
     assert_int_equal(access(temporary, F_OK), 0);

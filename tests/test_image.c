@@ -296,19 +296,30 @@ static void check_content(const char *path, const char *expected)
 
 static const char *const endings[] = {"png", "ppm", "exr", "npy"};
 
+static void old_file_make(char *path, size_t size, const char *ending)
+{
+    snprintf(path, size, "old.%s", ending);
+    file_write(path, "old", 3);
+}
+
+static ImageWriter *writer_of_8_by_40(const char *path, MessageList *messages)
+{
+    ImageHeader header = {image_format_of(path), 8, 40, 3, TRANSFER_SRGB, 8, 'f', notes};
+    ImageWriter *writer = image_writer_open(path, &header, messages);
+    assert_non_null(writer);
+    return writer;
+}
+
 static void test_abandoned_leaves_the_old_file(void **state)
 {
     (void)state;
     float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
         char path[16];
-        snprintf(path, sizeof path, "old.%s", endings[i]);
-        file_write(path, "old", 3);
+        old_file_make(path, sizeof path, endings[i]);
         unsigned before = folder_count();
         MessageList messages = {0};
-        ImageHeader header = {image_format_of(path), 8, 40, 3, TRANSFER_SRGB, 8, 'f', notes};
-        ImageWriter *writer = image_writer_open(path, &header, &messages);
-        assert_non_null(writer);
+        ImageWriter *writer = writer_of_8_by_40(path, &messages);
         assert_true(image_writer_rows(writer, values, 20, &messages));
         assert_int_equal(folder_count(), before + 1);
         image_writer_abandon(writer);
@@ -348,14 +359,11 @@ static void test_settled_is_yet_to_be_renamed(void **state)
     float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
         char path[16];
-        snprintf(path, sizeof path, "old.%s", endings[i]);
-        file_write(path, "old", 3);
+        old_file_make(path, sizeof path, endings[i]);
         unsigned before = folder_count();
         MessageList messages = {0};
-        ImageHeader header = {image_format_of(path), 8, 40, 3, TRANSFER_SRGB, 8, 'f', notes};
         for (int commits = 0; commits < 2; commits++) {
-            ImageWriter *writer = image_writer_open(path, &header, &messages);
-            assert_non_null(writer);
+            ImageWriter *writer = writer_of_8_by_40(path, &messages);
             assert_true(image_writer_rows(writer, values, 40, &messages));
             assert_true(image_writer_settle(writer, &messages));
             check_content(path, "old");

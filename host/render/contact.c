@@ -39,18 +39,13 @@ static Bounds everywhere(void)
     return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
 }
 
-static double largest_coordinate(Vector3 v)
-{
-    return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
-}
-
 static double extent_reach(const Extent *extent, size_t kind, const void *primitive)
 {
     if (extent_is_bounded(extent))
-        return fmax(largest_coordinate(extent->box.min), largest_coordinate(extent->box.max));
+        return fmax(vector_largest(extent->box.min), vector_largest(extent->box.max));
     if (kind == KIND_PLANES) return fabs(extent->offset);
     const Revolution *endless = primitive;
-    return largest_coordinate(vector3_of(&endless->base_radius)) + endless->base_radius.w / endless->range.y;
+    return vector_largest(vector3_of(&endless->base_radius)) + endless->base_radius.w / endless->range.y;
 }
 
 static Extent extent_of(size_t kind, const void *primitive)
@@ -69,19 +64,6 @@ static Extent extent_of(size_t kind, const void *primitive)
     extent.offset = vector_dot(extent.normal, point);
     extent.reach = extent_reach(&extent, kind, primitive);
     return extent;
-}
-
-static void bounds_grow(Bounds *bounds, double margin)
-{
-    *bounds = (Bounds){vector_subtract(bounds->min, vector_all(margin)),
-                       vector_add(bounds->max, vector_all(margin))};
-}
-
-static Bounds bounds_meet(Bounds a, Bounds b)
-{
-    Bounds both = {vector_max(a.min, b.min), vector_min(a.max, b.max)};
-    bool apart = both.min.x > both.max.x || both.min.y > both.max.y || both.min.z > both.max.z;
-    return apart ? bounds_empty() : both;
 }
 
 typedef struct {
@@ -119,11 +101,9 @@ static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
 static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
 {
     if (!extent_is_bounded(a) && !extent_is_bounded(b)) return everywhere();
-    Bounds both = a->box;
-    bounds_grow(&both, margin);
-    both = bounds_meet(both, b->box);
+    Bounds both = bounds_meet(bounds_grow(a->box, margin), b->box);
     if (bounds_is_empty(&both)) return both;
-    bounds_grow(&both, margin);
+    both = bounds_grow(both, margin);
     if (!vector_is_zero(a->normal)) both = bounds_near_plane(both, a, margin);
     if (!vector_is_zero(b->normal) && !bounds_is_empty(&both)) both = bounds_near_plane(both, b, margin);
     return both;
@@ -169,7 +149,7 @@ static void extents_keep_near(ExtentList *list, const ExtentList *others, double
     Bounds around = bounds_empty();
     for (size_t i = 0; i < others->count; i++)
         around = bounds_join(around, others->items[i].box);
-    bounds_grow(&around, margin);
+    around = bounds_grow(around, margin);
     size_t count = 0;
     for (size_t i = 0; i < list->count; i++) {
         Bounds near = bounds_meet(list->items[i].box, around);

@@ -71,7 +71,7 @@ static scalar4 scalar4_of(Vector3 v, double w)
 static Vector3 axis_scaled(Vector3 axis)
 {
     int exponent;
-    frexp(fmax(fabs(axis.x), fmax(fabs(axis.y), fabs(axis.z))), &exponent);
+    frexp(vector_largest(axis), &exponent);
     return (Vector3){ldexp(axis.x, -exponent), ldexp(axis.y, -exponent), ldexp(axis.z, -exponent)};
 }
 

@@ -90,8 +90,7 @@ static bool scene_fits(const FlatScene *flat, const Renderer *renderer, MessageL
 
 static double distance_largest(Vector3 from, Vector3 to)
 {
-    Vector3 way = vector_subtract(to, from);
-    return fmax(fabs(way.x), fmax(fabs(way.y), fabs(way.z)));
+    return vector_largest(vector_subtract(to, from));
 }
 
 // The unit of lengths on the device. In float a torus a trillion units large, or a trillionth, is lost, as

@@ -27,6 +27,20 @@ static inline Bounds bounds_join(Bounds a, Bounds b)
     return (Bounds){vector_min(a.min, b.min), vector_max(a.max, b.max)};
 }
 
+// What both hold; empty where they are apart.
+static inline Bounds bounds_meet(Bounds a, Bounds b)
+{
+    Bounds both = {vector_max(a.min, b.min), vector_min(a.max, b.max)};
+    bool apart = both.min.x > both.max.x || both.min.y > both.max.y || both.min.z > both.max.z;
+    return apart ? bounds_empty() : both;
+}
+
+static inline Bounds bounds_grow(Bounds bounds, double margin)
+{
+    return (Bounds){vector_subtract(bounds.min, vector_all(margin)),
+                    vector_add(bounds.max, vector_all(margin))};
+}
+
 static inline Bounds bounds_of_triangle(Vector3 a, Vector3 b, Vector3 c)
 {
     return (Bounds){vector_min(vector_min(a, b), c), vector_max(vector_max(a, b), c)};

@@ -39,6 +39,12 @@ static inline Vector3 vector_max(Vector3 a, Vector3 b)
     return (Vector3){b.x > a.x ? b.x : a.x, b.y > a.y ? b.y : a.y, b.z > a.z ? b.z : a.z};
 }
 
+// Of its components, without their signs.
+static inline double vector_largest(Vector3 a)
+{
+    return fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
+}
+
 static inline double vector_dot(Vector3 a, Vector3 b)
 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
@@ -57,7 +63,7 @@ static inline double vector_length(Vector3 a)
 // Unit vector, without overflow or underflow; the zero vector stays zero.
 static inline Vector3 vector_normalize(Vector3 a)
 {
-    double largest = fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
+    double largest = vector_largest(a);
     if (largest == 0) return a;
     int exponent;
     frexp(largest, &exponent);
