@@ -1,0 +1,153 @@
+"""Shared by the Python tests: runs the program in a folder of its own and reads the files that it writes.
+
+Tests are the executable tests/test_*.py; other Python files are helpers. A test finds the program in GLINT and its build folder
+in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG_CACHE_HOME, shared by the tests of a run.
+"""
+import ast
+import csv
+import json
+import math
+import os
+import re
+import shlex
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PROGRAM = Path(os.environ.get("GLINT", ROOT / "build/glint")).resolve()
+IS_SANITIZED = Path(os.environ.get("BUILD", PROGRAM.parent)).name.endswith("-sanitize")
+IS_LONG = os.environ.get("GLINT_LONG_TESTS") == "1"
+SPHERE = """\
+camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 60}
+background: [0.1, 0.2, 0.4]
+lights:
+  - point: {position: [3, 4, -5]}
+  - directional: {direction: [0, -1, 0.3], color: [0.2, 0.2, 0.2]}
+objects:
+  - sphere: {center: [0, 0, 0], radius: 1}
+"""
+
+
+def skip_all(reason):
+    print(f"skipped: {reason}")
+    sys.exit(77)
+
+
+def run(command, wrapper=(), env=None, **options):
+    """The finished process of `glint COMMAND`; a wrapper is the command that starts the program."""
+    options = {"stdin": subprocess.DEVNULL} | options if "input" not in options else options
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
+    environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"}
+    return subprocess.run([*wrapper, PROGRAM, *shlex.split(command)], env=environment | {"LC_ALL": "C"} | (env or {}), **options)
+
+
+def need_device():
+    """Skips the whole test where there is no OpenCL device; returns the default device."""
+    process = run("devices --json")
+    if process.returncode != 0:
+        skip_all(f"no OpenCL device: {process.stderr}")
+    return next(device for device in json.loads(process.stdout)["devices"] if device["default"])
+
+
+def need_modules(*modules):
+    """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip; skips it where there is none."""
+    script = '. tests/support.bash; python_with "$@" && echo "$python"'
+    cache = {"XDG_CACHE_HOME": os.path.expanduser("~/.cache")} | os.environ
+    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, env=cache, stdout=subprocess.PIPE, text=True)
+    if process.returncode != 0:
+        print(process.stdout, end="")
+        sys.exit(process.returncode)
+    python = process.stdout.strip()
+    if python not in ("python3", sys.executable):
+        os.execv(python, [python, "-B", *sys.argv])
+
+
+def find_icd(name):
+    """The file by which the OpenCL loader finds an implementation; None where it is not installed."""
+    return next((str(path) for path in Path("/etc/OpenCL/vendors").glob(f"*{name}*.icd")), None)
+
+
+class TestCase(unittest.TestCase):
+    """Each test runs in an empty folder of its own."""
+
+    maxDiff = 4000
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.addCleanup(os.chdir, ROOT)
+        os.chdir(folder.name)
+
+    def glint(self, command, status=0, **options):
+        """Runs `glint COMMAND`, which must exit with the status."""
+        process = run(command, **options)
+        self.assertEqual(process.returncode, status, f"glint {command}: {process.stderr}")
+        return process
+
+    def refuses(self, command, pattern, status=1, **options):
+        """`glint COMMAND` must exit with the status, say why on standard error and print nothing."""
+        process = self.glint(command, status, **options)
+        self.assertRegex(process.stderr, re.compile(pattern, re.MULTILINE), f"glint {command}")
+        self.assertEqual(process.stdout, "", f"glint {command}")
+        return process
+
+    def json(self, command, status=0, **options):
+        return json.loads(self.glint(command, status, **options).stdout)
+
+    def assertSameBytes(self, path, other):
+        if Path(path).read_bytes() != Path(other).read_bytes():
+            self.fail(f"{path} and {other} differ")
+
+
+def write(path, text):
+    Path(path).write_text(text, encoding="utf-8")
+    return path
+
+
+def npy_read(path):
+    """Shape, type and values of an array of float, double or unsigned."""
+    data = Path(path).read_bytes()
+    assert data[:8] == b"\x93NUMPY\x01\x00", path
+    (length,) = struct.unpack("<H", data[8:10])
+    head = ast.literal_eval(data[10 : 10 + length].decode())
+    assert not head["fortran_order"]
+    letter = {"<f4": "f", "<f8": "d", "<u4": "I"}[head["descr"]]
+    return head["shape"], head["descr"], struct.unpack(f"<{math.prod(head['shape'])}{letter}", data[10 + length :])
+
+
+def png_read(path):
+    """(width, height, bits, color type), raw rows, texts by keyword, and the kinds of chunk; checks every checksum."""
+    data = Path(path).read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n", path
+    at, chunks = 8, []
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at : at + 8])
+        body = data[at + 8 : at + 8 + size]
+        assert struct.unpack(">I", data[at + 8 + size : at + 12 + size])[0] == zlib.crc32(kind + body)
+        chunks.append((kind.decode(), body))
+        at += 12 + size
+    assert chunks[-1][0] == "IEND"
+    rows = zlib.decompress(b"".join(body for kind, body in chunks if kind == "IDAT"))
+    texts = dict(body.decode("latin-1").split("\0", 1) for kind, body in chunks if kind == "tEXt")
+    return struct.unpack(">IIBB", chunks[0][1][:10]), rows, texts, [kind for kind, _ in chunks]
+
+
+def csv_rows(text):
+    return list(csv.reader(text.splitlines()))
+
+
+def main():
+    """Runs the tests of the file that is executed. A skip is reported as cmocka does, which tools/run_tests shows."""
+    result = unittest.main(exit=False).result
+    for test, reason in result.skipped:
+        print(f"[  SKIPPED ] {test}\n{test}: {reason}")
+    if 0 < len(result.skipped) < result.testsRun:
+        print("[       OK ] the others")
+    if not result.wasSuccessful() or result.testsRun == 0:
+        sys.exit(1)
+    sys.exit(77 if len(result.skipped) == result.testsRun else 0)

@@ -1,0 +1,121 @@
+#!/usr/bin/env -S python3 -B
+"""The numbers of glint diff against numpy and flip-evaluator (the authors' own FLIP), which share no code with glint."""
+import math
+from pathlib import Path
+
+from glint import TestCase, main, need_modules
+
+need_modules("numpy=numpy==2.4.6", "flip_evaluator=flip-evaluator==1.7")
+import flip_evaluator  # noqa: E402
+import numpy as np  # noqa: E402
+
+
+def srgb_encode(linear):
+    linear = np.clip(linear, 0, 1)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def srgb_decode(display):
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
+
+
+def flip(reference, image):
+    """FLIP's map and mean of two displayed images, in float as flip-evaluator computes."""
+    floats = (a.astype(np.float32) for a in (reference, image))
+    return flip_evaluator.evaluate(*floats, "LDR", inputsRGB=True, applyMagma=False, computeMeanError=True,
+                                   parameters={"ppd": 67})[:2]
+
+
+def expected_metrics(reference, image, is_display):
+    """Each number of the report on two arrays, height x width x 3, and its tolerance."""
+    reference, image = reference.astype(np.float64), image.astype(np.float64)
+    encoded = [a if is_display else srgb_encode(np.nan_to_num(a, nan=0)) for a in (reference, image)]
+    light = [srgb_decode(a) if is_display else a for a in (reference, image)]
+    both = np.isfinite(light[0]) & np.isfinite(light[1])
+    expected, found = light[0][both], light[1][both]
+    difference = found - expected
+    steps = [np.floor(255 * a + 0.5) for a in encoded]
+    distance = np.abs(steps[0] - steps[1])
+    flip_map, flip_mean = flip(*encoded)
+    return {
+        "linear": {
+            "values": (int(both.sum()), 0),
+            "max_abs": (np.abs(difference).max(), 1e-7),
+            "rmse": (np.sqrt(np.mean(difference**2)), 1e-7),
+            "bias": (difference.mean(), 1e-7),
+            "p99_9": (np.quantile(np.abs(difference), 0.999, method="inverted_cdf"), 1e-7),
+            "psnr": (10 * np.log10(1 / np.mean(difference**2)), 1e-4),
+            "rel_mse": (np.mean(difference**2 / (expected**2 + 0.01)), 1e-5),
+        },
+        "srgb8": {
+            "off_by_1": (int((distance == 1).sum()), 0),
+            "off_by_2_or_more": (int((distance > 1).sum()), 0),
+            "psnr": (10 * np.log10(255**2 / np.mean(distance**2)), 1e-4),
+        },
+        "flip": {"mean": (flip_mean, 2e-5), "max": (flip_map.max(), 2e-4)},
+        "nonfinite_pixels": {
+            "reference": (int((~np.isfinite(reference)).any(axis=2).sum()), 0),
+            "picture": (int((~np.isfinite(image)).any(axis=2).sum()), 0),
+        },
+    }
+
+
+def save(name, array, is_display):
+    """Writes an NPY, or a PPM of 8 bits; returns its path and the values that it holds."""
+    if not is_display:
+        np.save(f"{name}.npy", array.astype(np.float32))
+        return f"{name}.npy", array.astype(np.float32)
+    steps = np.round(255 * np.clip(array, 0, 1)).astype(np.uint8)
+    Path(f"{name}.ppm").write_bytes(b"P6\n%d %d\n255\n" % (steps.shape[1], steps.shape[0]) + steps.tobytes())
+    return f"{name}.ppm", (steps / np.float32(255)).astype(np.float32)
+
+
+def waves(generator, height, width):
+    y, x = np.mgrid[0:height, 0:width] / max(height, width)
+    return np.stack([0.5 + 0.5 * np.sin(a * x + b * y) for a, b in generator.uniform(1, 25, (3, 2))], axis=2)
+
+
+def pairs():
+    """Name, reference, image, and whether both are display values."""
+    generator = np.random.default_rng(20)
+    for height, width in (48, 64), (5, 90), (1, 1), (33, 7):
+        base = waves(generator, height, width)
+        size = f"{width}x{height}"
+        for noise in 1e-5, 1e-2, 0.3:
+            noisy = base + generator.normal(0, noise, base.shape)
+            yield f"linear, {size}, noise {noise}", base, noisy, False
+            if noise > 1e-3:
+                yield f"display, {size}, noise {noise}", base, noisy, True
+        yield f"beyond the range, {size}", 4 * base - 1, 4 * base - 1.01, False
+        yield f"unrelated, {size}", base, generator.uniform(0, 1, base.shape), False
+        edges = (base > 0.5).astype(float)
+        yield f"edges, {size}", edges, 1 - edges, True
+    gray = np.full((64, 64, 3), 128 / 255)
+    black = gray.copy()
+    black[20, 40] = 0
+    yield "one black pixel", gray, black, True
+    yield "one step lighter", gray, gray + 1 / 255, True
+    holes = gray + 0.001
+    holes[3, 5, 1] = np.nan
+    holes[9, 9, 0] = -np.inf
+    yield "not finite", gray, holes, False
+
+
+class DiffMetrics(TestCase):
+    def test_metrics(self):
+        np.seterr(divide="ignore")
+        for name, reference, image, is_display in pairs():
+            reference_path, reference = save("reference", reference, is_display)
+            image_path, image = save("image", image, is_display)
+            report = self.json(f"diff {reference_path} {image_path} --json", status=3)
+            for group, metrics in expected_metrics(reference, image, is_display).items():
+                for key, (expected, tolerance) in metrics.items():
+                    found = math.inf if report[group][key] is None else report[group][key]  # JSON has no infinity
+                    scale = max(1, abs(expected)) if group == "linear" else 1
+                    with self.subTest(f"{name}: {group}.{key}"):
+                        self.assertTrue(found == expected or abs(found - expected) <= tolerance * scale,
+                                        f"{found}, expected {expected}")
+
+
+if __name__ == "__main__":
+    main()
