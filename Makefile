@@ -28,9 +28,9 @@ GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe
 
 # KERNELS=folder: its files stand in for those of the same name in kernels/: the textbook's formulas, to measure beside
 # (tools/numerics/textbook), never to ship.
-kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl)),$(or \
+kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h)),$(or \
            $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
-sources := $(sort $(wildcard host/*.c host/*/*.c))
+sources := $(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))
 pages   := $(sort $(wildcard host/cli/page/*))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
@@ -46,7 +46,7 @@ all: $(BUILD)/glint
 $(BUILD)/glint: $(objects)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
-$(BUILD)/kernel_files.c: $(kernels) kernels tools/embed $(BUILD)/flags
+$(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)
 	tools/embed kernel_files $(kernels) > $@
 
@@ -139,7 +139,7 @@ linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/num
           tools/numerics/overhear.c \
           $(if $(has_embree),$(embree_sources))
 
-formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl tools/numerics/textbook/*.h host/*/*.h tests/*.h \
+formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
              tests/oracle/*.h) $(embree_sources) $(embree_headers)
 
 format:

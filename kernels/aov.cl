@@ -1,6 +1,6 @@
 // What lies behind each pixel's center, in place of its color.
 #include "film.h"
-#include "phong.h"
+#include "shading/phong.h"
 
 // Infinity for a miss, put together from bits: `fast` need not know infinities.
 static inline real hit_distance(const Hit *hit)

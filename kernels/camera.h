@@ -20,7 +20,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
     const Vector eye = {(real)(0), (real)(0), (real)(0)};
     Ray ray = ray_make_unit(eye, vector_normalize(direction), active);
-    ray_take_apex(&ray, APEX_EYE);
+    ray_take_apex(&ray, COMMON_ORIGIN_EYE);
     return ray;
 }
 

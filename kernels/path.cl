@@ -1,7 +1,7 @@
 // The signature of the way that the ray through each pixel's center takes.
 #define SIGNS_PATHS 1
 #include "film.h"
-#include "path.h"
+#include "shading/path.h"
 
 static KERNEL_BODY void tile_sign(const Scene *scene, const Tile *tile, global int *paths)
 {

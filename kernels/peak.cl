@@ -1,5 +1,5 @@
 // What the device can do at most: arithmetic without memory, and memory without arithmetic.
-#include "lanes.h"
+#include "numerics/lanes.h"
 
 // Eight chains, independent of one another, keep pipelines of 4 steps in 2 units busy; each takes one fma a
 // round. They are variables, not an array: what a compiler does not unroll would load and store it.

@@ -1,7 +1,7 @@
 // The picture: each work-item traces the rays of one tile of pixels after the other.
 #define SIGNS_PATHS 0
 #include "film.h"
-#include "path.h"
+#include "shading/path.h"
 
 // Adds samples first..last-1 to the tile's part of the film; the last of all turns the sum into the mean.
 // `offsets` has each sample's place in its pixel, from -1 to 1. What each addition loses is carried to the

@@ -3,13 +3,13 @@
 #ifndef SCENE_H
 #define SCENE_H
 
-#include "bvh.h"
-#include "disc.h"
-#include "plane.h"
-#include "revolution.h"
-#include "sphere.h"
-#include "torus.h"
-#include "triangle.h"
+#include "shapes/disc.h"
+#include "shapes/plane.h"
+#include "shapes/revolution.h"
+#include "shapes/sphere.h"
+#include "shapes/torus.h"
+#include "shapes/triangle.h"
+#include "traversal/bvh.h"
 
 #define SCENE_SHAPE_MEMBER(feature, Type, name, names) global const Type *names;
 typedef struct {
@@ -18,7 +18,7 @@ typedef struct {
     global const TriangleNormals *triangle_normals;
     global const TriangleUvs *triangle_uvs;
     global const BvhNode *nodes;
-    global const Ball *balls;
+    global const CullSphere *cull_spheres;
     global const ObjectEntry *objects;
     global const Material *materials;
     global const Light *lights;
@@ -33,13 +33,14 @@ typedef struct {
 #define SCENE_ARGUMENTS                                                                                      \
     global const SceneHeader *header,                                                                        \
         SHAPE_LIST(SCENE_SHAPE_ARGUMENT) global const TriangleNormals *triangle_normals,                     \
-        global const TriangleUvs *triangle_uvs, global const BvhNode *nodes, global const Ball *balls,       \
-        global const ObjectEntry *objects, global const Material *materials, global const Light *lights,     \
+        global const TriangleUvs *triangle_uvs, global const BvhNode *nodes,                                 \
+        global const CullSphere *cull_spheres, global const ObjectEntry *objects,                            \
+        global const Material *materials, global const Light *lights,                                        \
         global const TextureLevel *texture_levels, global const Texel *texels
 #define SCENE_SHAPE_VALUE(feature, Type, name, names) names,
 #define SCENE_FROM_ARGUMENTS                                                                                 \
     {                                                                                                        \
-        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, nodes, balls, objects,         \
+        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, nodes, cull_spheres, objects,  \
             materials, lights, texture_levels, texels, 0                                                     \
     }
 
@@ -121,19 +122,19 @@ static inline void search_take(Search *search, const Scene *scene, mask found, r
     hit->object = lanes_select(closer, object, hit->object);
 }
 
-// The ray's row of balls, 0 where it has none.
-static inline global const Ball *ray_balls(const Scene *scene, const Ray *ray)
+// The ray's row of cull_spheres, 0 where it has none.
+static inline global const CullSphere *ray_cull_spheres(const Scene *scene, const Ray *ray)
 {
-    uint count = scene->header->balls.x;
-    if (ray->apex == APEX_NONE || count == 0) return 0;
-    return scene->balls + (size_t)(ray->apex - APEX_EYE) * count;
+    uint count = scene->header->cull_spheres.x;
+    if (ray->common_origin == COMMON_ORIGIN_NONE || count == 0) return 0;
+    return scene->cull_spheres + (size_t)(ray->common_origin - COMMON_ORIGIN_EYE) * count;
 }
 
-// How many of the first balls, up to `count`, all lanes' lines miss.
-static inline uint balls_missed(global const Ball *balls, uint count, const Ray *ray)
+// How many of the first cull_spheres, up to `count`, all lanes' lines miss.
+static inline uint cull_spheres_missed(global const CullSphere *cull_spheres, uint count, const Ray *ray)
 {
     uint missed = 0;
-    while (missed < count && lanes_all(ray_misses_ball(ray, &balls[missed])))
+    while (missed < count && lanes_all(ray_misses_cull_sphere(ray, &cull_spheres[missed])))
         missed++;
     return missed;
 }
@@ -146,15 +147,15 @@ static inline void object_fetch(const Scene *scene, uint kind, uint4 id)
         memory_fetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
-// Tests shapes first .. last - 1 of one kind; `balls`, where there are any, are theirs. Each kind has a
-// function of its own: of one for all, Mesa would compile every kind's test at each call, as it inlines
+// Tests shapes first .. last - 1 of one kind; `cull_spheres`, where there are any, are theirs. Each kind has
+// a function of its own: of one for all, Mesa would compile every kind's test at each call, as it inlines
 // before it knows which kind is asked for.
 #define SEARCH_OF_SHAPE(feature, Type, name, names)                                                          \
     static inline void search_##names(Search *search, const Scene *scene, const Ray *ray, uint first,        \
-                                      uint last, global const Ball *balls)                                   \
+                                      uint last, global const CullSphere *cull_spheres)                      \
     {                                                                                                        \
         for (uint i = first; i < last; i++) {                                                                \
-            if (balls) i += balls_missed(balls + (i - first), last - i, ray);                                \
+            if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
             if (i == last) break;                                                                            \
             Type shape = scene->names[i];                                                                    \
             real t = ray->far;                                                                               \
@@ -297,8 +298,8 @@ static inline void search_bvh(Search *search, const Scene *scene, const Ray *ray
 static inline void search_hierarchy(Search *search, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
-    global const Ball *balls = ray_balls(scene, ray);
-    if (balls && balls_missed(balls, 1, ray)) return;
+    global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
+    if (cull_spheres && cull_spheres_missed(cull_spheres, 1, ray)) return;
     ray_make_frame(ray);
     BoxRays rays = box_rays(ray, header->bounds);
     mask looking = box_rays_meet(&rays, header->bounds_low, header->bounds_high, search_limit(search));
@@ -335,14 +336,14 @@ static inline void search_plainly(Search *search, const Scene *scene, Ray *ray)
     uint boxes = HAS_BOXES ? counts[KIND_BOXES] - bounded_counts[KIND_BOXES] : 0;
     uint triangles = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bounded_counts[KIND_TRIANGLES] : 0;
     if (boxes + triangles > 0) ray_make_frame(ray);
-    global const Ball *balls = ray_balls(scene, ray);
-    if (balls) balls++; // the hierarchy's
+    global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
+    if (cull_spheres) cull_spheres++; // the hierarchy's
 #define SEARCH_PLAINLY(feature, Type, name, names)                                                           \
     if (HAS_##feature && lanes_any(search->open)) {                                                          \
         uint first = bounded_counts[KIND_##feature], last = counts[KIND_##feature];                          \
-        bool has_balls = balls && KIND_##feature != KIND_PLANES;                                             \
-        search_##names(search, scene, ray, first, last, has_balls ? balls : 0);                              \
-        if (has_balls) balls += last - first;                                                                \
+        bool has_cull_spheres = cull_spheres && KIND_##feature != KIND_PLANES;                               \
+        search_##names(search, scene, ray, first, last, has_cull_spheres ? cull_spheres : 0);                \
+        if (has_cull_spheres) cull_spheres += last - first;                                                  \
     }
     SHAPE_LIST(SEARCH_PLAINLY)
 }

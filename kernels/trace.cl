@@ -1,6 +1,6 @@
 // Explicit rays, each with its closest hit and what becomes of the ray there. Scene and rays are taken as
 // they are.
-#include "bounce.h"
+#include "shading/bounce.h"
 
 static inline Vector vector_load(const RealLanes *from)
 {

@@ -53,7 +53,7 @@ typedef struct {
 // Cylinder and cone: the points with |p x axis| = radius + slope (p . axis), p from the base. Radius and
 // slope are in units of |axis|, so that the axis need not be unit.
 typedef struct {
-    scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
+    scalar4 base_radius; // xyz base (an infinite cone's common_origin), w radius at the base times |axis|
     scalar4 axis_slope;  // xyz axis, w slope
     scalar4 range;       // x: p . axis runs from 0 to this where finite; y: |axis|; z: |axis|^2
     uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | ONLY_INSIDE
@@ -123,22 +123,23 @@ typedef struct {
 
 enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 
-// A ball around something, as seen from an apex: a point that all rays of a packet pass through, the eye or a
-// light at a place. Each apex has a row of SceneHeader's balls.x of them: that of all that hangs in the
-// hierarchy, then of each shape that does not, kind by kind; planes have none.
+// A ball around something, as seen from an common_origin: a point that all rays of a packet pass through, the
+// eye or a light at a place. Each common_origin has a row of SceneHeader's cull_spheres.x of them: that of
+// all that hangs in the hierarchy, then of each shape that does not, kind by kind; planes have none.
 //
-// xyz: from the apex to the center; w: the apex's power, |xyz|^2 - radius^2, lowered by BALL_SLACK u |xyz|^2,
-// or -BALL_LARGEST around the unbounded.
+// xyz: from the common_origin to the center; w: the common_origin's power, |xyz|^2 - radius^2, lowered by
+// CULL_SPHERE_SLACK u |xyz|^2, or -CULL_SPHERE_LARGEST around the unbounded.
 typedef struct {
     scalar4 center_power;
-} Ball;
+} CullSphere;
 
-#define BALL_LARGEST 1e37f
+#define CULL_SPHERE_LARGEST 1e37f
 
-// What balls count as larger by, in units of roundoff: of |xyz|^2, and of the square of a ray's direction.
-enum { BALL_SLACK = 256, BALL_WAY_SLACK = 128 };
+// What cull_spheres count as larger by, in units of roundoff: of |xyz|^2, and of the square of a ray's
+// direction.
+enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
 
-enum { APEX_NONE, APEX_EYE, APEX_FIRST_LIGHT };
+enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
 
 // Where an object's id leads.
 typedef struct {
@@ -231,7 +232,7 @@ typedef struct {
     scalar4 sample;          // x: width of a sample's share of a pixel, at distance 1
     uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;           // x: of a ray, at most
-    uint4 balls;             // x: of each apex; 0: there are none
+    uint4 cull_spheres;      // x: of each common_origin; 0: there are none
     uint4 counts[2];         // of each KIND_…, in its order
     uint4 bounded_counts[2]; // as many of them, from the first, hang in the hierarchy
 } SceneHeader;

@@ -7,6 +7,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/import/load.h"
 #include "host/scene/scene.h"
 
 #include <fcntl.h>

@@ -5,5 +5,5 @@
 python_with flint=python-flint==0.9.0
 write_tables() { "$python" -B tests/oracle/write_tables.py >"$scratch/tables.c"; }
 check "the oracle runs" write_tables
-check "host/measure/verify_tables.c is what it writes" diff "$scratch/tables.c" host/measure/verify_tables.c
+check "host/verify/tables.c is what it writes" diff "$scratch/tables.c" host/verify/tables.c
 finish

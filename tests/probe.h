@@ -71,8 +71,8 @@ static inline cl_program probe_program(const char *text, const char *prelude, co
 
 // Closest hits with every feature built in, so that one program serves all scenes. False where the device
 // cannot, after its reason is printed.
-static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const ProbeRay *rays,
-                               size_t count, ProbeHit *hits)
+static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const TraceRay *rays,
+                               size_t count, TraceHit *hits)
 {
     const RenderSettings settings = {.width = 1,
                                      .height = 1,

@@ -1,4 +1,5 @@
 #include "tests/scene_reading.h"
+#include "host/import/load.h"
 
 #include <math.h>
 #include <setjmp.h>

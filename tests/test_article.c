@@ -1,5 +1,6 @@
 // The faults of the article's own program. Each test writes out its formula, in float as its kernel has it,
 // shows that the answer is wrong by the reference, and holds glint to the right one on the same `.cfg` scene.
+#include "host/import/load.h"
 #include "tests/probe.h"
 #include "tests/reference.h"
 #include <setjmp.h>
@@ -82,11 +83,11 @@ static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
     ReferenceHit expected = reference_hit(scene, &ray);
     assert_true(expected.found);
 
-    const ProbeRay probe = {{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
+    const TraceRay probe = {{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
                             {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
                             0,
                             FLT_MAX};
-    ProbeHit hit = {0};
+    TraceHit hit = {0};
     assert_true(probe_trace(scene, PRECISION_SINGLE, 0, &probe, 1, &hit));
     assert_int_equal(hit.object, expected.object);
     assert_true(fabs((double)(hit.t - expected.t)) <= 8 * reference_ulp(expected.t, 24));

@@ -2,8 +2,8 @@
 // without them, as the hierarchy makes the difference): none that a line meets, or comes nearer to than a
 // shape's test may be off, is passed over, and those that it misses clearly are.
 #include "host/base/memory.h"
-#include "host/render/balls.h"
-#include "host/render/features.h"
+#include "host/compile/culling.h"
+#include "host/compile/features.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
 #include <float.h>
@@ -26,7 +26,7 @@ static const char kernel_text[] =
     "    Vector origin = {line[0], line[1], line[2]}, direction = {line[3], line[4], line[5]};\n"
     "    Ray ray = ray_make(origin, direction, 0, 1, mask_all());\n"
     "    ray_take_apex(&ray, apex);\n"
-    "    missed[i] = lanes_any(ray_misses_ball(&ray, &balls[i]));\n"
+    "    missed[i] = lanes_any(ray_misses_cull_sphere(&ray, &balls[i]));\n"
     "}\n";
 
 typedef struct {
@@ -35,8 +35,8 @@ typedef struct {
     Random random;
     double scale; // of all lengths but the eye's directions
     Vector3 apex;
-    FlatScene flat; // a light at the apex, and a sphere for each line
-    double *lines;  // origin and direction of each
+    CompiledScene flat; // a light at the apex, and a sphere for each line
+    double *lines;      // origin and direction of each
     int *missed;
     size_t met_count, missed_count, between_count;
 } Trial;
@@ -99,7 +99,7 @@ static void trial_open(Trial *trial, bool from_eye)
         (scalar4){trial->apex.x, trial->apex.y, trial->apex.z, 0};
     for (size_t i = 0; i < BALLS_PER_APEX; i++)
         line_make(trial, i, from_eye);
-    balls_lay(&trial->flat, trial->wide);
+    culling_fill(&trial->flat, trial->wide);
 }
 
 // What the device finds, with the arrays in its width.
@@ -113,11 +113,11 @@ static void trial_run(Trial *trial, cl_program program, uint32_t apex)
         else
             ((float *)(void *)lines)[i] = (float)trial->lines[i];
     }
-    const FlatArray *balls = &trial->flat.arrays[FLAT_BALLS];
+    const FlatArray *balls = &trial->flat.arrays[FLAT_CULL_SPHERES];
     const SceneHeader *header = trial->flat.arrays[FLAT_HEADER].items;
     // behind the hierarchy's own
-    FlatArray row = {flat_array_at(balls, (apex - APEX_EYE) * header->balls.x + 1), BALLS_PER_APEX,
-                     balls->layout};
+    FlatArray row = {flat_array_at(balls, (apex - COMMON_ORIGIN_EYE) * header->cull_spheres.x + 1),
+                     BALLS_PER_APEX, balls->layout};
     size_t row_size = flat_array_size(&row, trial->wide);
     void *row_bytes = memory_allocate(row_size, 1);
     flat_array_write(&row, trial->wide, row_bytes);
@@ -196,10 +196,10 @@ static void balls_check(bool wide, bool from_eye)
     trial.missed = memory_allocate(BALLS_PER_APEX, sizeof *trial.missed);
     for (size_t i = 0; i < APEX_COUNT; i++) {
         trial_open(&trial, from_eye);
-        trial_run(&trial, program, from_eye ? APEX_EYE : APEX_FIRST_LIGHT);
+        trial_run(&trial, program, from_eye ? COMMON_ORIGIN_EYE : COMMON_ORIGIN_FIRST_LIGHT);
         for (size_t k = 0; k < BALLS_PER_APEX; k++)
             line_judge(&trial, k, from_eye);
-        flat_scene_free(&trial.flat);
+        compiled_scene_free(&trial.flat);
     }
     // no answer was left out for being too near to call, but for few
     assert_true(trial.met_count > BALL_COUNT / 4);

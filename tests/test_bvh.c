@@ -2,7 +2,7 @@
 // leak. GLINT_LONG_TESTS=1 sends a million rays where this sends some ten thousand.
 #include "host/base/array.h"
 #include "host/base/memory.h"
-#include "host/render/bvh_widen.h"
+#include "host/compile/bvh_widen.h"
 #include "tests/probe.h"
 #include <math.h>
 #include <setjmp.h>
@@ -219,7 +219,7 @@ static void few_boxes_make_a_tree(void **state)
 // On and off
 
 static void trace_lanes(const Scene *scene, Precision precision, BvhChoice bvh, uint32_t lanes,
-                        const ProbeRay *rays, size_t count, ProbeHit *hits)
+                        const TraceRay *rays, size_t count, TraceHit *hits)
 {
     const RenderSettings settings = {.width = 1,
                                      .height = 1,
@@ -236,8 +236,8 @@ static void trace_lanes(const Scene *scene, Precision precision, BvhChoice bvh, 
     renderer_close(renderer);
 }
 
-static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const ProbeRay *rays, size_t count,
-                  ProbeHit *hits)
+static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const TraceRay *rays, size_t count,
+                  TraceHit *hits)
 {
     trace_lanes(scene, precision, bvh, 0, rays, count, hits);
 }
@@ -347,13 +347,13 @@ static Vector3 telling_point(const Scene *scene)
     }
 }
 
-static ProbeRay ray_of(Vector3 origin, Vector3 direction)
+static TraceRay ray_of(Vector3 origin, Vector3 direction)
 {
-    return (ProbeRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
 }
 
 // A quarter each: any, along an axis with components of exactly 0 or -0, at a telling point, from far away.
-static void rays_fill(ProbeRay *rays, size_t count, const Scene *scene)
+static void rays_fill(TraceRay *rays, size_t count, const Scene *scene)
 {
     for (size_t i = 0; i < count; i++) {
         Vector3 target = random_bits() & 1 ? telling_point(scene) : random_in_cube(10);
@@ -388,8 +388,8 @@ static void no_hit_depends_on_the_tree(void **state)
     size_t all_different = 0;
     Scene scene = random_scene(few_or_many(1000, 10000));
     size_t most = few_or_many(runs[0].few, runs[0].many);
-    ProbeRay *rays = memory_allocate(most, sizeof *rays);
-    ProbeHit *on = memory_allocate(most, sizeof *on), *off = memory_allocate(most, sizeof *off);
+    TraceRay *rays = memory_allocate(most, sizeof *rays);
+    TraceHit *on = memory_allocate(most, sizeof *on), *off = memory_allocate(most, sizeof *off);
     rays_fill(rays, most, &scene);
     for (size_t run = 0; run < sizeof runs / sizeof *runs; run++) {
         if (!probe_has(runs[run].precision)) continue;
@@ -401,7 +401,7 @@ static void no_hit_depends_on_the_tree(void **state)
                         (off[i].object == UINT32_MAX || memcmp(&on[i].t, &off[i].t, sizeof on[i].t) == 0);
             hit_count += off[i].object != UINT32_MAX;
             if (same || different++ >= 10) continue;
-            const ProbeRay *ray = &rays[i];
+            const TraceRay *ray = &rays[i];
             print_error(
                 "%s, ray %zu from %.9g %.9g %.9g along %.9g %.9g %.9g: object %d at %.17g with the tree, "
                 "%d (a %s) at %.17g without\n",
@@ -426,7 +426,7 @@ enum { PACKET = 16, PACKETS = 1000 };
 // In each packet nearly all rays look one way, all to the same sides, or three of four, or each its own way:
 // the walk goes by a beam, by two and what is left over, or ray by ray. Each ray begins to look where it
 // likes: behind its start, there, or ahead of it.
-static void rays_behind_fill(ProbeRay *rays, const Scene *scene)
+static void rays_behind_fill(TraceRay *rays, const Scene *scene)
 {
     static const double nears[] = {-30, -4, -1e-3, 0, 1};
     for (size_t packet = 0; packet < PACKETS; packet++) {
@@ -438,7 +438,7 @@ static void rays_behind_fill(ProbeRay *rays, const Scene *scene)
             bool goes_along = packet % 3 == 0 || (packet % 3 == 1 && lane % 4 != 0);
             Vector3 direction = random_direction();
             if (goes_along) direction = vector_add(ahead, vector_scale(direction, 0.03));
-            ProbeRay *ray = &rays[packet * PACKET + lane];
+            TraceRay *ray = &rays[packet * PACKET + lane];
             *ray = ray_of(vector_add(origin, random_in_cube(0.1)), direction);
             ray->tmin = nears[random_bits() % (looks_behind ? 3 : sizeof nears / sizeof *nears)];
             if (random_bits() & 1) ray->tmax = ray->tmin + random_between(1, 20);
@@ -446,7 +446,7 @@ static void rays_behind_fill(ProbeRay *rays, const Scene *scene)
     }
 }
 
-static size_t hits_differ(const ProbeRay *rays, const ProbeHit *hits, const ProbeHit *expected,
+static size_t hits_differ(const TraceRay *rays, const TraceHit *hits, const TraceHit *expected,
                           const char *what)
 {
     size_t different = 0;
@@ -471,8 +471,8 @@ static void rays_may_look_behind_their_start(void **state)
     Scene scene = random_scene(4000);
     const uint32_t plane = (uint32_t)scene.objects.count - 1;
     enum { COUNT = PACKETS * PACKET };
-    ProbeRay *rays = memory_allocate(COUNT, sizeof *rays);
-    ProbeHit *expected = memory_allocate(COUNT, sizeof *expected),
+    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
+    TraceHit *expected = memory_allocate(COUNT, sizeof *expected),
              *hits = memory_allocate(COUNT, sizeof *hits);
     rays_behind_fill(rays, &scene);
     static const Precision precisions[] = {PRECISION_SINGLE, PRECISION_DOUBLE};
@@ -571,7 +571,7 @@ static Scene closed_scene(Vector3 center, double radius)
 }
 
 // From inside, two fifths each at vertices and at edges, as the kernel's precision has them.
-static void rays_at_seams(ProbeRay *rays, size_t count, const Mesh *mesh, Vector3 center, bool wide)
+static void rays_at_seams(TraceRay *rays, size_t count, const Mesh *mesh, Vector3 center, bool wide)
 {
     for (size_t i = 0; i < count; i++) {
         const uint32_t *corners = mesh->triangles[random_bits() % mesh->triangle_count];
@@ -596,8 +596,8 @@ static void closed_meshes_do_not_leak(void **state)
     static const double radii[] = {1, 2};
     random_state = 31;
     size_t count = few_or_many(6000, 1000000), plain_count = few_or_many(320, 20000);
-    ProbeRay *rays = memory_allocate(count, sizeof *rays);
-    ProbeHit *hits = memory_allocate(count, sizeof *hits);
+    TraceRay *rays = memory_allocate(count, sizeof *rays);
+    TraceHit *hits = memory_allocate(count, sizeof *hits);
     for (size_t place = 0; place < 2; place++) {
         Scene scene = closed_scene(centers[place], radii[place]);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {

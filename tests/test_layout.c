@@ -2,9 +2,9 @@
 // members, as the device's compiler has them in float and in double, and their values after the host's
 // narrowing.
 #include "host/base/memory.h"
-#include "host/render/balls.h"
-#include "host/render/hierarchy.h"
-#include "host/render/textures.h"
+#include "host/compile/bvh_flatten.h"
+#include "host/compile/culling.h"
+#include "host/compile/textures.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
@@ -36,7 +36,7 @@ typedef struct {
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, balls)                       \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, cull_spheres)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[1])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounded_counts[0])           \
@@ -84,7 +84,7 @@ typedef struct {
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, first[0])                         \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, what[0])                          \
-    REALS(FLAT_BALLS, Ball, Ball, center_power)                                  \
+    REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
@@ -135,20 +135,20 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
 static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
 {
     Scene scene = scene_of_text("layout.yaml", scene_text);
-    FlatScene flat;
+    CompiledScene flat;
     const FlattenSettings settings = {
         .width = 1, .height = 1, .sample_count = 1, .shift_to_eye = true, .wide = wide};
     flatten(&flat, &scene, &settings);
     MessageList messages = {0};
-    assert_true(textures_hang(&flat, &scene, &settings, &messages));
+    assert_true(textures_load(&flat, &scene, &settings, &messages));
     message_list_free(&messages);
-    hierarchy_hang(&flat, 1);
-    balls_lay(&flat, wide);
+    bvh_flatten(&flat, 1);
+    culling_fill(&flat, wide);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         assert_true(flat.arrays[kind].count > 0);
         layouts[kind] = flat.arrays[kind].layout;
     }
-    flat_scene_free(&flat);
+    compiled_scene_free(&flat);
     scene_free(&scene);
 }
 

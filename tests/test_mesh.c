@@ -1,6 +1,6 @@
 // Meshes: what a file's triangles become, where they stand, what is refused, and which ids they get.
-#include "host/render/flatten.h"
-#include "host/scene/mesh.h"
+#include "host/compile/flatten.h"
+#include "host/import/mesh/mesh_import.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
@@ -510,7 +510,7 @@ static void ids_count_the_triangles(void **state)
                                    "  - mesh: {file: a.obj}\n"
                                    "  - triangle: {vertices: [[0, 0, 5], [1, 0, 5], [0, 1, 5]]}\n"
                                    "  - sphere: {center: [-9, 0, 0], radius: 1}\n");
-    FlatScene flat;
+    CompiledScene flat;
     flatten(&flat, &scene, &(FlattenSettings){.width = 1, .height = 1, .sample_count = 1});
     assert_int_equal(flat.arrays[FLAT_OBJECTS].count, 11);
     const ObjectEntry *entries = flat.arrays[FLAT_OBJECTS].items;
@@ -519,7 +519,7 @@ static void ids_count_the_triangles(void **state)
         assert_int_equal(entry.x, id == 0 || id == 10 ? KIND_SPHERES : KIND_TRIANGLES);
         assert_int_equal(flat_id(&flat.arrays[FLAT_FIRST_SHAPE + entry.x], entry.y), id);
     }
-    flat_scene_free(&flat);
+    compiled_scene_free(&flat);
     scene_free(&scene);
 }
 
@@ -527,13 +527,13 @@ enum { GRID = 64 };
 
 // Down on the unit square, from a little outside of it too, every other ray through a point of the line from
 // (0.1, 0.1, 1) to (0.7, 0.7, 1).
-static void rays_down(ProbeRay *rays)
+static void rays_down(TraceRay *rays)
 {
     for (size_t i = 0; i < GRID * GRID; i++) {
         size_t column = i % GRID, row = i / GRID;
         double x = (double)column / 50 - 0.125, y = (double)row / 50 - 0.125;
         double along = 0.1 + 0.6 * (double)i / (GRID * GRID);
-        rays[i] = (ProbeRay){{x, y, 4}, {0.0625, 0.03125, -1}, 0, INFINITY};
+        rays[i] = (TraceRay){{x, y, 4}, {0.0625, 0.03125, -1}, 0, INFINITY};
         if (i % 2 == 1) memcpy(rays[i].direction, (double[3]){along - x, along - y, -3}, sizeof(double[3]));
     }
 }
@@ -542,8 +542,8 @@ static void rays_down(ProbeRay *rays)
 static void triangles_without_area_are_never_hit(void **state)
 {
     (void)state;
-    static ProbeRay rays[GRID * GRID];
-    static ProbeHit clean[GRID * GRID], hits[GRID * GRID];
+    static TraceRay rays[GRID * GRID];
+    static TraceHit clean[GRID * GRID], hits[GRID * GRID];
     rays_down(rays);
     const char *objects = "  - mesh: {file: a.obj, material: {}}\n";
     static const char degenerate[] = "v 0.1 0.1 1\nv 0.7 0.7 1\nv 0.4 0.4 1\nv 0.25 0.25 1\n"

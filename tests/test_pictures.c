@@ -1,7 +1,8 @@
 // Pictures whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard
 // cases.
 #include "host/base/text.h"
-#include "host/render/camera_basis.h"
+#include "host/compile/camera_basis.h"
+#include "host/import/load.h"
 #include "tests/frame.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

@@ -1,5 +1,6 @@
 // Every scene in tests/broken gets exactly the messages beside it, and every message has such a scene.
 #include "host/base/array.h"
+#include "host/import/load.h"
 #include "tests/scene_reading.h"
 
 #include <ctype.h>

@@ -165,13 +165,13 @@ static void test_tolerated(void **state)
 
 static void check_sides(const char *shape, double reach, bool only_inside)
 {
-    const ProbeRay rays[] = {{{0, 0, -5}, {0, 0, 1}, 0, INFINITY}, {{0, 0, 0}, {0, 0, 1}, 0, INFINITY}};
+    const TraceRay rays[] = {{{0, 0, -5}, {0, 0, 1}, 0, INFINITY}, {{0, 0, 0}, {0, 0, 1}, 0, INFINITY}};
     Text text = {0};
     text_appendf(&text, LIT MATERIAL "%s\n", shape);
     Scene scene = scene_of_text("s.nff", text_c(&text));
     for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
         if (!probe_has(precision)) continue;
-        ProbeHit hits[2] = {0};
+        TraceHit hits[2] = {0};
         assert_true(probe_trace(&scene, precision, 0, rays, 2, hits));
         assert_int_equal(hits[0].object, 0);
         assert_true(fabs(hits[0].t - (only_inside ? 5 + reach : 5 - reach)) < 1e-5);

@@ -16,7 +16,7 @@ static const uint32_t lane_counts[] = {1, 4, 8, 16};
 typedef struct {
     Vector3 center;
     double reach;
-    ProbeRay rays[RAYS_PER_SPECIMEN];
+    TraceRay rays[RAYS_PER_SPECIMEN];
     ReferenceHit hits[RAYS_PER_SPECIMEN];
 } Trial;
 
@@ -66,10 +66,10 @@ static Vector3 vector_from(const double parts[3])
     return (Vector3){parts[0], parts[1], parts[2]};
 }
 
-static void compare(const Trial *trial, size_t index, const ProbeHit *hit, Precision precision, Tally *tally)
+static void compare(const Trial *trial, size_t index, const TraceHit *hit, Precision precision, Tally *tally)
 {
     const ReferenceHit *expected = &trial->hits[index];
-    const ProbeRay *ray = &trial->rays[index];
+    const TraceRay *ray = &trial->rays[index];
     const Tolerance *owed = &tolerances[precision];
     const int bits = bits_of(precision);
     const double u = ldexp(1, -bits);
@@ -131,7 +131,7 @@ static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size
                                 : reference_ray_rounded(given.origin, given.direction);
         // one in three looks behind its start, too
         if (i % 3 == 2) ray.tmin = -0x1p10;
-        trial->rays[i] = (ProbeRay){
+        trial->rays[i] = (TraceRay){
             {(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
             {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
             (double)ray.tmin,
@@ -144,7 +144,7 @@ static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size
 static void hold_at(const Trial *trial, const Scene *scene, Precision precision, uint32_t lanes,
                     const char *what)
 {
-    static ProbeHit hits[RAYS_PER_SPECIMEN];
+    static TraceHit hits[RAYS_PER_SPECIMEN];
     if (!probe_has(precision)) return;
     assert_true(probe_trace(scene, precision, lanes, trial->rays, RAYS_PER_SPECIMEN, hits));
     Tally tally = {0};
@@ -227,7 +227,7 @@ static void hits_from_beside_the_side(void **state)
     }
 }
 
-static bool same_bits(const ProbeHit *a, const ProbeHit *b)
+static bool same_bits(const TraceHit *a, const TraceHit *b)
 {
     return a->object == b->object &&
            (a->object == UINT32_MAX ||
@@ -238,7 +238,7 @@ static void gives_the_same_bits_at_every_width(void **state)
 {
     (void)state;
     static Trial trial;
-    static ProbeHit hits[2][RAYS_PER_SPECIMEN];
+    static TraceHit hits[2][RAYS_PER_SPECIMEN];
     Random random = {SPECIMEN_COUNT + 1};
     Specimen specimens[SPECIMEN_COUNT];
     Object objects[SPECIMEN_COUNT];
@@ -251,7 +251,7 @@ static void gives_the_same_bits_at_every_width(void **state)
     prepare(&trial, &scene, specimens, SPECIMEN_COUNT, false, false, &random);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         for (size_t width = 0; width < sizeof lane_counts / sizeof *lane_counts; width++) {
-            ProbeHit *seen = hits[width > 0];
+            TraceHit *seen = hits[width > 0];
             assert_true(
                 probe_trace(&scene, precision, lane_counts[width], trial.rays, RAYS_PER_SPECIMEN, seen));
             for (size_t i = 0; width > 0 && i < RAYS_PER_SPECIMEN; i++)

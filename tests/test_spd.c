@@ -1,7 +1,7 @@
 // The rays of the Standard Procedural Databases, counted and held to the published numbers (Haines, Standard
 // Procedural Databases 3.14, README, Database analysis): all classical ray tracers should be within 10%.
 // Skipped where the scenes are not there.
-#include "host/render/flat_types.h"
+#include "host/compile/flat_types.h"
 #include "tests/frame.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

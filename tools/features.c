@@ -1,6 +1,7 @@
 // What each part of the kernel costs a scene that has no use for it: a frame's and a build's processor time
 // with the kernel made for the scene's own features, then with one more, then with all. Prints a table in
 // Markdown.
+#include "host/import/load.h"
 #include "host/render/renderer.h"
 #include "host/scene/scene.h"
 #include <math.h>

@@ -3,8 +3,9 @@
 #include "host/base/json.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
-#include "host/render/features.h"
-#include "host/scene/report.h"
+#include "host/compile/features.h"
+#include "host/import/load.h"
+#include "host/import/report.h"
 #include <ctype.h>
 #include <errno.h>
 #include <getopt.h>

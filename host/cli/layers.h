@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/base/message.h"
-#include "host/measure/layers.h"
+#include "host/render/layers.h"
 #include "host/render/renderer.h"
 
 // Renders the whole picture into the arrays that are there; all must be but position and ray. False if the

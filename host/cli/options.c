@@ -1,4 +1,5 @@
 #include "host/cli/options.h"
+#include "host/import/load.h"
 
 #include "host/base/fault.h"
 #include "host/base/text.h"

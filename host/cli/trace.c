@@ -6,7 +6,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
-#include "host/scene/report.h"
+#include "host/import/report.h"
 #include <float.h>
 #include <getopt.h>
 #include <math.h>
@@ -42,7 +42,7 @@ typedef struct {
 } TraceOptions;
 
 typedef struct {
-    ProbeRay *items;
+    TraceRay *items;
     size_t count, capacity;
 } RayList;
 
@@ -108,7 +108,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
             }
         }
         if (count > 0) {
-            ProbeRay ray = {
+            TraceRay ray = {
                 {n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
             array_push(*rays, ray);
         }
@@ -131,7 +131,7 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
     return read;
 }
 
-static bool hits_write(const char *path, const ProbeHit *hits, size_t count, bool wide)
+static bool hits_write(const char *path, const TraceHit *hits, size_t count, bool wide)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -140,7 +140,7 @@ static bool hits_write(const char *path, const ProbeHit *hits, size_t count, boo
         int digits = wide ? 17 : 9;
         fputs("object,t,nx,ny,nz\n", output.file);
         for (size_t i = 0; i < count; i++) {
-            const ProbeHit *hit = &hits[i];
+            const TraceHit *hit = &hits[i];
             if (hit->object == UINT32_MAX)
                 fputs(",,,,\n", output.file);
             else
@@ -155,7 +155,7 @@ static bool hits_write(const char *path, const ProbeHit *hits, size_t count, boo
 
 // A ray in lengths of 2^exponent of its own: its direction's largest component lies within 0.5 and 1, so that
 // the square of its length neither vanishes nor overflows. Exact, and so are the answers.
-static ProbeRay ray_scaled(ProbeRay ray, double farthest, int *exponent)
+static TraceRay ray_scaled(TraceRay ray, double farthest, int *exponent)
 {
     double *d = ray.direction;
     frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
@@ -173,8 +173,8 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     messages_tell(&messages, NULL);
     if (!renderer) return EXIT_USER;
-    ProbeRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
-    ProbeHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
+    TraceRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
+    TraceHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
     int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
     double farthest = farthest_of(options->common.precision);
     for (size_t i = 0; i < rays->count; i++)

@@ -1,5 +1,5 @@
 // glint verify: the hard cases on a device, one line each.
-#include "host/measure/verify.h"
+#include "host/verify/verify.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
@@ -9,7 +9,7 @@
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
-#include "host/render/camera_basis.h"
+#include "host/compile/camera_basis.h"
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
@@ -90,7 +90,7 @@ static void *prober_open(void *context, const Scene *scene, bool hierarchy)
     return opened;
 }
 
-static void prober_trace(void *opened, const ProbeRay *rays, size_t count, ProbeHit *hits)
+static void prober_trace(void *opened, const TraceRay *rays, size_t count, TraceHit *hits)
 {
     const OpenScene *scene = opened;
     renderer_trace(scene->renderer, rays, count, hits);

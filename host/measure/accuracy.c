@@ -1,7 +1,7 @@
 #include "host/measure/accuracy.h"
 
 #include "host/base/memory.h"
-#include "host/measure/percentile.h"
+#include "host/base/percentile.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>

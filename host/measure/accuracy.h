@@ -5,7 +5,7 @@
 
 #include "host/measure/bench.h"
 #include "host/measure/image_metrics.h"
-#include "host/measure/layers.h"
+#include "host/render/layers.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>

@@ -1,12 +1,12 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
-#include "host/render/balls.h"
-#include "host/render/contact.h"
-#include "host/render/hierarchy.h"
+#include "host/compile/bvh_flatten.h"
+#include "host/compile/contact.h"
+#include "host/compile/culling.h"
+#include "host/compile/textures.h"
 #include "host/render/renderer_state.h"
-#include "host/render/textures.h"
-#include "host/scene/scene_change.h"
+#include "host/scene/transform.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,7 +75,7 @@ static bool array_is_finite(const FlatArray *array, bool wide)
     return true;
 }
 
-static bool scene_fits(const FlatScene *flat, const Renderer *renderer, MessageList *messages)
+static bool scene_fits(const CompiledScene *flat, const Renderer *renderer, MessageList *messages)
 {
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         if (array_is_finite(&flat->arrays[kind], renderer->report.wide)) continue;
@@ -133,7 +133,7 @@ static bool lights_are_near_enough(const Scene *scene, const Renderer *renderer,
 }
 
 // Whether the device has room for the arrays, as far as it says.
-static bool device_has_room(const FlatScene *flat, const Renderer *renderer, MessageList *messages)
+static bool device_has_room(const CompiledScene *flat, const Renderer *renderer, MessageList *messages)
 {
     const Device *device = renderer->compute->device;
     size_t sum = 0, largest = 0;
@@ -153,7 +153,7 @@ static bool device_has_room(const FlatScene *flat, const Renderer *renderer, Mes
 }
 
 // Frees each array of the host as it goes, so that no two copies of all of them exist.
-static void upload(Renderer *renderer, FlatScene *flat)
+static void upload(Renderer *renderer, CompiledScene *flat)
 {
     bool wide = renderer->report.wide;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
@@ -198,7 +198,7 @@ static void prelude_write(Renderer *renderer)
 
 // Makes the flat arrays, in the scene's unit, and the renderer's unit; false, without arrays, on a user's
 // fault.
-static bool scene_lay(FlatScene *flat, const Scene *scene, Renderer *renderer, MessageList *messages)
+static bool scene_lay(CompiledScene *flat, const Scene *scene, Renderer *renderer, MessageList *messages)
 {
     const RenderSettings *settings = &renderer->settings;
     double start = clock_seconds();
@@ -214,9 +214,9 @@ static bool scene_lay(FlatScene *flat, const Scene *scene, Renderer *renderer, M
                                             settings->sample_count, settings->bounce_count,
                                             settings->shift_to_eye, renderer->report.wide};
         flatten(flat, scene, &flattening);
-        whole = textures_hang(flat, scene, &flattening, messages) && scene_fits(flat, renderer, messages);
-        if (whole && renderer->report.features & FEATURE_TRANSMISSION) contact_mark(flat);
-        if (!whole) flat_scene_free(flat);
+        whole = textures_load(flat, scene, &flattening, messages) && scene_fits(flat, renderer, messages);
+        if (whole && renderer->report.features & FEATURE_TRANSMISSION) contact_find(flat);
+        if (!whole) compiled_scene_free(flat);
     }
     scene_scaled_free(&scaled);
     renderer->report.flatten_seconds = clock_seconds() - start;
@@ -238,31 +238,31 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     report->features = features_of(scene) | settings->extra_features;
     report->build_from_cache = true;
 
-    FlatScene flat;
+    CompiledScene flat;
     if (!scene_lay(&flat, scene, renderer, messages)) {
         free(renderer);
         return NULL;
     }
-    size_t bounded_count = hierarchy_bounded_count(&flat);
+    size_t bounded_count = bounded_primitive_count(&flat);
     bool hangs = settings->bvh == BVH_ON || (settings->bvh == BVH_AUTO && bounded_count >= BVH_WORTHWHILE);
     if (hangs && bounded_count > 0) {
         double start = clock_seconds();
-        hierarchy_hang(&flat, report->lanes);
+        bvh_flatten(&flat, report->lanes);
         report->features |= FEATURE_BVH;
         report->bvh_seconds = clock_seconds() - start;
     }
     double start = clock_seconds();
-    balls_lay(&flat, report->wide);
+    culling_fill(&flat, report->wide);
     report->flatten_seconds += clock_seconds() - start;
     if (!device_has_room(&flat, renderer, messages)) {
-        flat_scene_free(&flat);
+        compiled_scene_free(&flat);
         free(renderer);
         return NULL;
     }
     start = clock_seconds();
     upload(renderer, &flat);
     report->upload_seconds = clock_seconds() - start;
-    flat_scene_free(&flat);
+    compiled_scene_free(&flat);
     prelude_write(renderer);
     return renderer;
 }

@@ -2,9 +2,9 @@
 // The only room that joins scene and opencl.
 #pragma once
 
+#include "host/compile/features.h"
 #include "host/opencl/compute.h"
-#include "host/render/features.h"
-#include "host/scene/probe.h"
+#include "host/render/trace.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
 #include <stdint.h>
@@ -42,7 +42,7 @@ typedef struct {
     uint32_t lanes; // 1, 4, 8, 16; 0: the device's own choice
     BvhChoice bvh;
     bool counting;             // count rays by kind, with a build of its own: never time such a run
-    uint32_t perturb_seed;     // not 0: a build that errs as devices may (kernels/perturb.h)
+    uint32_t perturb_seed;     // not 0: a build that errs as devices may (kernels/numerics/perturb.h)
     uint32_t perturb_scale;    // times as much, at most PERTURB_SCALE_LARGEST; 0: once
     FeatureSet extra_features; // built in though the scene does not need them, for tests
     bool shift_to_eye;         // true for pictures; false for probes: rays and scene as they are
@@ -83,8 +83,8 @@ typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
 // Renders the region in bands of about band_seconds each. False if the sink stopped it.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
-// Closest hits of explicit rays (host/scene/probe.h), by the same intersection code that renders.
-void renderer_trace(Renderer *renderer, const ProbeRay *rays, size_t ray_count, ProbeHit *hits);
+// Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders.
+void renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
 
 // A kernel's launch, or a transfer.
 typedef struct {

@@ -28,7 +28,7 @@ static inline Bounds bounds_join(Bounds a, Bounds b)
 }
 
 // What both hold; empty where they are apart.
-static inline Bounds bounds_meet(Bounds a, Bounds b)
+static inline Bounds bounds_intersect(Bounds a, Bounds b)
 {
     Bounds both = {vector_max(a.min, b.min), vector_min(a.max, b.max)};
     bool apart = both.min.x > both.max.x || both.min.y > both.max.y || both.min.z > both.max.z;

@@ -1,13 +1,10 @@
 #include "host/scene/scene.h"
 #include "host/base/array.h"
 #include "host/base/memory.h"
-#include "host/base/text.h"
 #include "host/scene/mesh.h"
-#include "host/scene/scene_build.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 const char *const shape_names[SHAPE_COUNT] = {
@@ -38,19 +35,6 @@ void scene_add_object(Scene *scene, Object object, const Material *material)
 {
     object.material = scene_add_material(scene, material, "");
     array_push(scene->objects, object);
-}
-
-bool scene_finish(Scene *scene, Report *report)
-{
-    if (!report_close(report)) {
-        scene_free(scene);
-        return false;
-    }
-    if (!scene->objects.count)
-        message_add(report->messages, MESSAGE_WARNING, "%s: no objects", report->source->file);
-    if (!scene->lights.count)
-        message_add(report->messages, MESSAGE_WARNING, "%s: no lights", report->source->file);
-    return true;
 }
 
 size_t object_primitive_count(const Scene *scene, const Object *object)
@@ -107,40 +91,4 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
     for (size_t i = 0; i < scene->meshes.count && !is_read; i++)
         is_read = is_same_file(scene->meshes.items[i].path, &status);
     return is_read;
-}
-
-static bool ends_with(const char *path, const char *ending)
-{
-    size_t length = strlen(path), ending_length = strlen(ending);
-    return length > ending_length && !strcasecmp(path + length - ending_length, ending);
-}
-
-static bool scene_read(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
-{
-    if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
-    if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
-    if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
-    return scene_read_yaml(scene, source, messages);
-}
-
-bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
-{
-    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg", ".nff"};
-    *scene = (Scene){0};
-    bool is_known = false;
-    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
-        is_known |= ends_with(path, endings[i]);
-    if (!is_known) {
-        message_add(messages, MESSAGE_ERROR, "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff",
-                    path);
-        return false;
-    }
-    Text text = {0};
-    bool read = text_read_file(&text, path, messages);
-    if (read) {
-        Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
-        read = scene_read(scene, &source, options, messages);
-    }
-    text_free(&text);
-    return read;
 }

@@ -166,20 +166,13 @@ typedef struct {
     unsigned width, height; // the file's own picture size, or 0
 } Scene;
 
-typedef struct {
-    bool lenient; // skip unknown elements of .rt with a warning
-} SceneOptions;
-
-// Reads a scene; the format follows from the name's ending (.yaml .yml .rt .cfg .nff). On a user's fault
-// returns false with the errors in `messages` and an empty scene; warnings may be there either way.
-bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 void scene_free(Scene *scene); // and zeroes
 
-// The readers, from memory. `source->file` is used in messages only.
-bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
-bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
-bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
-bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
+// Returns the material's index.
+uint32_t scene_add_material(Scene *scene, const Material *material, const char *name);
+
+// Adds an object with a material of its own.
+void scene_add_object(Scene *scene, Object object, const Material *material);
 
 // Of a scene that has images.
 Source scene_source(const Scene *scene);

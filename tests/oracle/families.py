@@ -1,4 +1,4 @@
-"""The random rays and meshes of host/measure/verify_families.c, by the same operations in the same order: only + - * /
+"""The random rays and meshes of host/verify/families.c, by the same operations in the same order: only + - * /
 and sqrt, which are correctly rounded in C and here."""
 
 import struct

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the oracle of glint verify's pictures (host/measure/verify_exact.c, in long double) and the pictures themselves
+"""Holds the oracle of glint verify's pictures (host/verify/exact.c, in long double) and the pictures themselves
 to the exact oracle.
 
 usage: overheard.py OVERHEAR FOLDER [--long] [--spoil PART]

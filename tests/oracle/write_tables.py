@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes host/measure/verify_tables.c: what the probe cases ask and what the exact answers are."""
+"""Writes host/verify/tables.c: what the probe cases ask and what the exact answers are."""
 
 import struct
 import sys
@@ -209,7 +209,7 @@ def plain(number):
 
 def write(out):
     out.write("// Written by tests/oracle/write_tables.py; do not edit.\n")
-    out.write('#include "host/measure/verify_tables.h"\n\n#include <math.h>\n\n// clang-format off\n')
+    out.write('#include "host/verify/tables.h"\n\n#include <math.h>\n\n// clang-format off\n')
     rows = []
     for number, set_ in enumerate(SETS):
         name = f"{set_.case.lower()}_{number}"

@@ -41,9 +41,9 @@ typedef struct {
 
 // Rays of one rung at one specimen, and what they should meet.
 typedef struct {
-    ProbeRay *rays;
+    TraceRay *rays;
     ReferenceHit *hits;
-    ProbeHit *answers;
+    TraceHit *answers;
     size_t count;
 } Rays;
 
@@ -100,14 +100,14 @@ static void rays_free(Rays *rays)
 static Rays rays_make(const Object *object, const Specimen *specimen, double rung, size_t count, bool wide,
                       Random *random)
 {
-    Rays rays = {memory_allocate(count + 1, sizeof(ProbeRay)),
+    Rays rays = {memory_allocate(count + 1, sizeof(TraceRay)),
                  memory_allocate(count + 1, sizeof(ReferenceHit)),
-                 memory_allocate(count + 1, sizeof(ProbeHit)), count};
+                 memory_allocate(count + 1, sizeof(TraceHit)), count};
     for (size_t i = 0; i < count; i++) {
         SpecimenRay given = ladder_ray(specimen, rung, random);
         ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
                                 : reference_ray_rounded(given.origin, given.direction);
-        rays.rays[i] = (ProbeRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
+        rays.rays[i] = (TraceRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
                                   {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
                                   (double)ray.tmin,
                                   (double)ray.tmax};
@@ -147,7 +147,7 @@ static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision pre
 static void tally_add(Tally *tally, const Specimen *specimen, const Rays *rays, size_t i, Precision precision)
 {
     const ReferenceHit *expected = &rays->hits[i];
-    const ProbeHit *hit = &rays->answers[i];
+    const TraceHit *hit = &rays->answers[i];
     const Tier *tier = &tiers[precision];
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
@@ -187,7 +187,7 @@ static void numbers_write(Json *json, const char *key, const double *numbers, si
 // For tools/numerics/certify: a ray, the shape by numbers, and the reference's t as the sum of two doubles.
 static void sample_write(Json *json, const char *shape, const Object *object, const Rays *rays, size_t i)
 {
-    const ProbeRay *ray = &rays->rays[i];
+    const TraceRay *ray = &rays->rays[i];
     const ReferenceHit *hit = &rays->hits[i];
     json_begin_object(json, NULL);
     json_text(json, "shape", shape);
@@ -246,13 +246,13 @@ static double test_seconds(Compute *compute, const Specimen *specimen, Precision
 {
     bool wide = precision == PRECISION_DOUBLE;
     Object object = wide ? specimen->object : reference_round_object(&specimen->object);
-    Rays all = {memory_allocate(TIMED_RAYS, sizeof(ProbeRay)), NULL,
-                memory_allocate(TIMED_RAYS, sizeof(ProbeHit)), 0};
+    Rays all = {memory_allocate(TIMED_RAYS, sizeof(TraceRay)), NULL,
+                memory_allocate(TIMED_RAYS, sizeof(TraceHit)), 0};
     Random random = {2};
     for (int rung = 0; rung < RUNG_COUNT; rung++)
         for (int i = 0; i < TIMED_RAYS / RUNG_COUNT; i++) {
             SpecimenRay ray = ladder_ray(specimen, rungs[rung], &random);
-            all.rays[all.count++] = (ProbeRay){{ray.origin.x, ray.origin.y, ray.origin.z},
+            all.rays[all.count++] = (TraceRay){{ray.origin.x, ray.origin.y, ray.origin.z},
                                                {ray.direction.x, ray.direction.y, ray.direction.z},
                                                0,
                                                (double)FLT_MAX};

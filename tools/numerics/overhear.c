@@ -1,5 +1,5 @@
 // glint verify with its oracle overheard: runs one hard case as the program does and writes, as JSON, a
-// sample of what the oracle of the pictures (host/measure/verify_exact.c) was asked and answered, and of the
+// sample of what the oracle of the pictures (host/verify/exact.c) was asked and answered, and of the
 // pictures' pixels with the scene that they are of. tests/oracle/overheard.py holds both to the exact oracle.
 //
 //     overhear OUT.json EVERY PIXELS CASE --precision P
@@ -9,7 +9,7 @@
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/cli/commands.h"
-#include "host/measure/verify_exact.h"
+#include "host/verify/exact.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -25,10 +25,10 @@ ExactHit __real_exact_torus(LongVector center, Long major, Long minor, LongVecto
 ExactHit __wrap_exact_torus(LongVector center, Long major, Long minor, LongVector direction);
 Long __real_exact_highlight(LongVector normal, LongVector to_light, LongVector ray, double power);
 Long __wrap_exact_highlight(LongVector normal, LongVector to_light, LongVector ray, double power);
-void __real_exact_judge_surface(VerifyRun *run, const Object *object, const ProbeRay *ray,
-                                const ProbeHit *hit);
-void __wrap_exact_judge_surface(VerifyRun *run, const Object *object, const ProbeRay *ray,
-                                const ProbeHit *hit);
+void __real_exact_judge_surface(VerifyRun *run, const Object *object, const TraceRay *ray,
+                                const TraceHit *hit);
+void __wrap_exact_judge_surface(VerifyRun *run, const Object *object, const TraceRay *ray,
+                                const TraceHit *hit);
 PictureLayers __real_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
                                    uint32_t height);
 PictureLayers __wrap_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
@@ -277,8 +277,8 @@ static void object_write(const char *key, const Object *object, const Material *
     json_end(json);
 }
 
-void __wrap_exact_judge_surface(VerifyRun *run, const Object *object, const ProbeRay *ray,
-                                const ProbeHit *hit)
+void __wrap_exact_judge_surface(VerifyRun *run, const Object *object, const TraceRay *ray,
+                                const TraceHit *hit)
 {
     __real_exact_judge_surface(run, object, ray, hit);
     if (!is_taken(false)) return;

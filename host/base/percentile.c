@@ -1,0 +1,38 @@
+#include "host/base/percentile.h"
+
+#include "host/base/memory.h"
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The value at `rank` (from 0) of the sorted magnitudes. The bits of floats that are not negative order them:
+// first the upper half of the bits is found by counting, then the lower among those that share it.
+static float rank_select(const float *magnitudes, size_t count, size_t rank)
+{
+    size_t *counts = memory_allocate(1u << 16, sizeof *counts);
+    uint32_t found = 0;
+    for (unsigned shift = 16;; shift = 0) {
+        memset(counts, 0, (1u << 16) * sizeof *counts);
+        for (size_t i = 0; i < count; i++) {
+            uint32_t bits;
+            memcpy(&bits, &magnitudes[i], sizeof bits);
+            if (shift == 16 || bits >> 16 == found >> 16) counts[bits >> shift & 0xffff]++;
+        }
+        uint32_t half = 0;
+        for (; rank >= counts[half]; half++)
+            rank -= counts[half];
+        found |= half << shift;
+        if (shift == 0) break;
+    }
+    free(counts);
+    float value;
+    memcpy(&value, &found, sizeof value);
+    return value;
+}
+
+double percentile_999(const float *magnitudes, size_t count)
+{
+    if (count == 0) return 0;
+    return (double)rank_select(magnitudes, count, (size_t)ceil(0.999 * (double)count) - 1);
+}

@@ -1,0 +1,242 @@
+#include "host/compile/bvh_flatten.h"
+
+#include "host/base/memory.h"
+#include "host/compile/bvh_widen.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool revolution_box(const Revolution *shape, Bounds *box)
+{
+    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
+    Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
+    double length = shape->range.y, radius = shape->base_radius.w / length;
+    double height = shape->range.x / shape->range.z; // in units of the stored axis
+    double end_radius = radius + shape->axis_slope.w * height * length;
+    Vector3 reach = circle_reach(vector_scale(axis, 1 / length));
+    *box = bounds_join(
+        bounds_around(base, vector_scale(reach, fabs(radius))),
+        bounds_around(vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius))));
+    return true;
+}
+
+bool primitive_box(size_t kind, const void *primitive, Bounds *box)
+{
+    switch (kind) {
+    case KIND_SPHERES: {
+        const Sphere *sphere = primitive;
+        *box = bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
+        return true;
+    }
+    case KIND_DISCS: {
+        const Disc *disc = primitive;
+        *box = bounds_around(vector3_of(&disc->center_radius), vector_all(disc->center_radius.w));
+        return true;
+    }
+    case KIND_BOXES: {
+        const Box *shape = primitive;
+        *box = (Bounds){vector3_of(&shape->low), vector3_of(&shape->high)};
+        return true;
+    }
+    case KIND_CYLINDERS:
+    case KIND_CONES:
+        return revolution_box(primitive, box);
+    case KIND_TRIANGLES: {
+        const Triangle *triangle = primitive;
+        *box =
+            bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
+        return true;
+    }
+    case KIND_TORI: {
+        const Torus *torus = primitive;
+        Vector3 reach = vector_scale(circle_reach(vector3_of(&torus->axis_minor)), torus->center_major.w);
+        *box = bounds_around(vector3_of(&torus->center_major),
+                             vector_add(reach, vector_all(torus->axis_minor.w)));
+        return true;
+    }
+    default:
+        return false;
+    }
+}
+
+// The bounded primitives on their way into the tree.
+typedef struct {
+    Bounds *boxes;
+    uint8_t *kinds;
+    uint32_t *places; // in their shapes' arrays
+    size_t count;
+    size_t kind_counts[KIND_COUNT];
+} Bounded;
+
+static void bounded_collect(Bounded *bounded, const CompiledScene *flat)
+{
+    size_t capacity = 0;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        capacity += flat->arrays[FLAT_FIRST_SHAPE + kind].count;
+    *bounded = (Bounded){
+        .boxes = memory_allocate(capacity + 1, sizeof(Bounds)),
+        .kinds = memory_allocate(capacity + 1, 1),
+        .places = memory_allocate(capacity + 1, sizeof(uint32_t)),
+    };
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        for (size_t i = 0; i < array->count; i++) {
+            if (!primitive_box(kind, flat_array_at(array, i), &bounded->boxes[bounded->count])) continue;
+            bounded->kinds[bounded->count] = (uint8_t)kind;
+            bounded->places[bounded->count++] = (uint32_t)i;
+            bounded->kind_counts[kind]++;
+        }
+    }
+}
+
+static void bounded_free(Bounded *bounded)
+{
+    free(bounded->boxes);
+    free(bounded->kinds);
+    free(bounded->places);
+}
+
+// Where each primitive of the tree's order stands in its shape's new array.
+static uint32_t *order_in_kinds(const Bvh *bvh, const Bounded *bounded)
+{
+    uint32_t *order = memory_allocate(bvh->primitive_count + 1, sizeof *order);
+    uint32_t counts[KIND_COUNT] = {0};
+    for (size_t i = 0; i < bvh->primitive_count; i++)
+        order[i] = counts[bounded->kinds[bvh->order[i]]]++;
+    return order;
+}
+
+// Brings what stands at from[i] to i, cycle by cycle in place, which spares a second array; `from` is used
+// up.
+static void array_permute(FlatArray *array, uint32_t *from)
+{
+    size_t size = array->layout.size;
+    void *first = memory_allocate(1, size);
+    for (uint32_t i = 0; i < array->count; i++) {
+        if (from[i] == i) continue;
+        memcpy(first, flat_array_at(array, i), size);
+        uint32_t place = i;
+        while (from[place] != i) {
+            uint32_t next = from[place];
+            memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
+            from[place] = place;
+            place = next;
+        }
+        memcpy(flat_array_at(array, place), first, size);
+        from[place] = place;
+    }
+    free(first);
+}
+
+// Moves a shape's primitives into the leaves' order, the unbounded behind them, and tells the objects.
+static void array_reorder(CompiledScene *flat, size_t kind, const Bvh *bvh, const Bounded *bounded)
+{
+    FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+    if (array->count == 0) return;
+    uint32_t *from = memory_allocate(array->count, sizeof *from);
+    size_t count = 0;
+    for (size_t i = 0; i < bvh->primitive_count; i++)
+        if (bounded->kinds[bvh->order[i]] == kind) from[count++] = bounded->places[bvh->order[i]];
+    Bounds box;
+    for (size_t i = 0; count < array->count; i++)
+        if (!primitive_box(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
+    array_permute(array, from);
+    free(from);
+    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
+    for (size_t i = 0; i < array->count; i++)
+        entries[flat_id(array, i)].kind_index_material.y = (uint32_t)i;
+}
+
+// Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
+// primitives there: the rest of an empty place is 0.
+static Bounds empty_place(const Bounds *bounds)
+{
+    Vector3 extent = vector_subtract(bounds->max, bounds->min);
+    return (Bounds){vector_add(bounds->max, extent), vector_subtract(bounds->min, extent)};
+}
+
+static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
+                       const Bounds *empty, unsigned width, void *node)
+{
+    double *planes = node;
+    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *what = first + width;
+    uint32_t next_node = wide->first_node;
+    for (unsigned i = 0; i < width; i++) {
+        const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
+        const Bounds *box = child ? &child->box : empty;
+        const double low[3] = {box->min.x, box->min.y, box->min.z};
+        const double high[3] = {box->max.x, box->max.y, box->max.z};
+        for (unsigned axis = 0; axis < 3; axis++) {
+            planes[(BVH_LOW + axis) * width + i] = low[axis];
+            planes[(BVH_HIGH + axis) * width + i] = high[axis];
+        }
+        if (child && child->count > 0) {
+            first[i] = order[child->first];
+            what[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+        } else if (child) {
+            first[i] = next_node++;
+            what[i] = BVH_NODE;
+        }
+    }
+}
+
+static void nodes_write(CompiledScene *flat, const Bvh *bvh, const Bounded *bounded, unsigned width)
+{
+    BvhWide wide;
+    bvh_widen(&wide, bvh, width);
+    FlatArray *nodes = &flat->arrays[FLAT_NODES];
+    free(nodes->items);
+    *nodes = flat_nodes_make(wide.node_count, width);
+    uint32_t *order = order_in_kinds(bvh, bounded);
+    const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
+    for (size_t i = 0; i < wide.node_count; i++)
+        node_write(&wide.nodes[i], bvh, bounded, order, &empty, width, flat_array_at(nodes, i));
+    free(order);
+    bvh_wide_free(&wide);
+}
+
+static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *bounded)
+{
+    uint32_t counts[4 * sizeof header->bounded_counts / sizeof *header->bounded_counts] = {0};
+    _Static_assert(KIND_COUNT <= sizeof counts / sizeof *counts, "a kind without a place in SceneHeader");
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        counts[kind] = (uint32_t)bounded->kind_counts[kind];
+    memcpy(header->bounded_counts, counts, sizeof counts);
+    const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]);
+    Vector3 low = bounds.min, high = bounds.max;
+    Vector3 half_low = vector_scale(low, 0.5), half_high = vector_scale(high, 0.5);
+    Vector3 center = vector_add(half_low, half_high), reach = vector_subtract(half_high, half_low);
+    header->bounds = (scalar4){center.x, center.y, center.z, reach.x + reach.y + reach.z};
+    header->bounds_low = (scalar4){low.x, low.y, low.z, 0};
+    header->bounds_high = (scalar4){high.x, high.y, high.z, 0};
+}
+
+void bvh_flatten(CompiledScene *flat, unsigned lanes)
+{
+    Bounded bounded;
+    bounded_collect(&bounded, flat);
+    if (bounded.count > 0) {
+        Bvh bvh;
+        bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
+        free(bounded.boxes);
+        bounded.boxes = NULL;
+        nodes_write(flat, &bvh, &bounded, lanes < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : lanes);
+        for (size_t kind = 0; kind < KIND_COUNT; kind++)
+            array_reorder(flat, kind, &bvh, &bounded);
+        header_note(flat->arrays[FLAT_HEADER].items, &bvh, &bounded);
+        bvh_free(&bvh);
+    }
+    bounded_free(&bounded);
+}
+
+size_t bounded_primitive_count(const CompiledScene *flat)
+{
+    size_t count = 0;
+    Bounds box;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        for (size_t i = 0; i < array->count; i++)
+            count += primitive_box(kind, flat_array_at(array, i), &box);
+    }
+    return count;
+}

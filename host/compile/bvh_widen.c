@@ -1,0 +1,174 @@
+#include "host/compile/bvh_widen.h"
+
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Costs relative to each other: a node's boxes held against a beam all at once, one of them met and its turn
+// come, one primitive tested. (Found by trying: a test costs less than its arithmetic, which fills the
+// processor's waiting.)
+static const double wide_node_cost = 1, wide_box_cost = 1, wide_test_cost = 0.4;
+
+// What takes one place where it might take several costs something even where its area is nothing: this
+// decides ties, and vanishes beside other costs, which are of the order of 1.
+static const float tie_cost = 0x1p-40f;
+
+// The least cost where a subtree may take 1 .. width places in the wide node above it; entry 0 is unused. In
+// one place it is a wide node of its own, or a leaf.
+typedef float Costs[BVH_WIDTH_LARGEST + 1];
+
+typedef struct {
+    Costs costs;           // beyond leaves_cost
+    float leaves_cost;     // of the binary tree's leaves
+    uint32_t first, count; // its primitives; count 0: more, or of more kinds, than a leaf may hold
+    bool is_leaf;          // rather than a wide node
+} Subtree;
+
+typedef struct {
+    const Bvh *bvh;
+    Subtree *subtrees; // of the binary nodes
+    double scale;      // of areas
+    unsigned width;
+} Widening;
+
+static bool child_is_empty(const BvhChild *child)
+{
+    return bounds_is_empty(&child->box);
+}
+
+static bool child_is_node(const BvhChild *child)
+{
+    return child->count == 0 && !child_is_empty(child);
+}
+
+static float leaf_cost(const Widening *widening, double half_area, uint32_t count)
+{
+    return (float)(half_area * widening->scale * (wide_box_cost + wide_test_cost * count));
+}
+
+static Subtree child_subtree(const Widening *widening, const BvhChild *child)
+{
+    if (child_is_node(child)) return widening->subtrees[child->first];
+    Subtree leaf = {.first = child->first, .count = child->count};
+    if (!child_is_empty(child))
+        leaf.leaves_cost = leaf_cost(widening, bounds_half_area(child->box), child->count);
+    return leaf;
+}
+
+// How many of the places the first of two children best takes.
+static unsigned places_share(const float *first, const float *second, unsigned places)
+{
+    unsigned best = 1;
+    for (unsigned k = 2; k < places; k++)
+        if (first[k] + second[places - k] < first[best] + second[places - best]) best = k;
+    return best;
+}
+
+// Both sides' primitives, where they make one leaf.
+static void subtree_count(const Widening *widening, const Subtree *first, const Subtree *second,
+                          Subtree *subtree)
+{
+    const uint8_t *kinds = widening->bvh->kinds;
+    bool joins = first->count > 0 && second->count > 0 && first->count + second->count <= BVH_LEAF_LARGEST &&
+                 kinds[first->first] == kinds[second->first];
+    subtree->first = first->first < second->first ? first->first : second->first;
+    subtree->count = joins ? first->count + second->count : 0;
+}
+
+// From the leaves up: children come after their parent.
+static void costs_find(Widening *widening)
+{
+    const Bvh *bvh = widening->bvh;
+    for (size_t i = bvh->node_count; i-- > 0;) {
+        const BvhNodeBuild *node = &bvh->nodes[i];
+        Subtree first = child_subtree(widening, &node->children[0]);
+        Subtree second = child_subtree(widening, &node->children[1]);
+        Subtree subtree = {.leaves_cost = first.leaves_cost + second.leaves_cost};
+        subtree_count(widening, &first, &second, &subtree);
+        for (unsigned places = 2; places <= widening->width; places++) {
+            unsigned share = places_share(first.costs, second.costs, places);
+            subtree.costs[places] = first.costs[share] + second.costs[places - share];
+        }
+        double half_area = bounds_half_area(bvh_node_bounds(node));
+        float as_node = subtree.costs[widening->width] +
+                        (float)(half_area * widening->scale * (wide_node_cost + wide_box_cost));
+        float as_leaf = leaf_cost(widening, half_area, subtree.count) - subtree.leaves_cost;
+        subtree.is_leaf = subtree.count > 0 && as_leaf < as_node;
+        subtree.costs[1] = (subtree.is_leaf ? as_leaf : as_node) + tie_cost;
+        for (unsigned places = 2; places <= widening->width; places++)
+            subtree.costs[places] = fminf(subtree.costs[places], subtree.costs[1]);
+        widening->subtrees[i] = subtree;
+    }
+}
+
+static void child_gather(const Widening *widening, const BvhChild *child, unsigned places, BvhWide *wide,
+                         BvhWideNode *node);
+
+static void children_gather(const Widening *widening, uint32_t index, unsigned places, BvhWide *wide,
+                            BvhWideNode *node)
+{
+    const BvhChild *children = widening->bvh->nodes[index].children;
+    Subtree first = child_subtree(widening, &children[0]), second = child_subtree(widening, &children[1]);
+    unsigned share = places_share(first.costs, second.costs, places);
+    child_gather(widening, &children[0], share, wide, node);
+    child_gather(widening, &children[1], places - share, wide, node);
+}
+
+static void child_gather(const Widening *widening, const BvhChild *child, unsigned places, BvhWide *wide,
+                         BvhWideNode *node)
+{
+    if (child_is_empty(child)) return;
+    if (child_is_node(child)) {
+        const Subtree *subtree = &widening->subtrees[child->first];
+        if (subtree->costs[places] < subtree->costs[1]) {
+            children_gather(widening, child->first, places, wide, node);
+            return;
+        }
+        if (subtree->is_leaf) {
+            BvhChild *leaf = &wide->leaves[wide->leaf_count++];
+            *leaf = (BvhChild){child->box, subtree->first, subtree->count};
+            child = leaf;
+        }
+    }
+    node->children[node->child_count++] = child;
+}
+
+void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
+{
+    if (width < 2 || width > BVH_WIDTH_LARGEST) fault("a node of %u children", width);
+    double root_area = bounds_half_area(bvh_node_bounds(&bvh->nodes[0]));
+    Widening widening = {
+        .bvh = bvh,
+        .subtrees = memory_allocate(bvh->node_count, sizeof(Subtree)),
+        .scale = root_area >= DBL_MIN && root_area <= DBL_MAX ? 1 / root_area : 0,
+        .width = width,
+    };
+    costs_find(&widening);
+    uint32_t *roots = memory_allocate(bvh->node_count, sizeof *roots);
+    *wide = (BvhWide){
+        .nodes = memory_allocate(bvh->node_count, sizeof *wide->nodes),
+        .node_count = 1,
+        .leaves = memory_allocate((bvh->node_count + 1) / 2, sizeof *wide->leaves), // none within another
+    };
+    roots[0] = 0;
+    for (size_t i = 0; i < wide->node_count; i++) {
+        BvhWideNode *node = &wide->nodes[i];
+        *node = (BvhWideNode){.first_node = (uint32_t)wide->node_count};
+        children_gather(&widening, roots[i], width, wide, node);
+        for (unsigned k = 0; k < node->child_count; k++)
+            if (child_is_node(node->children[k])) roots[wide->node_count++] = node->children[k]->first;
+    }
+    free(roots);
+    free(widening.subtrees);
+}
+
+void bvh_wide_free(BvhWide *wide)
+{
+    free(wide->nodes);
+    free(wide->leaves);
+    *wide = (BvhWide){0};
+}

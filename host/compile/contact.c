@@ -1,0 +1,194 @@
+#include "host/compile/contact.h"
+
+#include "host/base/memory.h"
+#include "host/compile/bvh_flatten.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+// As near as this, in parts of how far the scene reaches, surfaces count as touching. The kernels look five
+// errors ahead at most (kernels/shading/surface.h), of 16 u of a shape's numbers and 4 u of a point's, each
+// the sum of three coordinates: 5 * (16 * 7 + 4 * 3) u = 620 u at float for a cylinder, whose numbers are
+// most.
+#define NEARNESS 0x1p-14
+
+// More pairs than this, 5 to 30 ms of them, are not held against each other: a box around all opaque
+// primitives that have one takes their place.
+#define PAIRS_LARGEST ((size_t)1 << 19)
+
+// Where a primitive is: in its box, infinite where it has none; what is flat also in its plane, normal . p =
+// offset.
+typedef struct {
+    Bounds box;
+    Vector3 normal; // 0: not flat
+    double offset;
+    double reach; // how far from the origin, mostly the eye, its numbers are
+} Extent;
+
+typedef struct {
+    Extent *items;
+    size_t count;
+} ExtentList;
+
+static bool extent_is_bounded(const Extent *extent)
+{
+    return isfinite(extent->box.min.x);
+}
+
+static Bounds everywhere(void)
+{
+    return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
+}
+
+static double extent_reach(const Extent *extent, size_t kind, const void *primitive)
+{
+    if (extent_is_bounded(extent))
+        return fmax(vector_largest(extent->box.min), vector_largest(extent->box.max));
+    if (kind == KIND_PLANES) return fabs(extent->offset);
+    const Revolution *endless = primitive;
+    return vector_largest(vector3_of(&endless->base_radius)) + endless->base_radius.w / endless->range.y;
+}
+
+static Extent extent_of(size_t kind, const void *primitive)
+{
+    Extent extent = {.box = everywhere()};
+    primitive_box(kind, primitive, &extent.box);
+    Vector3 point = {0, 0, 0};
+    if (kind == KIND_PLANES) {
+        extent.normal = vector3_of(&((const Plane *)primitive)->normal);
+        point = vector3_of(&((const Plane *)primitive)->point);
+    } else if (kind == KIND_DISCS) {
+        extent.normal = vector3_of(&((const Disc *)primitive)->normal);
+        point = vector3_of(&((const Disc *)primitive)->center_radius);
+    }
+    if (!vector_is_zero(extent.normal)) extent.normal = vector_normalize(extent.normal);
+    extent.offset = vector_dot(extent.normal, point);
+    extent.reach = extent_reach(&extent, kind, primitive);
+    return extent;
+}
+
+typedef struct {
+    double low, high;
+} Interval;
+
+static Interval interval_scale(double low, double high, double factor)
+{
+    if (factor == 0) return (Interval){0, 0};
+    return factor > 0 ? (Interval){low * factor, high * factor} : (Interval){high * factor, low * factor};
+}
+
+// What of a box lies within `margin` of a plane: along each axis that the normal has a part of,
+// n_x x = offset - n_y y - n_z z, for all y and z of the box.
+static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
+{
+    const double normal[3] = {flat->normal.x, flat->normal.y, flat->normal.z};
+    double low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
+    for (unsigned axis = 0; axis < 3; axis++) {
+        if (normal[axis] == 0) continue;
+        unsigned next = (axis + 1) % 3, last = (axis + 2) % 3;
+        Interval a = interval_scale(low[next], high[next], normal[next]);
+        Interval b = interval_scale(low[last], high[last], normal[last]);
+        Interval along = interval_scale(flat->offset - margin - a.high - b.high,
+                                        flat->offset + margin - a.low - b.low, 1 / normal[axis]);
+        low[axis] = fmax(low[axis], along.low);
+        high[axis] = fmin(high[axis], along.high);
+        if (low[axis] > high[axis]) return bounds_empty();
+    }
+    return (Bounds){{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+}
+
+// A box around where two may touch. What is endless errs the more the farther it is seen: two such are never
+// told apart.
+static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
+{
+    if (!extent_is_bounded(a) && !extent_is_bounded(b)) return everywhere();
+    Bounds both = bounds_intersect(bounds_grow(a->box, margin), b->box);
+    if (bounds_is_empty(&both)) return both;
+    both = bounds_grow(both, margin);
+    if (!vector_is_zero(a->normal)) both = bounds_near_plane(both, a, margin);
+    if (!vector_is_zero(b->normal) && !bounds_is_empty(&both)) both = bounds_near_plane(both, b, margin);
+    return both;
+}
+
+// The primitives that pass light, or those that do not. Returns how far any reaches.
+static double extents_collect(ExtentList *list, const CompiledScene *flat, bool transparent)
+{
+    const ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
+    const FlatMaterial *materials = flat->arrays[FLAT_MATERIALS].items;
+    *list = (ExtentList){.items = memory_allocate(flat->arrays[FLAT_OBJECTS].count + 1, sizeof(Extent))};
+    double largest = 0;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        for (size_t i = 0; i < array->count; i++) {
+            const FlatMaterial *material = &materials[entries[flat_id(array, i)].kind_index_material.z];
+            if (transparent != (material->reflection_transmission_ior.y > 0)) continue;
+            list->items[list->count] = extent_of(kind, flat_array_at(array, i));
+            largest = fmax(largest, list->items[list->count++].reach);
+        }
+    }
+    return largest;
+}
+
+// One in place of all that have boxes.
+static void extents_join_bounded(ExtentList *list)
+{
+    Bounds all = bounds_empty();
+    size_t count = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        if (extent_is_bounded(&list->items[i]))
+            all = bounds_join(all, list->items[i].box);
+        else
+            list->items[count++] = list->items[i];
+    }
+    if (!bounds_is_empty(&all)) list->items[count++] = (Extent){.box = all};
+    list->count = count;
+}
+
+// Leaves out what is far from all of the others.
+static void extents_keep_near(ExtentList *list, const ExtentList *others, double margin)
+{
+    Bounds around = bounds_empty();
+    for (size_t i = 0; i < others->count; i++)
+        around = bounds_join(around, others->items[i].box);
+    around = bounds_grow(around, margin);
+    size_t count = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        Bounds near = bounds_intersect(list->items[i].box, around);
+        if (!bounds_is_empty(&near)) list->items[count++] = list->items[i];
+    }
+    list->count = count;
+}
+
+static Bounds lists_meet(ExtentList *transparent, ExtentList *opaque, double margin)
+{
+    extents_keep_near(opaque, transparent, margin);
+    extents_keep_near(transparent, opaque, margin);
+    if (transparent->count == 0) return bounds_empty();
+    if (opaque->count > PAIRS_LARGEST / transparent->count) extents_join_bounded(opaque);
+    if (opaque->count > PAIRS_LARGEST / transparent->count) return everywhere();
+    Bounds all = bounds_empty();
+    for (size_t i = 0; i < transparent->count; i++)
+        for (size_t k = 0; k < opaque->count; k++)
+            all = bounds_join(all, extents_meet(&transparent->items[i], &opaque->items[k], margin));
+    return all;
+}
+
+// Kernels at `fast` need not know infinities.
+static scalar4 scalar4_within_floats(Vector3 v)
+{
+    v = vector_max(vector_min(v, vector_all(FLT_MAX)), vector_all(-FLT_MAX));
+    return (scalar4){v.x, v.y, v.z, 0};
+}
+
+void contact_find(CompiledScene *flat)
+{
+    ExtentList transparent, opaque;
+    double reach = extents_collect(&transparent, flat, true);
+    reach = fmax(reach, extents_collect(&opaque, flat, false));
+    Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * reach);
+    SceneHeader *header = flat->arrays[FLAT_HEADER].items;
+    header->contact_low = scalar4_within_floats(contact.min);
+    header->contact_high = scalar4_within_floats(contact.max);
+    free(transparent.items);
+    free(opaque.items);
+}

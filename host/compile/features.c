@@ -1,0 +1,52 @@
+#include "host/compile/features.h"
+
+#define FEATURE_NAME(name) #name,
+const char *const feature_names[FEATURE_COUNT] = {FEATURE_LIST(FEATURE_NAME)};
+#undef FEATURE_NAME
+
+static const FeatureSet shape_features[SHAPE_COUNT] = {
+    [SHAPE_SPHERE] = FEATURE_SPHERES,     [SHAPE_PLANE] = FEATURE_PLANES,
+    [SHAPE_DISC] = FEATURE_DISCS,         [SHAPE_BOX] = FEATURE_BOXES,
+    [SHAPE_CYLINDER] = FEATURE_CYLINDERS, [SHAPE_CONE] = FEATURE_CONES,
+    [SHAPE_TRIANGLE] = FEATURE_TRIANGLES, [SHAPE_TORUS] = FEATURE_TORI,
+    [SHAPE_MESH] = FEATURE_TRIANGLES,
+};
+
+static const FeatureSet light_features[] = {
+    [LIGHT_POINT] = FEATURE_POINT_LIGHTS,
+    [LIGHT_DIRECTIONAL] = FEATURE_DIRECTIONAL_LIGHTS,
+    [LIGHT_SPOT] = FEATURE_SPOT_LIGHTS,
+};
+
+static FeatureSet material_features(const Material *material)
+{
+    FeatureSet set = 0;
+    if (material->checker) set |= FEATURE_CHECKERS;
+    if (material->image) set |= FEATURE_IMAGES;
+    if (material->reflection > 0) set |= FEATURE_REFLECTION;
+    // total reflection makes mirrors of glass
+    if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
+    return set;
+}
+
+FeatureSet features_of(const Scene *scene)
+{
+    FeatureSet set = 0;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        set |= shape_features[object->kind] | material_features(&scene->materials.items[object->material]);
+        if (object->kind != SHAPE_MESH) continue;
+        const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+        for (size_t k = 0; mesh->materials && k < mesh->triangle_count; k++)
+            set |= material_features(&scene->materials.items[mesh->materials[k]]);
+    }
+    for (size_t i = 0; i < scene->lights.count; i++)
+        set |= light_features[scene->lights.items[i].kind];
+    return set;
+}
+
+void features_write_prelude(Text *text, FeatureSet set)
+{
+    for (unsigned i = 0; i < FEATURE_COUNT; i++)
+        text_appendf(text, "#define HAS_%s %d\n", feature_names[i], (int)(set >> i & 1));
+}

@@ -1,0 +1,196 @@
+#include "host/compile/textures.h"
+
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/image/image.h"
+#include "host/image/srgb.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Of a side: beyond it a place in float, 24 bits, no longer tells parts of a texel. Of all pictures: a kernel
+// counts texels in 32 bits.
+enum { SIDE_LARGEST = 1 << 16, TEXELS_LARGEST = 1 << 28 };
+
+typedef struct {
+    uint32_t width, height;
+    float (*colors)[3];
+} Level;
+
+typedef struct {
+    struct {
+        Level *items;
+        size_t count, capacity;
+    } levels; // of all pictures, one after another
+    size_t texel_count;
+} LevelList;
+
+static Level level_open(uint32_t width, uint32_t height)
+{
+    return (Level){width, height, memory_allocate((size_t)width * height, sizeof(float[3]))};
+}
+
+static void levels_free(LevelList *list)
+{
+    for (size_t i = 0; i < list->levels.count; i++)
+        free(list->levels.items[i].colors);
+    free(list->levels.items);
+}
+
+// A line of texels divided anew: `part` from 0 to `count` covers the old texels first .. last, the outer ones
+// in part.
+typedef struct {
+    double start, end;
+    uint32_t first, last;
+} Span;
+
+static Span span_of(uint32_t part, uint32_t parts, uint32_t count)
+{
+    Span span = {(double)part * count / parts, (double)(part + 1) * count / parts, 0, 0};
+    span.first = (uint32_t)span.start;
+    span.last = (uint32_t)ceil(span.end) - 1;
+    return span;
+}
+
+static double span_covers(const Span *span, uint32_t texel)
+{
+    return fmin(span->end, texel + 1.0) - fmax(span->start, texel);
+}
+
+// Half as many texels each way, rounded up; each is the mean of what it covers, so that the picture's mean
+// stays.
+static Level level_halved(const Level *fine)
+{
+    Level coarse = level_open((fine->width + 1) / 2, (fine->height + 1) / 2);
+    for (uint32_t y = 0; y < coarse.height; y++) {
+        Span rows = span_of(y, coarse.height, fine->height);
+        for (uint32_t x = 0; x < coarse.width; x++) {
+            Span columns = span_of(x, coarse.width, fine->width);
+            double sum[3] = {0};
+            for (uint32_t row = rows.first; row <= rows.last; row++) {
+                for (uint32_t column = columns.first; column <= columns.last; column++) {
+                    const float *color = fine->colors[(size_t)row * fine->width + column];
+                    double weight = span_covers(&rows, row) * span_covers(&columns, column);
+                    for (size_t channel = 0; channel < 3; channel++)
+                        sum[channel] += weight * (double)color[channel];
+                }
+            }
+            double area = (rows.end - rows.start) * (columns.end - columns.start);
+            float *color = coarse.colors[(size_t)y * coarse.width + x];
+            for (size_t channel = 0; channel < 3; channel++)
+                color[channel] = (float)(sum[channel] / area);
+        }
+    }
+    return coarse;
+}
+
+// Light below 0, which the filters of other programs leave, counts as none.
+static bool level_fill(Level *level, const Image *image, bool decodes)
+{
+    size_t count = (size_t)image->width * image->height;
+    for (size_t i = 0; i < count; i++) {
+        for (size_t channel = 0; channel < 3; channel++) {
+            float value = image->values[i * image->channels + (image->channels < 3 ? 0 : channel)];
+            if (!isfinite(value)) return false;
+            level->colors[i][channel] = decodes ? (float)srgb_decode((double)value) : fmaxf(value, 0);
+        }
+    }
+    return true;
+}
+
+// What is wrong with a picture that was read, or NULL.
+static const char *levels_add(LevelList *list, const Image *image, bool as_displayed)
+{
+    if (image->width > SIDE_LARGEST || image->height > SIDE_LARGEST)
+        return "a side of more than 65536 texels";
+    if ((size_t)image->width * image->height > TEXELS_LARGEST - list->texel_count)
+        return "too many texels in all pictures";
+    Level level = level_open(image->width, image->height);
+    array_push(list->levels, level);
+    if (!level_fill(&level, image, image->display && !as_displayed)) return "a color is not finite";
+    list->texel_count += (size_t)level.width * level.height;
+    while (level.width > 1 || level.height > 1) {
+        level = level_halved(&level);
+        array_push(list->levels, level);
+        list->texel_count += (size_t)level.width * level.height;
+    }
+    return list->texel_count > TEXELS_LARGEST ? "too many texels in all pictures" : NULL;
+}
+
+static bool image_add(LevelList *list, TextureSize *size, const Scene *scene, const SceneImage *scene_image,
+                      MessageList *messages)
+{
+    const Source source = scene_source(scene);
+    Image image;
+    MessageList problems = {0};
+    bool done = image_read(&image, scene_image->path, &problems);
+    if (done) {
+        const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
+        *size = (TextureSize){image.width, image.height};
+        image_free(&image);
+        done = !problem;
+        if (problem)
+            message_add_at(messages, MESSAGE_ERROR, &source, scene_image->offset, "cannot use '%s': %s",
+                           scene_image->path, problem);
+    }
+    for (size_t i = 0; i < problems.count; i++)
+        message_add_at(messages, problems.items[i].severity, &source, scene_image->offset, "%s",
+                       problems.items[i].text);
+    message_list_free(&problems);
+    return done;
+}
+
+static void levels_flatten(CompiledScene *flat, const LevelList *list)
+{
+    flat->arrays[FLAT_TEXTURE_LEVELS] = flat_array_make(FLAT_TEXTURE_LEVELS, list->levels.count);
+    flat->arrays[FLAT_TEXELS] = flat_array_make(FLAT_TEXELS, list->texel_count);
+    TextureLevel *levels = flat->arrays[FLAT_TEXTURE_LEVELS].items;
+    Texel *texels = flat->arrays[FLAT_TEXELS].items;
+    uint32_t first = 0;
+    for (size_t i = 0; i < list->levels.count; i++) {
+        const Level *level = &list->levels.items[i];
+        uint32_t count = level->width * level->height;
+        levels[i].place = (uint4){first, level->width, level->height, 0};
+        for (uint32_t k = 0; k < count; k++)
+            memcpy(&texels[first + k].color, level->colors[k], sizeof level->colors[k]);
+        first += count;
+    }
+}
+
+// The levels of picture i are first_levels[i] .. first_levels[i + 1] - 1.
+static void materials_tell(CompiledScene *flat, const Scene *scene, const uint32_t *first_levels,
+                           const TextureSize *sizes)
+{
+    FlatMaterial *materials = flat->arrays[FLAT_MATERIALS].items;
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *material = &scene->materials.items[i];
+        if (material->image == 0) continue;
+        size_t image = material->image - 1;
+        materials[i].image =
+            (uint4){1 + first_levels[image], first_levels[image + 1] - first_levels[image], 0, 0};
+        materials[i].reflection_transmission_ior.w = sizes[image].width / material->image_size;
+    }
+}
+
+bool textures_load(CompiledScene *flat, const Scene *scene, const FlattenSettings *settings,
+                   MessageList *messages)
+{
+    size_t count = scene->images.count;
+    LevelList list = {0};
+    TextureSize *sizes = memory_allocate_zeroed(count + 1, sizeof *sizes);
+    uint32_t *first_levels = memory_allocate_zeroed(count + 1, sizeof *first_levels);
+    bool done = true;
+    for (size_t i = 0; i < count && done; i++) {
+        done = image_add(&list, &sizes[i], scene, &scene->images.items[i], messages);
+        first_levels[i + 1] = (uint32_t)list.levels.count;
+    }
+    if (done) {
+        levels_flatten(flat, &list);
+        materials_tell(flat, scene, first_levels, sizes);
+        texture_mapping_fill(flat, scene, sizes, settings);
+    }
+    levels_free(&list);
+    free(sizes);
+    free(first_levels);
+    return done;
+}

@@ -1,0 +1,271 @@
+// `.cfg`, the scenes of the article's own program: blocks such as `=>sphere :` with a key a line.
+// What is read and what is tolerated: docs/scene-format.md.
+#include "host/base/array.h"
+#include "host/import/line.h"
+#include "host/import/load.h"
+
+#include <string.h>
+
+static const Range range_radians = {0, M_PI_2, true, "greater than 0 and less than pi/2"};
+
+// Everything that a block may say.
+typedef struct {
+    Vector3 position, look_at, center, normal, color, diffuse, intensity;
+    double radius, angle, specular;
+} BlockValues;
+
+typedef struct {
+    const char *name;
+    size_t offset; // in BlockValues
+    bool is_vector;
+    const Range *range;
+} Key;
+
+static const Key keys[] = {
+    {"position", offsetof(BlockValues, position), true, NULL},
+    {"look_at", offsetof(BlockValues, look_at), true, NULL},
+    {"center", offsetof(BlockValues, center), true, NULL},
+    {"normal", offsetof(BlockValues, normal), true, NULL},
+    {"radius", offsetof(BlockValues, radius), false, &range_positive},
+    {"angle", offsetof(BlockValues, angle), false, &range_radians},
+    {"intensity", offsetof(BlockValues, intensity), true, &range_not_negative},
+    {"color", offsetof(BlockValues, color), true, &range_byte},
+    {"diffuse", offsetof(BlockValues, diffuse), true, &range_not_negative},
+    {"specular", offsetof(BlockValues, specular), false, &range_not_negative},
+};
+
+enum { KEY_COUNT = sizeof keys / sizeof *keys, BLOCK_KEY_LIMIT = 8 };
+
+typedef struct {
+    Report report;
+    Line line;
+    Scene *scene;
+    bool has_camera;
+} CfgReader;
+
+typedef struct {
+    const char *name;
+    const char *keys[BLOCK_KEY_LIMIT]; // all required; ended by NULL
+    void (*finish)(CfgReader *reader, const BlockValues *values);
+} Block;
+
+static void camera_finish(CfgReader *reader, const BlockValues *values)
+{
+    reader->scene->camera = (Camera){
+        .position = values->position,
+        .look_at = values->look_at,
+        .up = {0, 1, 0},
+        .field_axis = FIELD_HORIZONTAL,
+        .half_tangent = 0.25, // the program's frame of 1 at a focal length of 2
+    };
+}
+
+static void light_finish(CfgReader *reader, const BlockValues *values)
+{
+    Light light = {.kind = LIGHT_POINT, .position = values->position, .color = values->intensity};
+    array_push(reader->scene->lights, light);
+}
+
+static void object_finish(CfgReader *reader, const BlockValues *values, Object object)
+{
+    Material material = material_default();
+    material.color = vector_scale(values->color, 1.0 / 255);
+    material.diffuse = values->diffuse;
+    material.specular = values->specular;
+    material.shininess = 30;
+    scene_add_object(reader->scene, object, &material);
+}
+
+static void sphere_finish(CfgReader *reader, const BlockValues *values)
+{
+    Object object = {.kind = SHAPE_SPHERE, .as.sphere = {.center = values->center, .radius = values->radius}};
+    object_finish(reader, values, object);
+}
+
+static void plane_finish(CfgReader *reader, const BlockValues *values)
+{
+    Object object = {.kind = SHAPE_PLANE, .as.plane = {.point = values->position, .normal = values->normal}};
+    object_finish(reader, values, object);
+}
+
+static void cylinder_finish(CfgReader *reader, const BlockValues *values)
+{
+    Object object = {
+        .kind = SHAPE_CYLINDER,
+        .as.cylinder = {.from = values->center, .axis = values->normal, .radius = values->radius}};
+    object_finish(reader, values, object);
+}
+
+static void cone_finish(CfgReader *reader, const BlockValues *values)
+{
+    Object object = {
+        .kind = SHAPE_CONE,
+        .as.cone = {.from = values->center, .axis = values->normal, .slope = tan(values->angle)}};
+    object_finish(reader, values, object);
+}
+
+#define OBJECT_KEYS "color", "diffuse", "specular"
+
+static const Block blocks[] = {
+    {"camera", {"position", "look_at"}, camera_finish},
+    {"light", {"position", "intensity"}, light_finish},
+    {"sphere", {"radius", "center", OBJECT_KEYS}, sphere_finish},
+    {"plane", {"position", "normal", OBJECT_KEYS}, plane_finish},
+    {"cylinder", {"radius", "center", "normal", OBJECT_KEYS}, cylinder_finish},
+    {"cone", {"angle", "center", "normal", OBJECT_KEYS}, cone_finish},
+};
+
+static const Key *key_find(const Block *block, Word word)
+{
+    bool belongs = false;
+    for (size_t i = 0; i < BLOCK_KEY_LIMIT && block->keys[i]; i++)
+        belongs |= word_is(word, block->keys[i]);
+    for (size_t i = 0; belongs && i < KEY_COUNT; i++) {
+        if (word_is(word, keys[i].name)) return &keys[i];
+    }
+    return NULL;
+}
+
+static bool key_read(CfgReader *reader, const Block *block, BlockValues *values, bool *seen)
+{
+    Line *line = &reader->line;
+    Word word = line_word(line);
+    const Key *key = key_find(block, word);
+    if (!key) {
+        report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name, word_shown(word),
+                     word.text);
+        return false;
+    }
+    if (seen[key - keys]) {
+        report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
+        return false;
+    }
+    seen[key - keys] = true;
+    size_t offset = line_peek(line).offset;
+    void *target = (char *)values + key->offset;
+    bool read = key->is_vector ? line_blank_vector(line, key->name, key->range, target)
+                               : line_number(line, key->name, key->range, target);
+    if (read && !strcmp(key->name, "normal") && vector_is_zero(values->normal)) {
+        report_error(&reader->report, offset, "'normal' must not be zero");
+        return false;
+    }
+    return read && line_end(line);
+}
+
+// The next line that is not blank. False at the end of the source.
+static bool line_next_filled(Line *line)
+{
+    while (line_next(line, '\0')) {
+        if (line_peek(line).length) return true;
+    }
+    return false;
+}
+
+static bool word_opens_block(Word word)
+{
+    return word.length >= 2 && !memcmp(word.text, "=>", 2);
+}
+
+// Reads to the closing brace. False, reported, where a fault keeps the block from being used.
+static bool block_read(CfgReader *reader, const Block *block, size_t start, BlockValues *values)
+{
+    Line *line = &reader->line;
+    bool seen[KEY_COUNT] = {false}, all_read = true;
+    for (;;) {
+        if (!line_next_filled(line)) {
+            report_error(&reader->report, reader->report.source->length, "'}' is missing");
+            return false;
+        }
+        Word word = line_peek(line);
+        if (word_opens_block(word)) {
+            report_error(&reader->report, word.offset, "'}' is missing");
+            line->next = line->start; // the next block is read all the same
+            return false;
+        }
+        if (word_is(word, "}")) break;
+        all_read &= key_read(reader, block, values, seen);
+    }
+    line_word(line);
+    all_read &= line_end(line);
+    for (size_t i = 0; i < BLOCK_KEY_LIMIT && block->keys[i]; i++) {
+        Word name = {.text = block->keys[i], .length = strlen(block->keys[i])};
+        if (!seen[key_find(block, name) - keys]) {
+            report_error(&reader->report, start, "%s lacks '%s'", block->name, block->keys[i]);
+            all_read = false;
+        }
+    }
+    return all_read;
+}
+
+// The block that a line such as `=>sphere :` opens. NULL, reported, where there is none of that name.
+static const Block *block_find(CfgReader *reader)
+{
+    Word arrow = line_word(&reader->line);
+    Word name = {.text = arrow.text + 2, .offset = arrow.offset + 2, .length = arrow.length - 2};
+    if (!name.length) name = line_word(&reader->line);
+    if (name.length && name.text[name.length - 1] == ':')
+        name.length--;
+    else if (word_is(line_peek(&reader->line), ":"))
+        line_word(&reader->line);
+    else {
+        report_error(&reader->report, line_peek(&reader->line).offset, "':' is missing");
+        return NULL;
+    }
+    for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
+        if (word_is(name, blocks[i].name)) return line_end(&reader->line) ? &blocks[i] : NULL;
+    }
+    report_error(&reader->report, name.offset, "unknown block '%.*s'", word_shown(name), name.text);
+    return NULL;
+}
+
+static void block_skip(Line *line)
+{
+    while (line_next(line, '\0') && !word_is(line_peek(line), "}"))
+        continue;
+}
+
+static void block_open(CfgReader *reader)
+{
+    Line *line = &reader->line;
+    size_t start = line_peek(line).offset;
+    const Block *block = block_find(reader);
+    if (!block) {
+        block_skip(line);
+        return;
+    }
+    if (!line_next_filled(line) || !word_is(line_peek(line), "{")) {
+        report_error(&reader->report, line->at, "'{' is missing");
+        return;
+    }
+    line_word(line);
+    line_end(line);
+    bool is_camera = block->finish == camera_finish;
+    if (is_camera && reader->has_camera) report_error(&reader->report, start, "a second camera");
+    reader->has_camera |= is_camera;
+    BlockValues values = {0};
+    if (!block_read(reader, block, start, &values)) return;
+    if (is_camera && vector_is_zero(vector_subtract(values.look_at, values.position)))
+        report_error(&reader->report, start, "'look_at' must differ from 'position'");
+    block->finish(reader, &values);
+}
+
+static void blocks_read(CfgReader *reader)
+{
+    while (!report_is_full(&reader->report) && line_next_filled(&reader->line)) {
+        Word word = line_peek(&reader->line);
+        if (word_opens_block(word))
+            block_open(reader);
+        else
+            report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
+    }
+    if (!reader->has_camera && !report_is_full(&reader->report))
+        report_error(&reader->report, reader->report.source->length, "no camera: a block =>camera");
+}
+
+bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
+{
+    *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {0.2, 0.2, 0.2}};
+    CfgReader reader = {.report = report_open(source, messages), .scene = scene};
+    if (line_open(&reader.line, &reader.report)) blocks_read(&reader);
+    return scene_finish(scene, &reader.report);
+}

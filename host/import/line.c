@@ -1,0 +1,144 @@
+#include "host/import/line.h"
+
+#include <string.h>
+
+bool line_open(Line *line, Report *report)
+{
+    const Source *source = report->source;
+    bool has_mark = source->length >= 3 && !memcmp(source->bytes, "\xEF\xBB\xBF", 3);
+    *line = (Line){.report = report, .next = has_mark ? 3 : 0};
+    const char *nul = source->length ? memchr(source->bytes, '\0', source->length) : NULL;
+    if (nul) report_error(report, (size_t)(nul - source->bytes), "not text: a NUL character");
+    return !nul;
+}
+
+bool line_next(Line *line, char comment)
+{
+    const Source *source = line->report->source;
+    if (line->next >= source->length) return false;
+    line->start = line->at = line->next;
+    const char *bytes = source->bytes + line->start;
+    const char *newline = memchr(bytes, '\n', source->length - line->start);
+    line->end = newline ? (size_t)(newline - source->bytes) : source->length;
+    line->next = line->end + 1;
+    const char *start_of_comment = comment ? memchr(bytes, comment, line->end - line->start) : NULL;
+    if (start_of_comment) line->end = (size_t)(start_of_comment - source->bytes);
+    return true;
+}
+
+static bool is_blank(char character)
+{
+    return character == ' ' || character == '\t' || character == '\r';
+}
+
+Word line_word(Line *line)
+{
+    const char *bytes = line->report->source->bytes;
+    while (line->at < line->end && is_blank(bytes[line->at]))
+        line->at++;
+    size_t start = line->at;
+    while (line->at < line->end && !is_blank(bytes[line->at]))
+        line->at++;
+    return (Word){.text = bytes + start, .offset = start, .length = line->at - start};
+}
+
+Word line_peek(const Line *line)
+{
+    Line copy = *line;
+    return line_word(&copy);
+}
+
+bool word_is(Word word, const char *text)
+{
+    return word.length == strlen(text) && !memcmp(word.text, text, word.length);
+}
+
+bool word_is_number(Word word)
+{
+    double number;
+    return number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
+}
+
+int word_shown(Word word)
+{
+    return word.length < WORD_SHOWN ? (int)word.length : WORD_SHOWN;
+}
+
+// The next word; reports where there is none.
+static bool line_field(Line *line, const char *name, Word *word)
+{
+    *word = line_word(line);
+    if (!word->length) report_error(line->report, word->offset, "'%s' is missing", name);
+    return word->length > 0;
+}
+
+bool line_number(Line *line, const char *name, const Range *range, double *value)
+{
+    Word word;
+    return line_field(line, name, &word) &&
+           number_read_field(line->report, word.offset, name, word.text, word.length, range, value);
+}
+
+bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value)
+{
+    double number;
+    size_t offset = line_peek(line).offset;
+    if (!line_number(line, name, range, &number)) return false;
+    *value = (unsigned)number;
+    if (*value != number) report_error(line->report, offset, "'%s' must be a whole number", name);
+    return *value == number;
+}
+
+static size_t comma_count(Word word)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < word.length; i++)
+        count += word.text[i] == ',';
+    return count;
+}
+
+bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value)
+{
+    Word word;
+    if (!line_field(line, name, &word)) return false;
+    if (comma_count(word) != 2) {
+        report_error(line->report, word.offset, "'%s' must be three numbers with commas between, not '%.*s'",
+                     name, word_shown(word), word.text);
+        return false;
+    }
+    double values[3];
+    size_t start = 0;
+    for (size_t i = 0; i < 3; i++) {
+        size_t end = start;
+        while (end < word.length && word.text[end] != ',')
+            end++;
+        if (!number_read_field(line->report, word.offset + start, name, word.text + start, end - start, range,
+                               &values[i]))
+            return false;
+        start = end + 1;
+    }
+    *value = (Vector3){values[0], values[1], values[2]};
+    return true;
+}
+
+bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value)
+{
+    double values[3];
+    for (size_t i = 0; i < 3; i++) {
+        if (i && !line_peek(line).length) {
+            report_error(line->report, line->at, "'%s' must be three numbers, not %zu", name, i);
+            return false;
+        }
+        if (!line_number(line, name, range, &values[i])) return false;
+    }
+    *value = (Vector3){values[0], values[1], values[2]};
+    return true;
+}
+
+bool line_end(Line *line)
+{
+    Word word = line_word(line);
+    if (word.length)
+        report_error(line->report, word.offset, "unexpected '%.*s'", word_shown(word), word.text);
+    return !word.length;
+}

@@ -1,0 +1,54 @@
+#include "host/import/load.h"
+
+#include "host/base/text.h"
+#include <string.h>
+#include <strings.h>
+
+bool scene_finish(Scene *scene, Report *report)
+{
+    if (!report_close(report)) {
+        scene_free(scene);
+        return false;
+    }
+    if (!scene->objects.count)
+        message_add(report->messages, MESSAGE_WARNING, "%s: no objects", report->source->file);
+    if (!scene->lights.count)
+        message_add(report->messages, MESSAGE_WARNING, "%s: no lights", report->source->file);
+    return true;
+}
+
+static bool ends_with(const char *path, const char *ending)
+{
+    size_t length = strlen(path), ending_length = strlen(ending);
+    return length > ending_length && !strcasecmp(path + length - ending_length, ending);
+}
+
+static bool scene_read(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
+{
+    if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
+    if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
+    if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
+    return scene_read_yaml(scene, source, messages);
+}
+
+bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+{
+    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg", ".nff"};
+    *scene = (Scene){0};
+    bool is_known = false;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        is_known |= ends_with(path, endings[i]);
+    if (!is_known) {
+        message_add(messages, MESSAGE_ERROR, "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff",
+                    path);
+        return false;
+    }
+    Text text = {0};
+    bool read = text_read_file(&text, path, messages);
+    if (read) {
+        Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+        read = scene_read(scene, &source, options, messages);
+    }
+    text_free(&text);
+    return read;
+}

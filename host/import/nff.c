@@ -1,0 +1,392 @@
+// `.nff`, Eric Haines' Neutral File Format: elements of words separated by blanks and line ends.
+// What is read and how its lights and materials are understood: docs/scene-format.md.
+#include "host/base/array.h"
+#include "host/import/line.h"
+#include "host/import/load.h"
+#include "host/scene/polygon.h"
+
+#include <stdlib.h>
+
+typedef struct {
+    Report report;
+    Line line;
+    Scene *scene;
+    uint32_t material; // of what follows
+    bool has_material, has_background, has_view, has_fault;
+    struct {
+        size_t *items;
+        size_t count, capacity;
+    } white_lights; // those without a color: indices
+    struct {
+        Vector3 *items;
+        size_t count, capacity;
+    } corners, normals; // of the polygon being read
+    PolygonTriangles triangles;
+} NffReader;
+
+static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
+
+// Goes on to the next line with a word on it, unless this one has one left. False at the end of the source.
+static bool reach_word(NffReader *reader)
+{
+    while (!line_peek(&reader->line).length) {
+        if (!line_next(&reader->line, '#')) return false;
+    }
+    return true;
+}
+
+static bool read_number(NffReader *reader, const char *name, const Range *range, double *value)
+{
+    reach_word(reader);
+    return line_number(&reader->line, name, range, value);
+}
+
+static bool read_vector(NffReader *reader, const char *name, const Range *range, Vector3 *value)
+{
+    return read_number(reader, name, range, &value->x) && read_number(reader, name, range, &value->y) &&
+           read_number(reader, name, range, &value->z);
+}
+
+static bool read_color(NffReader *reader, Color *color)
+{
+    return read_vector(reader, "color", &range_not_negative, color);
+}
+
+static bool read_from(NffReader *reader)
+{
+    return read_vector(reader, "from", NULL, &reader->scene->camera.position);
+}
+
+static bool read_at(NffReader *reader)
+{
+    return read_vector(reader, "at", NULL, &reader->scene->camera.look_at);
+}
+
+static bool read_up(NffReader *reader)
+{
+    return read_vector(reader, "up", NULL, &reader->scene->camera.up);
+}
+
+static bool read_angle(NffReader *reader)
+{
+    double degrees;
+    if (!read_number(reader, "angle", &range_field_of_view, &degrees)) return false;
+    reader->scene->camera.half_tangent = tan(degrees * (M_PI / 360));
+    return true;
+}
+
+// Nothing is too near to be seen.
+static bool read_hither(NffReader *reader)
+{
+    double unused;
+    return read_number(reader, "hither", NULL, &unused);
+}
+
+static bool read_resolution(NffReader *reader)
+{
+    reach_word(reader);
+    if (!line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width)) return false;
+    reach_word(reader);
+    return line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height);
+}
+
+enum { VIEW_REQUIRED = 4, VIEW_KEYS = 6 };
+
+// The first ones are required.
+static const struct {
+    const char *name;
+    bool (*read)(NffReader *reader);
+} view_keys[VIEW_KEYS] = {
+    {"from", read_from},   {"at", read_at},         {"up", read_up},
+    {"angle", read_angle}, {"hither", read_hither}, {"resolution", read_resolution},
+};
+
+static size_t view_key_index(Word word)
+{
+    size_t index = 0;
+    while (index < VIEW_KEYS && !word_is(word, view_keys[index].name))
+        index++;
+    return index;
+}
+
+static bool view_is_complete(NffReader *reader, size_t offset, const bool *seen)
+{
+    for (size_t i = 0; i < VIEW_REQUIRED; i++) {
+        if (seen[i]) continue;
+        report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i].name);
+        return false;
+    }
+    const Camera *camera = &reader->scene->camera;
+    bool looks = !vector_is_zero(vector_subtract(camera->look_at, camera->position));
+    if (!looks) report_error(&reader->report, offset, "'from' and 'at' must differ");
+    return looks;
+}
+
+static bool read_view(NffReader *reader)
+{
+    size_t offset = reader->line.start;
+    if (reader->has_view) {
+        report_error(&reader->report, offset, "a second view");
+        return false;
+    }
+    reader->has_view = true;
+    if (reader->scene->objects.count) {
+        report_error(&reader->report, offset, "the view must stand before the objects");
+        return false;
+    }
+    reader->scene->camera.field_axis = FIELD_VERTICAL;
+    bool seen[VIEW_KEYS] = {false};
+    while (reach_word(reader)) {
+        Word word = line_peek(&reader->line);
+        size_t index = view_key_index(word);
+        if (index == VIEW_KEYS) break;
+        if (seen[index]) {
+            report_error(&reader->report, word.offset, "a second '%s'", view_keys[index].name);
+            return false;
+        }
+        seen[index] = true;
+        line_word(&reader->line);
+        if (!view_keys[index].read(reader) || !line_end(&reader->line)) return false;
+    }
+    return view_is_complete(reader, offset, seen);
+}
+
+static bool read_background(NffReader *reader)
+{
+    if (reader->has_background) {
+        report_error(&reader->report, reader->line.start, "a second background");
+        return false;
+    }
+    reader->has_background = true;
+    return read_color(reader, &reader->scene->background) && line_end(&reader->line);
+}
+
+static bool read_light(NffReader *reader)
+{
+    Light light = {.kind = LIGHT_POINT};
+    if (!read_vector(reader, "position", NULL, &light.position)) return false;
+    if (!line_peek(&reader->line).length)
+        array_push(reader->white_lights, reader->scene->lights.count);
+    else if (!read_color(reader, &light.color))
+        return false;
+    array_push(reader->scene->lights, light);
+    return line_end(&reader->line);
+}
+
+static bool read_material(NffReader *reader)
+{
+    Material material = material_default();
+    double diffuse;
+    reader->has_material = true;
+    if (!read_color(reader, &material.color) || !read_number(reader, "Kd", &range_not_negative, &diffuse) ||
+        !read_number(reader, "Ks", &range_unit, &material.specular) ||
+        !read_number(reader, "Shine", &range_not_negative, &material.shininess) ||
+        !read_number(reader, "T", &range_unit, &material.transmission))
+        return false;
+    const Range *range = material.transmission > 0 ? &range_positive : &range_not_negative;
+    double ior;
+    if (!read_number(reader, "index of refraction", range, &ior) || !line_end(&reader->line)) return false;
+    if (ior > 0) material.ior = ior;
+    material.ambient = diffuse;
+    material.diffuse = (Color){diffuse, diffuse, diffuse};
+    material.reflection = material.specular;
+    material.full_shadow = true;
+    reader->material = scene_add_material(reader->scene, &material, "");
+    return true;
+}
+
+static void object_add(NffReader *reader, Object object)
+{
+    if (!reader->has_material) {
+        report_warning(&reader->report, reader->line.start, "no material stands before this: white");
+        Material white = material_default();
+        reader->material = scene_add_material(reader->scene, &white, "");
+        reader->has_material = true;
+    }
+    object.material = reader->material;
+    array_push(reader->scene->objects, object);
+}
+
+static bool read_sphere(NffReader *reader)
+{
+    Object object = {.kind = SHAPE_SPHERE};
+    double radius;
+    if (!read_vector(reader, "center", NULL, &object.as.sphere.center)) return false;
+    reach_word(reader);
+    size_t offset = line_peek(&reader->line).offset;
+    if (!read_number(reader, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
+    if (radius == 0) {
+        report_error(&reader->report, offset, "'radius' must not be 0");
+        return false;
+    }
+    object.as.sphere.radius = fabs(radius);
+    object.as.sphere.only_inside = radius < 0;
+    object_add(reader, object);
+    return true;
+}
+
+// A cone, or, where both radii are the same, a cylinder.
+static bool read_cone(NffReader *reader)
+{
+    Vector3 base, apex;
+    double base_radius, apex_radius;
+    size_t offset = reader->line.start;
+    if (!read_vector(reader, "base", NULL, &base) || !read_number(reader, "radius", NULL, &base_radius) ||
+        !read_vector(reader, "apex", NULL, &apex) || !read_number(reader, "radius", NULL, &apex_radius) ||
+        !line_end(&reader->line))
+        return false;
+    Vector3 axis = vector_subtract(apex, base);
+    const char *fault = NULL;
+    if (vector_is_zero(axis)) fault = "a cone's base and apex must differ";
+    if (base_radius * apex_radius < 0) fault = "a cone's radii must not be of different signs";
+    if (base_radius == 0 && apex_radius == 0) fault = "a cone's radii must not both be 0";
+    if (fault) {
+        report_error(&reader->report, offset, "%s", fault);
+        return false;
+    }
+    bool only_inside = base_radius < 0 || apex_radius < 0;
+    Object object;
+    if (base_radius == apex_radius) {
+        object = (Object){.kind = SHAPE_CYLINDER,
+                          .as.cylinder = {.from = base,
+                                          .axis = axis,
+                                          .radius = fabs(base_radius),
+                                          .finite = true,
+                                          .only_inside = only_inside}};
+    } else {
+        object = (Object){.kind = SHAPE_CONE,
+                          .as.cone = {.from = base,
+                                      .axis = axis,
+                                      .radius = {fabs(base_radius), fabs(apex_radius)},
+                                      .finite = true,
+                                      .only_inside = only_inside}};
+    }
+    object_add(reader, object);
+    return true;
+}
+
+static bool read_corners(NffReader *reader, bool smooth)
+{
+    unsigned count;
+    reach_word(reader);
+    if (!line_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
+    reader->corners.count = reader->normals.count = 0;
+    for (unsigned i = 0; i < count; i++) {
+        Vector3 corner, normal = {0, 0, 0};
+        if (!read_vector(reader, "vertex", NULL, &corner)) return false;
+        if (smooth) {
+            reach_word(reader);
+            size_t offset = line_peek(&reader->line).offset;
+            if (!read_vector(reader, "normal", NULL, &normal)) return false;
+            if (vector_is_zero(normal)) {
+                report_error(&reader->report, offset, "'normal' must not be zero");
+                return false;
+            }
+        }
+        array_push(reader->corners, corner);
+        array_push(reader->normals, normal);
+    }
+    return line_end(&reader->line);
+}
+
+static bool read_any_polygon(NffReader *reader, bool smooth)
+{
+    size_t offset = reader->line.start;
+    if (!read_corners(reader, smooth)) return false;
+    switch (polygon_triangulate(reader->corners.items, reader->corners.count, &reader->triangles)) {
+    case POLYGON_WITHOUT_AREA:
+        report_warning(&reader->report, offset, "a polygon without area is never hit");
+        break;
+    case POLYGON_CROSSED:
+        report_warning(&reader->report, offset, "the polygon crosses itself: filled as far as it can be");
+        break;
+    case POLYGON_CUT:
+        break;
+    }
+    for (size_t i = 0; i < reader->triangles.count; i++) {
+        Object object = {.kind = SHAPE_TRIANGLE, .as.triangle.smooth = smooth};
+        for (size_t k = 0; k < 3; k++) {
+            uint32_t corner = reader->triangles.items[i][k];
+            object.as.triangle.vertices[k] = reader->corners.items[corner];
+            object.as.triangle.normals[k] = reader->normals.items[corner];
+        }
+        object_add(reader, object);
+    }
+    return true;
+}
+
+static bool read_polygon(NffReader *reader)
+{
+    return read_any_polygon(reader, false);
+}
+
+static bool read_patch(NffReader *reader)
+{
+    return read_any_polygon(reader, true);
+}
+
+// Each reads what follows its name, to the end of a line; reports and returns false at the first fault.
+static const struct {
+    const char *name;
+    bool (*read)(NffReader *reader);
+} elements[] = {
+    {"v", read_view}, {"b", read_background}, {"l", read_light},   {"f", read_material},
+    {"c", read_cone}, {"s", read_sphere},     {"p", read_polygon}, {"pp", read_patch},
+};
+
+// After a fault the rest of its line is skipped, and lines that may have belonged to it.
+static void element_read(NffReader *reader)
+{
+    Word name = line_word(&reader->line);
+    for (size_t i = 0; i < sizeof elements / sizeof *elements; i++) {
+        if (!word_is(name, elements[i].name)) continue;
+        reader->has_fault = !elements[i].read(reader);
+        if (reader->has_fault) reader->line.at = reader->line.end;
+        return;
+    }
+    reader->line.at = reader->line.end;
+    bool is_number = word_is_number(name);
+    if (reader->has_fault && (is_number || view_key_index(name) < VIEW_KEYS)) return;
+    reader->has_fault = true;
+    if (is_number)
+        report_error(&reader->report, name.offset, "expected an element, not the number %.*s",
+                     word_shown(name), name.text);
+    else
+        report_error(&reader->report, name.offset, "unknown element '%.*s'", word_shown(name), name.text);
+}
+
+// The format leaves intensities open; this is the formula its author proposes (Haines, Standard Procedural
+// Databases, README, File structure), for each of n lights without a color and for ambient light.
+static void lights_finish(NffReader *reader)
+{
+    Scene *scene = reader->scene;
+    if (!scene->lights.count) return;
+    double intensity = sqrt((double)scene->lights.count) / (2 * (double)scene->lights.count);
+    Color white = {intensity, intensity, intensity};
+    scene->ambient = white;
+    for (size_t i = 0; i < reader->white_lights.count; i++)
+        scene->lights.items[reader->white_lights.items[i]].color = white;
+}
+
+bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
+{
+    *scene = (Scene){.color_meaning = COLORS_DISPLAY};
+    NffReader reader = {.report = report_open(source, messages), .scene = scene};
+    if (line_open(&reader.line, &reader.report)) {
+        bool is_empty = true;
+        while (!report_is_full(&reader.report) && reach_word(&reader)) {
+            is_empty = false;
+            element_read(&reader);
+        }
+        if (is_empty)
+            report_error(&reader.report, 0, "the scene is empty");
+        else if (!reader.has_view && !report_is_full(&reader.report))
+            report_error(&reader.report, source->length, "no view: an element v");
+    }
+    lights_finish(&reader);
+    free(reader.white_lights.items);
+    free(reader.corners.items);
+    free(reader.normals.items);
+    free(reader.triangles.items);
+    return scene_finish(scene, &reader.report);
+}

@@ -1,0 +1,90 @@
+#include "host/import/report.h"
+#include "host/base/fault.h"
+
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MESSAGES_TOLD = 20 }; // of each severity
+
+Report report_open(const Source *source, MessageList *messages)
+{
+    return (Report){.source = source, .messages = messages, .first = messages->count};
+}
+
+static void report_add(Report *report, MessageSeverity severity, size_t offset, const char *format,
+                       va_list arguments)
+{
+    char *text;
+    if (vasprintf(&text, format, arguments) < 0) fault("out of memory: message");
+    message_add_at(report->messages, severity, report->source, offset, "%s", text);
+    free(text);
+}
+
+void report_error(Report *report, size_t offset, const char *format, ...)
+{
+    if (report->error_count++ >= MESSAGES_TOLD) return;
+    va_list arguments;
+    va_start(arguments, format);
+    report_add(report, MESSAGE_ERROR, offset, format, arguments);
+    va_end(arguments);
+}
+
+void report_warning(Report *report, size_t offset, const char *format, ...)
+{
+    if (report->warning_count++ >= MESSAGES_TOLD) return;
+    va_list arguments;
+    va_start(arguments, format);
+    report_add(report, MESSAGE_WARNING, offset, format, arguments);
+    va_end(arguments);
+}
+
+bool report_is_full(const Report *report)
+{
+    return report->error_count >= MESSAGES_TOLD;
+}
+
+static bool message_is_before(const Message *a, const Message *b)
+{
+    return a->line != b->line ? a->line < b->line : a->column < b->column;
+}
+
+// What an alias brings in several times is wrong once: whether it is among the list's messages from `first`
+// up to `end`.
+static bool message_is_among(const Message *message, const MessageList *list, size_t first, size_t end)
+{
+    for (size_t i = first; i < end; i++) {
+        const Message *other = &list->items[i];
+        if (other->line == message->line && other->column == message->column &&
+            !strcmp(other->text, message->text))
+            return true;
+    }
+    return false;
+}
+
+bool report_close(Report *report)
+{
+    MessageList *list = report->messages;
+    size_t kept = report->first;
+    for (size_t i = report->first; i < list->count; i++) {
+        Message message = list->items[i];
+        if (message_is_among(&message, list, report->first, kept)) {
+            // its twin is told
+            free(message.file);
+            free(message.text);
+            free(message.source_line);
+            continue;
+        }
+        size_t place = kept++;
+        for (; place > report->first && message_is_before(&message, &list->items[place - 1]); place--)
+            list->items[place] = list->items[place - 1];
+        list->items[place] = message;
+    }
+    list->count = kept;
+    if (report_is_full(report))
+        message_add(list, MESSAGE_ERROR, "%s: many errors: reading stopped", report->source->file);
+    if (report->warning_count > MESSAGES_TOLD)
+        message_add(list, MESSAGE_WARNING, "%s: %zu more warnings", report->source->file,
+                    report->warning_count - MESSAGES_TOLD);
+    return report->error_count == 0;
+}

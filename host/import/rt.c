@@ -1,0 +1,318 @@
+// `.rt`, the scenes of miniRT: one element a line, fields separated by blanks, vectors by commas.
+// What is read and what is tolerated: docs/scene-format.md.
+#include "host/base/array.h"
+#include "host/import/line.h"
+#include "host/import/load.h"
+
+typedef struct {
+    Report report;
+    Line line;
+    Scene *scene;
+    bool lenient;
+    bool has_element, has_ambient, has_camera, has_size;
+} RtReader;
+
+static const Range range_axis = {-1, 1, false, "from -1 to 1"};
+
+static bool read_color(Line *line, Color *color)
+{
+    if (!line_comma_vector(line, "color", &range_byte, color)) return false;
+    *color = vector_scale(*color, 1.0 / 255);
+    return true;
+}
+
+// A unit vector; other lengths are common, and made so. Zero stays, for the caller to judge.
+static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
+{
+    const double tolerated = 0.01; // files round to two or three digits
+    size_t offset = line_peek(line).offset;
+    if (!line_comma_vector(line, name, &range_axis, axis)) return false;
+    if (!vector_is_zero(*axis) && fabs(vector_length(*axis) - 1) > tolerated)
+        report_warning(line->report, offset, "'%s' is not of unit length: made so", name);
+    *axis = vector_normalize(*axis);
+    return true;
+}
+
+static bool read_axis(Line *line, const char *name, Vector3 *axis)
+{
+    size_t offset = line_peek(line).offset;
+    if (!read_unit_vector(line, name, axis)) return false;
+    if (vector_is_zero(*axis)) report_error(line->report, offset, "'%s' must not be zero", name);
+    return !vector_is_zero(*axis);
+}
+
+// The line must end here; with --lenient, what is left (textures and the like) is skipped.
+static bool element_end(RtReader *reader)
+{
+    if (!reader->lenient) return line_end(&reader->line);
+    for (Word word; (word = line_word(&reader->line)).length;)
+        report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
+    return true;
+}
+
+// Whether specular and shininess follow. With --lenient a number alone is a field of some other meaning.
+static bool finish_follows(const RtReader *reader)
+{
+    Line ahead = reader->line;
+    return word_is_number(line_word(&ahead)) && (!reader->lenient || word_is_number(line_peek(&ahead)));
+}
+
+// What ends an object's line: perhaps specular and shininess, nothing else.
+static bool read_finish(RtReader *reader, Material *material)
+{
+    Line *line = &reader->line;
+    if (finish_follows(reader) &&
+        !(line_number(line, "specular", &range_unit, &material->specular) &&
+          line_number(line, "shininess", &range_not_negative, &material->shininess)))
+        return false;
+    return element_end(reader);
+}
+
+static bool read_material(RtReader *reader, Material *material)
+{
+    return read_color(&reader->line, &material->color) && read_finish(reader, material);
+}
+
+static bool read_ambient(RtReader *reader)
+{
+    double ratio;
+    Color color;
+    if (reader->has_ambient) {
+        report_error(&reader->report, reader->line.start, "a second ambient light");
+        return false;
+    }
+    reader->has_ambient = true;
+    if (!line_number(&reader->line, "ratio", &range_unit, &ratio) || !read_color(&reader->line, &color) ||
+        !element_end(reader))
+        return false;
+    reader->scene->ambient = vector_scale(color, ratio);
+    return true;
+}
+
+static bool read_camera(RtReader *reader, Camera *camera)
+{
+    Line *line = &reader->line;
+    Vector3 direction;
+    double fov_degrees;
+    if (!line_comma_vector(line, "position", NULL, &camera->position)) return false;
+    size_t offset = line_peek(line).offset;
+    if (!read_unit_vector(line, "direction", &direction) ||
+        !line_number(line, "fov", &range_field_of_view, &fov_degrees) || !element_end(reader))
+        return false;
+    if (vector_is_zero(direction)) {
+        report_warning(&reader->report, offset, "'direction' is zero: looks along +z");
+        direction = (Vector3){0, 0, 1};
+    }
+    // Far from the origin a step of one could be lost in rounding.
+    double step = fmax(1, vector_length(camera->position));
+    camera->look_at = vector_add(camera->position, vector_scale(direction, step));
+    camera->up = (Vector3){0, 1, 0};
+    camera->field_axis = FIELD_HORIZONTAL;
+    camera->half_tangent = tan(fov_degrees * (M_PI / 360));
+    return true;
+}
+
+static bool read_only_camera(RtReader *reader)
+{
+    if (reader->has_camera) {
+        report_error(&reader->report, reader->line.start, "a second camera");
+        return false;
+    }
+    reader->has_camera = true;
+    return read_camera(reader, &reader->scene->camera);
+}
+
+// The older subject's `c`, of which a file may have several.
+static bool read_one_camera(RtReader *reader)
+{
+    if (!reader->has_camera) return read_only_camera(reader);
+    report_warning(&reader->report, reader->line.start, "only the first camera is used");
+    Camera unused = {0};
+    return read_camera(reader, &unused);
+}
+
+static bool read_light(RtReader *reader)
+{
+    Line *line = &reader->line;
+    Light light = {.kind = LIGHT_POINT, .color = {1, 1, 1}};
+    double ratio;
+    if (!line_comma_vector(line, "position", NULL, &light.position) ||
+        !line_number(line, "ratio", &range_unit, &ratio) ||
+        (line_peek(line).length && !read_color(line, &light.color)) || !element_end(reader))
+        return false;
+    light.color = vector_scale(light.color, ratio);
+    array_push(reader->scene->lights, light);
+    return true;
+}
+
+static bool read_resolution(RtReader *reader)
+{
+    if (reader->has_size) {
+        report_error(&reader->report, reader->line.start, "a second resolution");
+        return false;
+    }
+    reader->has_size = true;
+    return line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
+           line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height) &&
+           element_end(reader);
+}
+
+static bool read_sphere(RtReader *reader)
+{
+    Object object = {.kind = SHAPE_SPHERE};
+    Material material = material_default();
+    double diameter;
+    if (!line_comma_vector(&reader->line, "center", NULL, &object.as.sphere.center) ||
+        !line_number(&reader->line, "diameter", &range_positive, &diameter) ||
+        !read_material(reader, &material))
+        return false;
+    object.as.sphere.radius = diameter / 2;
+    scene_add_object(reader->scene, object, &material);
+    return true;
+}
+
+static bool read_plane(RtReader *reader)
+{
+    Object object = {.kind = SHAPE_PLANE};
+    Material material = material_default();
+    if (!line_comma_vector(&reader->line, "point", NULL, &object.as.plane.point) ||
+        !read_axis(&reader->line, "normal", &object.as.plane.normal) || !read_material(reader, &material))
+        return false;
+    scene_add_object(reader->scene, object, &material);
+    return true;
+}
+
+static bool word_has_comma(Word word)
+{
+    for (size_t i = 0; i < word.length; i++) {
+        if (word.text[i] == ',') return true;
+    }
+    return false;
+}
+
+static bool read_cylinder(RtReader *reader)
+{
+    Line *line = &reader->line;
+    Object object = {.kind = SHAPE_CYLINDER, .as.cylinder = {.finite = true, .caps = true}};
+    Material material = material_default();
+    Vector3 center, axis;
+    double diameter, height;
+    if (!line_comma_vector(line, "center", NULL, &center) || !read_axis(line, "axis", &axis)) return false;
+    Word third = line_peek(line);
+    bool color_first = word_has_comma(third);
+    if (color_first) {
+        report_warning(&reader->report, third.offset, "the color stands before the sizes");
+        if (!read_color(line, &material.color)) return false;
+    }
+    if (!line_number(line, "diameter", &range_positive, &diameter) ||
+        !line_number(line, "height", &range_positive, &height) ||
+        !(color_first ? read_finish(reader, &material) : read_material(reader, &material)))
+        return false;
+    object.as.cylinder.from = vector_subtract(center, vector_scale(axis, height / 2));
+    object.as.cylinder.axis = vector_scale(axis, height);
+    object.as.cylinder.radius = diameter / 2;
+    scene_add_object(reader->scene, object, &material);
+    return true;
+}
+
+// The bonus cone: its base at the point, its tip a height along the axis.
+static bool read_cone(RtReader *reader)
+{
+    Line *line = &reader->line;
+    Object object = {.kind = SHAPE_CONE, .as.cone = {.finite = true, .caps = true}};
+    Material material = material_default();
+    Vector3 axis;
+    double diameter, height;
+    if (!line_comma_vector(line, "base", NULL, &object.as.cone.from) || !read_axis(line, "axis", &axis) ||
+        !line_number(line, "diameter", &range_positive, &diameter) ||
+        !line_number(line, "height", &range_positive, &height) || !read_material(reader, &material))
+        return false;
+    object.as.cone.axis = vector_scale(axis, height);
+    object.as.cone.radius[0] = diameter / 2;
+    scene_add_object(reader->scene, object, &material);
+    return true;
+}
+
+// A square's sides run level and upward: along the horizontal of its plane, and across it. The subject leaves
+// the turn about the normal open.
+static bool read_square(RtReader *reader)
+{
+    Vector3 center, normal;
+    Material material = material_default();
+    double side;
+    if (!line_comma_vector(&reader->line, "center", NULL, &center) ||
+        !read_axis(&reader->line, "normal", &normal) ||
+        !line_number(&reader->line, "side", &range_positive, &side) || !read_material(reader, &material))
+        return false;
+    Vector3 level = vector_cross((Vector3){0, 1, 0}, normal);
+    level = vector_is_zero(level) ? (Vector3){1, 0, 0} : vector_normalize(level);
+    Vector3 across = vector_scale(vector_cross(normal, level), side / 2);
+    level = vector_scale(level, side / 2);
+    Vector3 low = vector_subtract(center, across), high = vector_add(center, across);
+    Vector3 corners[4] = {vector_subtract(low, level), vector_add(low, level), vector_add(high, level),
+                          vector_subtract(high, level)};
+    uint32_t index = scene_add_material(reader->scene, &material, "");
+    for (size_t i = 1; i <= 2; i++) {
+        Object half = {.kind = SHAPE_TRIANGLE,
+                       .material = index,
+                       .as.triangle = {.vertices = {corners[0], corners[i], corners[i + 1]}}};
+        array_push(reader->scene->objects, half);
+    }
+    return true;
+}
+
+static bool read_triangle(RtReader *reader)
+{
+    Object object = {.kind = SHAPE_TRIANGLE};
+    Material material = material_default();
+    for (size_t i = 0; i < 3; i++) {
+        if (!line_comma_vector(&reader->line, "vertex", NULL, &object.as.triangle.vertices[i])) return false;
+    }
+    if (!read_material(reader, &material)) return false;
+    scene_add_object(reader->scene, object, &material);
+    return true;
+}
+
+// Each reads the rest of its line; reports and returns false at the first fault.
+static const struct {
+    const char *name;
+    bool (*read)(RtReader *reader);
+} elements[] = {
+    {"A", read_ambient},   {"C", read_only_camera}, {"c", read_one_camera}, {"L", read_light},
+    {"l", read_light},     {"R", read_resolution},  {"sp", read_sphere},    {"pl", read_plane},
+    {"cy", read_cylinder}, {"co", read_cone},       {"sq", read_square},    {"tr", read_triangle},
+};
+
+static void element_read(RtReader *reader)
+{
+    Word name = line_word(&reader->line);
+    if (!name.length) return;
+    reader->has_element = true;
+    for (size_t i = 0; i < sizeof elements / sizeof *elements; i++) {
+        if (word_is(name, elements[i].name)) {
+            elements[i].read(reader);
+            return;
+        }
+    }
+    if (reader->lenient)
+        report_warning(&reader->report, name.offset, "skipped unknown element '%.*s'", word_shown(name),
+                       name.text);
+    else
+        report_error(&reader->report, name.offset, "unknown element '%.*s'", word_shown(name), name.text);
+}
+
+bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
+{
+    *scene = (Scene){.color_meaning = COLORS_DISPLAY};
+    RtReader reader = {
+        .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
+    if (line_open(&reader.line, &reader.report)) {
+        while (!report_is_full(&reader.report) && line_next(&reader.line, '#'))
+            element_read(&reader);
+        if (!reader.has_element)
+            report_error(&reader.report, 0, "the scene is empty");
+        else if (!reader.has_camera && !report_is_full(&reader.report))
+            report_error(&reader.report, source->length, "no camera: a line with C");
+    }
+    return scene_finish(scene, &reader.report);
+}

@@ -1,0 +1,219 @@
+#include "host/import/yaml/fields.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { FIELD_LIMIT = 32 };
+
+void expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
+{
+    char found[WORD_SHOWN + sizeof "''"];
+    if (node->kind == YAML_MAPPING)
+        snprintf(found, sizeof found, "a mapping");
+    else if (node->kind == YAML_SEQUENCE)
+        snprintf(found, sizeof found, "a list of %u", node->child_count);
+    else if (yaml_text(&reader->tree, node)[0] == '\0')
+        snprintf(found, sizeof found, "nothing");
+    else
+        snprintf(found, sizeof found, "'%.*s'", WORD_SHOWN, yaml_text(&reader->tree, node));
+    report_error(&reader->report, node->offset, "'%s' must be %s, not %s", name, expected, found);
+}
+
+void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
+                    size_t known_count)
+{
+    const char *word = yaml_text(&reader->tree, node);
+    const char *nearest = strlen(word) <= WORD_SHOWN ? text_nearest(word, known, known_count) : NULL;
+    if (nearest)
+        report_error(&reader->report, node->offset, "unknown %s '%s': did you mean '%s'?", kind, word,
+                     nearest);
+    else
+        report_error(&reader->report, node->offset, "unknown %s '%.*s'", kind, WORD_SHOWN, word);
+}
+
+static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,
+                                 const Field *fields, size_t field_count)
+{
+    const char *known[FIELD_LIMIT];
+    for (size_t i = 0; i < field_count; i++)
+        known[i] = fields[i].name;
+    char kind[64];
+    snprintf(kind, sizeof kind, "%s key", what);
+    unknown_report(reader, key, kind, known, field_count);
+}
+
+bool key_is_word(YamlReader *reader, const YamlNode *key)
+{
+    if (key->kind == YAML_SCALAR) return true;
+    report_error(&reader->report, key->offset, "a key must be a word");
+    return false;
+}
+
+// Index of the field that a key names, or field_count.
+static size_t field_find(const YamlReader *reader, const YamlNode *key, const Field *fields,
+                         size_t field_count)
+{
+    size_t index = 0;
+    while (index < field_count && strcmp(yaml_text(&reader->tree, key), fields[index].name) != 0)
+        index++;
+    return index;
+}
+
+// Leaves in `forms` those that the key allows. `seen`: the fields before it.
+static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *field, const Field *fields,
+                        const bool *seen, unsigned *forms)
+{
+    if (*forms & field->forms) {
+        *forms &= field->forms;
+        return true;
+    }
+    const Field *other = fields;
+    while (!seen[other - fields] || (other->forms & field->forms))
+        other++;
+    report_error(&reader->report, key->offset, "'%s' cannot stand beside '%s'", field->name, other->name);
+    return false;
+}
+
+bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
+                 size_t field_count, void *target, Form *form)
+{
+    if (mapping->kind != YAML_MAPPING) {
+        expected_report(reader, what, "a mapping", mapping);
+        return false;
+    }
+    size_t errors_before = reader->report.error_count;
+    bool seen[FIELD_LIMIT] = {false};
+    unsigned forms = FORM_ANY;
+    bool mixed = false;
+    const YamlNode *value;
+    for (const YamlNode *key = yaml_first(&reader->tree, mapping); key && !report_is_full(&reader->report);
+         key = yaml_next(&reader->tree, value)) {
+        value = yaml_next(&reader->tree, key);
+        if (!key_is_word(reader, key)) continue;
+        size_t index = field_find(reader, key, fields, field_count);
+        const Field *field = &fields[index];
+        if (index == field_count)
+            unknown_field_report(reader, key, what, fields, field_count);
+        else if (seen[index])
+            report_error(&reader->report, key->offset, "'%s' is given twice", field->name);
+        else if (form_narrow(reader, key, field, fields, seen, &forms))
+            field->read(reader, field, value, (char *)target + field->offset);
+        else
+            mixed = true;
+        if (index < field_count) seen[index] = true;
+    }
+    unsigned chosen = forms & -forms; // the first
+    for (size_t i = 0; i < field_count && !mixed; i++) {
+        if (fields[i].required && (fields[i].forms & chosen) && !seen[i])
+            report_error(&reader->report, mapping->offset, "%s lacks '%s'", what, fields[i].name);
+    }
+    if (form) *form = chosen;
+    return reader->report.error_count == errors_before;
+}
+
+const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name)
+{
+    const YamlNode *value;
+    for (const YamlNode *key = yaml_first(&reader->tree, mapping); key;
+         key = yaml_next(&reader->tree, value)) {
+        value = yaml_next(&reader->tree, key);
+        if (key->kind == YAML_SCALAR && !strcmp(yaml_text(&reader->tree, key), name)) return value;
+    }
+    return mapping;
+}
+
+bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
+                 const YamlNode **value)
+{
+    if (node->kind != YAML_MAPPING || node->child_count != 2) {
+        report_error(&reader->report, node->offset, "expected %s", expected);
+        return false;
+    }
+    *key = yaml_first(&reader->tree, node);
+    *value = yaml_next(&reader->tree, *key);
+    return key_is_word(reader, *key);
+}
+
+bool read_node(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    (void)reader, (void)field;
+    *(const YamlNode **)target = node;
+    return true;
+}
+
+bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    if (node->kind != YAML_SCALAR) {
+        expected_report(reader, field->name, "a number", node);
+        return false;
+    }
+    const char *text = yaml_text(&reader->tree, node);
+    return number_read_field(&reader->report, node->offset, field->name, text, strlen(text), field->range,
+                             target);
+}
+
+bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
+                FieldReader *read, size_t size, void *target)
+{
+    if (node->kind != YAML_SEQUENCE || node->child_count != count) {
+        expected_report(reader, field->name, what, node);
+        return false;
+    }
+    bool all_read = true;
+    char *place = target;
+    for (const YamlNode *item = yaml_first(&reader->tree, node); item;
+         item = yaml_next(&reader->tree, item)) {
+        all_read &= read(reader, field, item, place);
+        place += size;
+    }
+    return all_read;
+}
+
+bool read_vector(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    double values[3];
+    if (!items_read(reader, field, node, 3, "three numbers", read_number, sizeof *values, values))
+        return false;
+    *(Vector3 *)target = (Vector3){values[0], values[1], values[2]};
+    return true;
+}
+
+bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    if (!read_vector(reader, field, node, target)) return false;
+    if (vector_is_zero(*(const Vector3 *)target)) {
+        report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
+        return false;
+    }
+    return true;
+}
+
+bool read_color(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Field channels = *field;
+    channels.range = &range_not_negative;
+    return read_vector(reader, &channels, node, target);
+}
+
+bool read_factors(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Field channels = *field;
+    channels.range = &range_not_negative;
+    if (node->kind == YAML_SEQUENCE) return read_vector(reader, &channels, node, target);
+    double value;
+    if (!read_number(reader, &channels, node, &value)) return false;
+    *(Color *)target = (Color){value, value, value};
+    return true;
+}
+
+bool read_boolean(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    bool is_true = !strcmp(text, "true");
+    if (!is_true && strcmp(text, "false") != 0) {
+        expected_report(reader, field->name, "true or false", node);
+        return false;
+    }
+    *(bool *)target = is_true;
+    return true;
+}

@@ -1,0 +1,192 @@
+#include "host/base/array.h"
+#include "host/import/yaml/yaml.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// So that wrong names and many pictures in a hostile file cost little.
+enum { NAMES_COMPARED = 1000, IMAGES_LARGEST = 1000 };
+
+typedef struct {
+    Color colors[2];
+    double size;
+} Checker;
+
+static bool read_two_colors(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 2, "two colors", read_color, sizeof(Color), target);
+}
+
+static bool read_checker(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    static const Field fields[] = {
+        {"colors", read_two_colors, offsetof(Checker, colors), FORM_ANY, REQUIRED, NULL},
+        {"size", read_number, offsetof(Checker, size), FORM_ANY, OPTIONAL, &range_positive},
+    };
+    Checker checker = {.size = 1};
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &checker, NULL)) return false;
+    Material *material = target;
+    material->checker = true;
+    memcpy(material->checker_colors, checker.colors, sizeof checker.colors);
+    material->checker_size = checker.size;
+    return true;
+}
+
+char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
+{
+    if (node->kind != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
+        expected_report(reader, name, "the name of a file", node);
+        return NULL;
+    }
+    const char *scene_file = reader->report.source->file, *file = yaml_text(&reader->tree, node);
+    const char *slash = strrchr(scene_file, '/');
+    int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - scene_file) : 0;
+    Text path = {0};
+    text_appendf(&path, "%.*s%s", folder_length, scene_file, file);
+    return path.items;
+}
+
+// Materials with the same picture share it.
+static bool read_image(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Scene *scene = reader->scene;
+    char *path = yaml_read_path(reader, field->name, node);
+    if (!path) return false;
+    size_t index = 0;
+    while (index < scene->images.count && strcmp(scene->images.items[index].path, path) != 0)
+        index++;
+    if (index == IMAGES_LARGEST) {
+        report_error(&reader->report, node->offset, "more than %d pictures", IMAGES_LARGEST);
+        free(path);
+        return false;
+    }
+    if (index == scene->images.count) {
+        SceneImage image = {path, node->offset};
+        array_push(scene->images, image);
+    } else {
+        free(path);
+    }
+    *(uint32_t *)target = (uint32_t)index + 1;
+    return true;
+}
+
+static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
+{
+    static const Field fields[] = {
+        {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL, NULL},
+        {"checker", read_checker, 0, FORM_SECOND, OPTIONAL, NULL},
+        {"image", read_image, offsetof(Material, image), FORM_THIRD, REQUIRED, NULL},
+        {"size", read_number, offsetof(Material, image_size), FORM_THIRD, OPTIONAL, &range_positive},
+        {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"diffuse", read_factors, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
+        {"specular", read_number, offsetof(Material, specular), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"shininess", read_number, offsetof(Material, shininess), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"reflection", read_number, offsetof(Material, reflection), FORM_ANY, OPTIONAL, &range_unit},
+        {"transmission", read_number, offsetof(Material, transmission), FORM_ANY, OPTIONAL, &range_unit},
+        {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
+    };
+    Material material = material_default();
+    if (node) fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
+    scene_add_material(reader->scene, &material, name);
+}
+
+static int names_compare(const void *a, const void *b)
+{
+    const MaterialName *first = a, *second = b;
+    int order = strcmp(first->name, second->name);
+    return order ? order : (first->offset > second->offset) - (first->offset < second->offset);
+}
+
+static int name_matches(const void *word, const void *name)
+{
+    return strcmp(word, ((const MaterialName *)name)->name);
+}
+
+void yaml_read_materials(YamlReader *reader, const YamlNode *node)
+{
+    if (node->kind != YAML_MAPPING) {
+        expected_report(reader, "materials", "a mapping", node);
+        return;
+    }
+    const YamlNode *value;
+    for (const YamlNode *key = yaml_first(&reader->tree, node); key; key = yaml_next(&reader->tree, value)) {
+        value = yaml_next(&reader->tree, key);
+        if (!key_is_word(reader, key)) continue;
+        MaterialName name = {.name = yaml_text(&reader->tree, key),
+                             .material = (uint32_t)reader->scene->materials.count,
+                             .offset = key->offset};
+        array_push(reader->names, name);
+        material_append(reader, value, name.name);
+    }
+    if (!reader->names.count) return;
+    qsort(reader->names.items, reader->names.count, sizeof(MaterialName), names_compare);
+    for (size_t i = 1; i < reader->names.count; i++) {
+        const MaterialName *name = &reader->names.items[i];
+        if (!strcmp(name[-1].name, name->name))
+            report_error(&reader->report, name->offset, "material '%.40s' is given twice", name->name);
+    }
+}
+
+static void unknown_material_report(YamlReader *reader, const YamlNode *node)
+{
+    const char *known[NAMES_COMPARED];
+    size_t known_count = 0;
+    for (; known_count < NAMES_COMPARED && known_count < reader->names.count; known_count++)
+        known[known_count] = reader->names.items[known_count].name;
+    unknown_report(reader, node, "material", known, known_count);
+}
+
+bool read_material(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    uint32_t *index = target;
+    if (node->kind == YAML_MAPPING) {
+        *index = (uint32_t)reader->scene->materials.count;
+        material_append(reader, node, "");
+        return true;
+    }
+    if (node->kind == YAML_SEQUENCE || !yaml_text(&reader->tree, node)[0]) {
+        expected_report(reader, field->name, "the name of a material or a mapping", node);
+        return false;
+    }
+    const MaterialName *name = reader->names.count
+                                   ? bsearch(yaml_text(&reader->tree, node), reader->names.items,
+                                             reader->names.count, sizeof(MaterialName), name_matches)
+                                   : NULL;
+    if (!name) {
+        unknown_material_report(reader, node);
+        return false;
+    }
+    *index = name->material;
+    return true;
+}
+
+bool material_fits(YamlReader *reader, const YamlNode *mapping, const Object *object)
+{
+    const Scene *scene = reader->scene;
+    if (scene->materials.items[object->material].image == 0) return true;
+    const YamlNode *place = field_node(reader, mapping, "material");
+    switch (object->kind) {
+    case SHAPE_SPHERE:
+    case SHAPE_PLANE:
+    case SHAPE_DISC:
+        return true;
+    case SHAPE_MESH:
+        if (scene->meshes.items[object->as.mesh.index].uvs) return true;
+        report_error(&reader->report, place->offset, "the mesh has no uv for the material's image");
+        return false;
+    default:
+        report_error(&reader->report, place->offset,
+                     "an image lies on a sphere, plane, disc or mesh, not on a %s",
+                     shape_names[object->kind]);
+        return false;
+    }
+}
+
+uint32_t material_default_index(YamlReader *reader)
+{
+    if (reader->default_material == UINT32_MAX) {
+        reader->default_material = (uint32_t)reader->scene->materials.count;
+        material_append(reader, NULL, "");
+    }
+    return reader->default_material;
+}

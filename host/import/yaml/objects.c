@@ -1,0 +1,201 @@
+#include "host/base/array.h"
+#include "host/import/yaml/yaml.h"
+
+#include <string.h>
+
+static const Range range_quarter_turn = {0, 90, true, "greater than 0 and less than 90"};
+
+#define MATERIAL                                                                                             \
+    {                                                                                                        \
+        "material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL, NULL                      \
+    }
+
+static const Field sphere_fields[] = {
+    {"center", read_vector, offsetof(Object, as.sphere.center), FORM_ANY, REQUIRED, NULL},
+    {"radius", read_number, offsetof(Object, as.sphere.radius), FORM_ANY, REQUIRED, &range_positive},
+    MATERIAL,
+};
+
+static const Field plane_fields[] = {
+    {"point", read_vector, offsetof(Object, as.plane.point), FORM_ANY, REQUIRED, NULL},
+    {"normal", read_direction, offsetof(Object, as.plane.normal), FORM_ANY, REQUIRED, NULL},
+    MATERIAL,
+};
+
+static const Field disc_fields[] = {
+    {"center", read_vector, offsetof(Object, as.disc.center), FORM_ANY, REQUIRED, NULL},
+    {"normal", read_direction, offsetof(Object, as.disc.normal), FORM_ANY, REQUIRED, NULL},
+    {"radius", read_number, offsetof(Object, as.disc.radius), FORM_ANY, REQUIRED, &range_positive},
+    MATERIAL,
+};
+
+static const Field box_fields[] = {
+    {"min", read_vector, offsetof(Object, as.box.min), FORM_ANY, REQUIRED, NULL},
+    {"max", read_vector, offsetof(Object, as.box.max), FORM_ANY, REQUIRED, NULL},
+    MATERIAL,
+};
+
+static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
+{
+    (void)form;
+    Vector3 min = object->as.box.min, max = object->as.box.max;
+    if (min.x <= max.x && min.y <= max.y && min.z <= max.z) return true;
+    report_error(&reader->report, field_node(reader, mapping, "max")->offset,
+                 "'max' must not be below 'min'");
+    return false;
+}
+
+// `from` and `to` share places with `point` and `axis`: the finite form's `to` becomes the axis in the end.
+static const Field cylinder_fields[] = {
+    {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FIRST, REQUIRED, NULL},
+    {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FIRST, REQUIRED, NULL},
+    {"point", read_vector, offsetof(Object, as.cylinder.from), FORM_SECOND, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_SECOND, REQUIRED, NULL},
+    {"radius", read_number, offsetof(Object, as.cylinder.radius), FORM_ANY, REQUIRED, &range_positive},
+    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FIRST, OPTIONAL, NULL},
+    MATERIAL,
+};
+
+static bool axis_finish(YamlReader *reader, const YamlNode *mapping, Vector3 from, Vector3 *axis)
+{
+    *axis = vector_subtract(*axis, from);
+    if (!vector_is_zero(*axis)) return true;
+    report_error(&reader->report, field_node(reader, mapping, "to")->offset, "'to' must differ from 'from'");
+    return false;
+}
+
+static bool cylinder_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
+{
+    object->as.cylinder.finite = form == FORM_FIRST;
+    object->as.cylinder.caps &= object->as.cylinder.finite;
+    return form == FORM_SECOND ||
+           axis_finish(reader, mapping, object->as.cylinder.from, &object->as.cylinder.axis);
+}
+
+static bool read_two_radii(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
+}
+
+static const Field cone_fields[] = {
+    {"from", read_vector, offsetof(Object, as.cone.from), FORM_FIRST, REQUIRED, NULL},
+    {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FIRST, REQUIRED, NULL},
+    {"radius", read_two_radii, offsetof(Object, as.cone.radius), FORM_FIRST, REQUIRED, &range_not_negative},
+    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FIRST, OPTIONAL, NULL},
+    {"apex", read_vector, offsetof(Object, as.cone.from), FORM_SECOND, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_SECOND, REQUIRED, NULL},
+    {"angle", read_number, offsetof(Object, as.cone.slope), FORM_SECOND, REQUIRED, &range_quarter_turn},
+    MATERIAL,
+};
+
+static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
+{
+    object->as.cone.finite = form == FORM_FIRST;
+    object->as.cone.caps &= object->as.cone.finite;
+    if (form == FORM_SECOND) {
+        object->as.cone.slope = tan(object->as.cone.slope * (M_PI / 180));
+        return true;
+    }
+    if (object->as.cone.radius[0] == 0 && object->as.cone.radius[1] == 0) {
+        report_error(&reader->report, field_node(reader, mapping, "radius")->offset,
+                     "'radius' must not be zero at both ends");
+        return false;
+    }
+    return axis_finish(reader, mapping, object->as.cone.from, &object->as.cone.axis);
+}
+
+static bool read_three_points(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 3, "three points", read_vector, sizeof(Vector3), target);
+}
+
+static bool read_three_directions(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 3, "three directions", read_direction, sizeof(Vector3), target);
+}
+
+static const Field triangle_fields[] = {
+    {"vertices", read_three_points, offsetof(Object, as.triangle.vertices), FORM_ANY, REQUIRED, NULL},
+    {"normals", read_three_directions, offsetof(Object, as.triangle.normals), FORM_ANY, OPTIONAL, NULL},
+    MATERIAL,
+};
+
+static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
+{
+    (void)form;
+    const Vector3 *vertices = object->as.triangle.vertices;
+    object->as.triangle.smooth = !vector_is_zero(object->as.triangle.normals[0]);
+    if (vector_is_zero(vector_cross(vector_subtract(vertices[1], vertices[0]),
+                                    vector_subtract(vertices[2], vertices[0]))))
+        report_warning(&reader->report, mapping->offset, "a triangle without area is never hit");
+    return true;
+}
+
+static const Field torus_fields[] = {
+    {"center", read_vector, offsetof(Object, as.torus.center), FORM_ANY, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.torus.axis), FORM_ANY, REQUIRED, NULL},
+    {"major", read_number, offsetof(Object, as.torus.major), FORM_ANY, REQUIRED, &range_positive},
+    {"minor", read_number, offsetof(Object, as.torus.minor), FORM_ANY, REQUIRED, &range_positive},
+    MATERIAL,
+};
+
+typedef struct {
+    Object start; // what the fields leave as it is
+    const Field *fields;
+    size_t field_count;
+    // What the fields cannot say one by one; reports and returns false where they do not fit together. May be
+    // NULL.
+    bool (*finish)(YamlReader *reader, const YamlNode *mapping, Form form, Object *object);
+} Shape;
+
+#define FIELDS(fields) fields, COUNT_OF(fields)
+
+// In the order of ShapeKind; a mesh has its own reader.
+static const Shape shapes[SHAPE_MESH] = {
+    {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL},
+    {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL},
+    {{.kind = SHAPE_DISC}, FIELDS(disc_fields), NULL},
+    {{.kind = SHAPE_BOX}, FIELDS(box_fields), box_finish},
+    {{.kind = SHAPE_CYLINDER, .as.cylinder.caps = true}, FIELDS(cylinder_fields), cylinder_finish},
+    {{.kind = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish},
+    {{.kind = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish},
+    {{.kind = SHAPE_TORUS}, FIELDS(torus_fields), NULL},
+};
+
+static void object_read(YamlReader *reader, const YamlNode *item)
+{
+    const YamlNode *key, *mapping;
+    if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
+    size_t kind = 0;
+    while (kind < SHAPE_COUNT && strcmp(yaml_text(&reader->tree, key), shape_names[kind]) != 0)
+        kind++;
+    if (kind == SHAPE_COUNT) {
+        unknown_report(reader, key, "shape", shape_names, SHAPE_COUNT);
+        return;
+    }
+    if (kind == SHAPE_MESH) {
+        yaml_read_mesh(reader, mapping);
+        return;
+    }
+    const Shape *shape = &shapes[kind];
+    Object object = shape->start;
+    object.material = UINT32_MAX;
+    Form form;
+    if (!fields_read(reader, mapping, shape_names[kind], shape->fields, shape->field_count, &object, &form))
+        return;
+    if (shape->finish && !shape->finish(reader, mapping, form, &object)) return;
+    if (object.material == UINT32_MAX) object.material = material_default_index(reader);
+    if (!material_fits(reader, mapping, &object)) return;
+    array_push(reader->scene->objects, object);
+}
+
+void yaml_read_objects(YamlReader *reader, const YamlNode *node)
+{
+    if (node->kind != YAML_SEQUENCE) {
+        expected_report(reader, "objects", "a list", node);
+        return;
+    }
+    for (const YamlNode *item = yaml_first(&reader->tree, node); item && !report_is_full(&reader->report);
+         item = yaml_next(&reader->tree, item))
+        object_read(reader, item);
+}

@@ -1,0 +1,286 @@
+#include "host/import/yaml/tree.h"
+#include "host/base/array.h"
+#include "host/base/fault.h"
+
+#include <libfyaml.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DEPTH_LIMIT = 32, ANCHOR_LIMIT = 1000 };
+
+typedef struct {
+    size_t text, length; // name in the source
+    uint32_t node;
+} Anchor;
+
+typedef struct {
+    uint32_t node, last_child;
+} OpenNode;
+
+typedef struct {
+    YamlTree *tree;
+    Report *report;
+    OpenNode open[DEPTH_LIMIT];
+    size_t depth;
+    size_t end; // of the last event, where an empty value stands
+    struct {
+        Anchor *items;
+        size_t count, capacity;
+    } anchors;
+} TreeBuilder;
+
+static void node_append(TreeBuilder *builder, YamlNode node)
+{
+    YamlTree *tree = builder->tree;
+    uint32_t index = (uint32_t)tree->nodes.count;
+    array_push(tree->nodes, node);
+    if (!builder->depth) return;
+    OpenNode *parent = &builder->open[builder->depth - 1];
+    tree->nodes.items[parent->node].child_count++;
+    if (parent->last_child)
+        tree->nodes.items[parent->last_child].next = index;
+    else
+        tree->nodes.items[parent->node].first = index;
+    parent->last_child = index;
+}
+
+// Chunk by chunk: libfyaml 0.7's fy_token_get_text loses memory on some quoted texts of several lines, and
+// its fy_token_iter_read mixes up the chunks.
+static bool token_append_text(Text *text, struct fy_token *token)
+{
+    struct fy_token_iter *iterator = fy_token_iter_create(token);
+    if (!iterator) fault("libfyaml: out of memory");
+    const struct fy_iter_chunk *chunk = NULL;
+    int error = 0;
+    while ((chunk = fy_token_iter_chunk_next(iterator, chunk, &error)))
+        text_append(text, chunk->str, chunk->len);
+    fy_token_iter_destroy(iterator);
+    return !error;
+}
+
+static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode node)
+{
+    Text *texts = &builder->tree->texts;
+    node.kind = YAML_SCALAR;
+    node.text = texts->count;
+    if (token && !token_append_text(texts, token)) {
+        report_error(builder->report, node.offset, "not well-formed YAML");
+        return false;
+    }
+    text_append(texts, "", 1);
+    if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1)) {
+        report_error(builder->report, node.offset, "a text with a NUL character in it");
+        return false;
+    }
+    node_append(builder, node);
+    return true;
+}
+
+static bool collection_open(TreeBuilder *builder, YamlNode node)
+{
+    if (builder->depth == DEPTH_LIMIT) {
+        report_error(builder->report, node.offset, "nested more than %d levels deep", DEPTH_LIMIT);
+        return false;
+    }
+    uint32_t index = (uint32_t)builder->tree->nodes.count;
+    node_append(builder, node);
+    builder->open[builder->depth++] = (OpenNode){.node = index};
+    return true;
+}
+
+// Later anchors of a name hide earlier ones (YAML 1.2.2, section 7.1).
+static const Anchor *anchor_find(const TreeBuilder *builder, const char *name, size_t length)
+{
+    for (size_t i = builder->anchors.count; i-- > 0;) {
+        const Anchor *anchor = &builder->anchors.items[i];
+        if (anchor->length == length && !memcmp(builder->report->source->bytes + anchor->text, name, length))
+            return anchor;
+    }
+    return NULL;
+}
+
+static bool alias_append(TreeBuilder *builder, const char *name, size_t length, size_t offset)
+{
+    const Anchor *anchor = anchor_find(builder, name, length);
+    if (!anchor) {
+        report_error(builder->report, offset, "unknown alias '*%.*s'", (int)(length < 40 ? length : 40),
+                     name);
+        return false;
+    }
+    for (size_t i = 0; i < builder->depth; i++) {
+        if (builder->open[i].node == anchor->node) {
+            report_error(builder->report, offset, "an alias inside of what it names");
+            return false;
+        }
+    }
+    YamlNode copy = builder->tree->nodes.items[anchor->node];
+    copy.next = 0;
+    node_append(builder, copy);
+    return true;
+}
+
+static bool anchor_add(TreeBuilder *builder, struct fy_token *token)
+{
+    size_t start = fy_token_start_mark(token)->input_pos,
+           length = fy_token_end_mark(token)->input_pos - start;
+    if (builder->anchors.count == ANCHOR_LIMIT) {
+        report_error(builder->report, start, "more than %d anchors", ANCHOR_LIMIT);
+        return false;
+    }
+    Anchor anchor = {.text = start, .length = length, .node = (uint32_t)builder->tree->nodes.count};
+    array_push(builder->anchors, anchor);
+    return true;
+}
+
+static bool event_take(TreeBuilder *builder, struct fy_event *event)
+{
+    const struct fy_mark *start = fy_event_start_mark(event), *end = fy_event_end_mark(event);
+    YamlNode node = {.offset = start ? start->input_pos : builder->end};
+    if (end) builder->end = end->input_pos;
+    bool is_node =
+        event->type == FYET_SCALAR || event->type == FYET_SEQUENCE_START || event->type == FYET_MAPPING_START;
+    if (is_node && fy_event_get_tag_token(event)) {
+        report_error(builder->report, fy_token_start_mark(fy_event_get_tag_token(event))->input_pos,
+                     "scenes have no tags");
+        return false;
+    }
+    if (is_node && fy_event_get_anchor_token(event) && !anchor_add(builder, fy_event_get_anchor_token(event)))
+        return false;
+
+    switch (event->type) {
+    case FYET_DOCUMENT_START:
+        if (builder->tree->nodes.count) {
+            report_error(builder->report, node.offset, "a second document");
+            return false;
+        }
+        return true;
+    case FYET_SCALAR:
+        return scalar_append(builder, event->scalar.value, node);
+    case FYET_ALIAS: {
+        size_t length;
+        const char *name = fy_token_get_text(event->alias.anchor, &length);
+        return alias_append(builder, name, length, node.offset - strlen("*"));
+    }
+    case FYET_SEQUENCE_START:
+        node.kind = YAML_SEQUENCE;
+        return collection_open(builder, node);
+    case FYET_MAPPING_START:
+        node.kind = YAML_MAPPING;
+        return collection_open(builder, node);
+    case FYET_SEQUENCE_END:
+    case FYET_MAPPING_END:
+        builder->depth--;
+        return true;
+    default:
+        return true;
+    }
+}
+
+// Byte offset of libfyaml's line and column, both from 1; columns count characters.
+static size_t place_offset(const Source *source, int line, int column)
+{
+    size_t at = 0;
+    for (int i = 1; i < line && at < source->length; at++)
+        i += source->bytes[at] == '\n';
+    for (int i = 1; i < column && at < source->length && source->bytes[at] != '\n'; i++) {
+        at++;
+        while (at < source->length && (source->bytes[at] & 0xC0) == 0x80)
+            at++;
+    }
+    return at;
+}
+
+// `end`: how far the parser came, for the few faults it says nothing about.
+static void syntax_report(struct fy_diag *diagnostics, Report *report, size_t end)
+{
+    void *iterator = NULL;
+    const struct fy_diag_error *error = fy_diag_errors_iterate(diagnostics, &iterator);
+    if (!error) {
+        report_error(report, end, "not well-formed YAML");
+        return;
+    }
+    report_error(report, place_offset(report->source, error->line, error->column), "%s", error->msg);
+}
+
+static void diagnostic_ignore(struct fy_diag *diag, void *user, const char *text, size_t length)
+{
+    (void)diag, (void)user, (void)text, (void)length;
+}
+
+static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy_diag *diagnostics)
+{
+    bool ended = false;
+    while (!ended) {
+        struct fy_event *event = fy_parser_parse(parser);
+        if (!event) {
+            syntax_report(diagnostics, builder->report, builder->end);
+            return false;
+        }
+        ended = event->type == FYET_STREAM_END;
+        bool taken = event_take(builder, event);
+        fy_parser_event_free(parser, event);
+        if (!taken) return false;
+    }
+    if (!builder->tree->nodes.count) {
+        report_error(builder->report, 0, "the scene is empty");
+        return false;
+    }
+    return true;
+}
+
+// Checked first: libfyaml 0.7 takes other bytes for the end of the text, or never ends.
+static bool source_is_text(const Source *source, Report *report)
+{
+    for (size_t at = 0, size; at < source->length; at += size) {
+        size = text_character_size(source->bytes + at, source->length - at);
+        if (!size || !source->bytes[at]) {
+            report_error(report, at, "not UTF-8 text");
+            return false;
+        }
+    }
+    return true;
+}
+
+bool yaml_tree_read(YamlTree *tree, Report *report)
+{
+    if (!source_is_text(report->source, report)) return false;
+    struct fy_diag_cfg quiet;
+    fy_diag_cfg_default(&quiet);
+    quiet.fp = NULL;
+    quiet.output_fn = diagnostic_ignore;
+    struct fy_diag *diagnostics = fy_diag_create(&quiet);
+    fy_diag_set_collect_errors(diagnostics, true);
+    struct fy_parse_cfg settings = {.flags = FYPCF_DEFAULT_PARSE | FYPCF_JSON_NONE, .diag = diagnostics};
+    struct fy_parser *parser = fy_parser_create(&settings);
+    if (!parser || fy_parser_set_string(parser, report->source->bytes, report->source->length))
+        fault("libfyaml: cannot make a parser");
+
+    TreeBuilder builder = {.tree = tree, .report = report};
+    bool built = tree_build(&builder, parser, diagnostics);
+    free(builder.anchors.items);
+    fy_parser_destroy(parser);
+    fy_diag_destroy(diagnostics);
+    return built;
+}
+
+void yaml_tree_free(YamlTree *tree)
+{
+    free(tree->nodes.items);
+    text_free(&tree->texts);
+    *tree = (YamlTree){0};
+}
+
+const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node)
+{
+    return node->first ? &tree->nodes.items[node->first] : NULL;
+}
+
+const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node)
+{
+    return node->next ? &tree->nodes.items[node->next] : NULL;
+}
+
+const char *yaml_text(const YamlTree *tree, const YamlNode *scalar)
+{
+    return tree->texts.items + scalar->text;
+}

@@ -1,0 +1,86 @@
+// The native format: the whole document and its camera. Reference: docs/scene-format.md.
+#include "host/import/yaml/yaml.h"
+#include "host/base/memory.h"
+#include "host/import/load.h"
+
+#include <stdlib.h>
+
+typedef struct {
+    Camera camera;
+    double fov_degrees, focal_length, frame[2];
+} CameraFields;
+
+static bool read_frame(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
+}
+
+void yaml_read_camera(YamlReader *reader, const YamlNode *node)
+{
+    static const Field fields[] = {
+        {"position", read_vector, offsetof(CameraFields, camera.position), FORM_ANY, REQUIRED, NULL},
+        {"look_at", read_vector, offsetof(CameraFields, camera.look_at), FORM_ANY, REQUIRED, NULL},
+        {"up", read_direction, offsetof(CameraFields, camera.up), FORM_ANY, OPTIONAL, NULL},
+        {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FIRST, OPTIONAL, &range_field_of_view},
+        {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_SECOND, REQUIRED,
+         &range_positive},
+        {"frame", read_frame, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
+    };
+    CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
+    Form form;
+    if (!fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read, &form)) return;
+    Camera *camera = &reader->scene->camera;
+    *camera = read.camera;
+    if (vector_is_zero(vector_subtract(camera->look_at, camera->position)))
+        report_error(&reader->report, field_node(reader, node, "look_at")->offset,
+                     "'look_at' must differ from 'position'");
+    if (form == FORM_FIRST) {
+        camera->field_axis = FIELD_VERTICAL;
+        camera->half_tangent = tan(read.fov_degrees * (M_PI / 360));
+    } else {
+        camera->field_axis = FIELD_HORIZONTAL;
+        camera->half_tangent = read.frame[0] / 2 / read.focal_length;
+        camera->frame_aspect = read.frame[0] / read.frame[1];
+    }
+}
+
+typedef struct {
+    Color background, ambient;
+    const YamlNode *camera, *lights, *materials, *objects;
+} Document;
+
+static void document_read(YamlReader *reader)
+{
+    static const Field fields[] = {
+        {"camera", read_node, offsetof(Document, camera), FORM_ANY, REQUIRED, NULL},
+        {"background", read_color, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
+        {"ambient", read_color, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
+        {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
+        {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL, NULL},
+        {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL, NULL},
+    };
+    Document document = {0};
+    fields_read(reader, reader->tree.nodes.items, "scene", fields, COUNT_OF(fields), &document, NULL);
+    reader->scene->background = document.background;
+    reader->scene->ambient = document.ambient;
+    if (document.camera) yaml_read_camera(reader, document.camera);
+    if (document.lights) yaml_read_lights(reader, document.lights);
+    if (document.materials) // before the objects that name them
+        yaml_read_materials(reader, document.materials);
+    if (document.objects) yaml_read_objects(reader, document.objects);
+}
+
+bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages)
+{
+    *scene = (Scene){.color_meaning = COLORS_LINEAR};
+    YamlReader reader = {
+        .report = report_open(source, messages), .scene = scene, .default_material = UINT32_MAX};
+    if (yaml_tree_read(&reader.tree, &reader.report)) document_read(&reader);
+    if (scene->images.count > 0) {
+        scene->file = memory_copy_text(source->file);
+        text_append(&scene->text, source->bytes, source->length);
+    }
+    yaml_tree_free(&reader.tree);
+    free(reader.names.items);
+    return scene_finish(scene, &reader.report);
+}

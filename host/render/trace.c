@@ -1,0 +1,101 @@
+// Explicit rays.
+#include "host/base/memory.h"
+#include "host/render/renderer_state.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum { TRACE_GROUP = 64, TRACE_RAYS_OF_LAUNCH = 1 << 18 };
+
+static void scalar_set(void *scalars, size_t index, bool wide, double value)
+{
+    if (wide)
+        ((double *)scalars)[index] = value;
+    else
+        ((float *)scalars)[index] = (float)value;
+}
+
+static double scalar_at(const void *scalars, size_t index, bool wide)
+{
+    return wide ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
+}
+
+static void vector_at(const void *scalars, size_t index, bool wide, double vector[3])
+{
+    for (size_t axis = 0; axis < 3; axis++)
+        vector[axis] = scalar_at(scalars, index + axis, wide);
+}
+
+// The scalars of one hit, from `index` on.
+static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object, double unit)
+{
+    TraceHit hit = {.object = object,
+                    .t = scalar_at(scalars, index + RESULT_T, wide),
+                    .passed = scalar_at(scalars, index + RESULT_PASSED, wide),
+                    .light = scalar_at(scalars, index + RESULT_LIGHT, wide)};
+    vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
+    vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
+    vector_at(scalars, index + RESULT_MIRRORED_ORIGIN, wide, hit.mirrored_origin);
+    vector_at(scalars, index + RESULT_MIRRORED_DIRECTION, wide, hit.mirrored_direction);
+    vector_at(scalars, index + RESULT_PASSED_ORIGIN, wide, hit.passed_origin);
+    vector_at(scalars, index + RESULT_PASSED_DIRECTION, wide, hit.passed_direction);
+    hit.t *= unit;
+    for (size_t axis = 0; axis < 3; axis++) {
+        hit.position[axis] *= unit;
+        hit.mirrored_origin[axis] *= unit;
+        hit.passed_origin[axis] *= unit;
+    }
+    return hit;
+}
+
+static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count, TraceHit *hits)
+{
+    bool wide = renderer->report.wide;
+    double unit = renderer->unit, farthest = wide ? DBL_MAX : (double)FLT_MAX;
+    size_t scalar = renderer_scalar_size(renderer);
+    void *values = memory_allocate((size_t)count * RAY_SCALARS, scalar);
+    for (uint32_t i = 0; i < count; i++) {
+        const double *origin = rays[i].origin, *direction = rays[i].direction;
+        const double ray[RAY_SCALARS] = {
+            origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
+            direction[1],     direction[2],     rays[i].tmin / unit, fmin(rays[i].tmax / unit, farthest)};
+        for (size_t k = 0; k < RAY_SCALARS; k++)
+            scalar_set(values, i * RAY_SCALARS + k, wide, ray[k]);
+    }
+    Compute *compute = renderer->compute;
+    cl_mem ray_buffer =
+        buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, values, CL_MEM_READ_ONLY);
+    free(values);
+    size_t result_size = (size_t)count * RESULT_SCALARS * scalar,
+           object_size = (size_t)count * sizeof(uint32_t);
+    cl_mem results = buffer_create(compute, result_size, NULL, CL_MEM_WRITE_ONLY);
+    cl_mem objects = buffer_create(compute, object_size, NULL, CL_MEM_WRITE_ONLY);
+
+    cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
+    kernel_argument(kernel, FLAT_COUNT, sizeof(cl_mem), &ray_buffer);
+    kernel_argument(kernel, FLAT_COUNT + 1, sizeof count, &count);
+    kernel_argument(kernel, FLAT_COUNT + 2, sizeof(cl_mem), &results);
+    kernel_argument(kernel, FLAT_COUNT + 3, sizeof(cl_mem), &objects);
+    size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = TRACE_GROUP;
+    renderer_launch(renderer, KERNEL_TRACE, 1, &items, &group);
+
+    const void *result = renderer_map(renderer, results, result_size);
+    const uint32_t *object = renderer_map(renderer, objects, object_size);
+    for (uint32_t i = 0; i < count; i++)
+        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, wide, object[i], unit);
+    renderer_unmap(renderer, results, result);
+    renderer_unmap(renderer, objects, object);
+    cl_must(clFinish(compute->queue));
+    cl_must(clReleaseMemObject(ray_buffer));
+    cl_must(clReleaseMemObject(results));
+    cl_must(clReleaseMemObject(objects));
+}
+
+void renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+{
+    for (size_t first = 0; first < ray_count; first += TRACE_RAYS_OF_LAUNCH) {
+        size_t left = ray_count - first;
+        uint32_t count = left < TRACE_RAYS_OF_LAUNCH ? (uint32_t)left : TRACE_RAYS_OF_LAUNCH;
+        trace_batch(renderer, rays + first, count, hits + first);
+    }
+}

@@ -1,0 +1,164 @@
+#include "host/scene/transform.h"
+#include "host/base/memory.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { VECTORS_LARGEST = 6 };
+
+// The object's places, and what reaches from one to another; returns how many.
+static size_t object_vectors(Object *object, Vector3 *vectors[VECTORS_LARGEST])
+{
+    size_t count = 0;
+    switch (object->kind) {
+    case SHAPE_SPHERE:
+        vectors[count++] = &object->as.sphere.center;
+        break;
+    case SHAPE_PLANE:
+        vectors[count++] = &object->as.plane.point;
+        vectors[count++] = &object->as.plane.normal;
+        break;
+    case SHAPE_DISC:
+        vectors[count++] = &object->as.disc.center;
+        vectors[count++] = &object->as.disc.normal;
+        break;
+    case SHAPE_BOX:
+        vectors[count++] = &object->as.box.min;
+        vectors[count++] = &object->as.box.max;
+        break;
+    case SHAPE_CYLINDER:
+        vectors[count++] = &object->as.cylinder.from;
+        vectors[count++] = &object->as.cylinder.axis;
+        break;
+    case SHAPE_CONE:
+        vectors[count++] = &object->as.cone.from;
+        vectors[count++] = &object->as.cone.axis;
+        break;
+    case SHAPE_TRIANGLE:
+        for (size_t i = 0; i < 3; i++) {
+            vectors[count++] = &object->as.triangle.vertices[i];
+            vectors[count++] = &object->as.triangle.normals[i];
+        }
+        break;
+    case SHAPE_TORUS:
+        vectors[count++] = &object->as.torus.center;
+        vectors[count++] = &object->as.torus.axis;
+        break;
+    case SHAPE_MESH:
+    case SHAPE_COUNT:
+        break;
+    }
+    return count;
+}
+
+// Every vector that is a place or reaches from one to another, but for those of meshes.
+static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
+{
+    change(&scene->camera.position, factor);
+    change(&scene->camera.look_at, factor);
+    change(&scene->camera.up, factor);
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        change(&scene->lights.items[i].position, factor);
+        change(&scene->lights.items[i].direction, factor);
+    }
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Vector3 *vectors[VECTORS_LARGEST];
+        size_t count = object_vectors(&scene->objects.items[i], vectors);
+        for (size_t k = 0; k < count; k++)
+            change(vectors[k], factor);
+    }
+}
+
+static void vector_grow(Vector3 *vector, double factor)
+{
+    *vector = vector_scale(*vector, factor);
+}
+
+void scene_scale(Scene *scene, double factor)
+{
+    scene_for_each_vector(scene, vector_grow, factor);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        if (object->kind == SHAPE_SPHERE) object->as.sphere.radius *= factor;
+        if (object->kind == SHAPE_DISC) object->as.disc.radius *= factor;
+        if (object->kind == SHAPE_CYLINDER) object->as.cylinder.radius *= factor;
+        if (object->kind == SHAPE_TORUS) object->as.torus.major *= factor;
+        if (object->kind == SHAPE_TORUS) object->as.torus.minor *= factor;
+        if (object->kind == SHAPE_CONE) object->as.cone.radius[0] *= factor;
+        if (object->kind == SHAPE_CONE) object->as.cone.radius[1] *= factor;
+    }
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        for (size_t k = 0; k < scene->meshes.items[i].vertex_count; k++)
+            vector_grow(&scene->meshes.items[i].vertices[k], factor);
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        scene->materials.items[i].checker_size *= factor;
+        scene->materials.items[i].image_size *= factor;
+    }
+}
+
+static void *copy_of(const void *items, size_t count, size_t size)
+{
+    void *copy = memory_allocate(count + 1, size);
+    if (count > 0) memcpy(copy, items, count * size);
+    return copy;
+}
+
+Scene scene_scaled(const Scene *scene, double factor)
+{
+    Scene scaled = *scene;
+    scaled.lights.items = copy_of(scene->lights.items, scene->lights.count, sizeof *scene->lights.items);
+    scaled.materials.items =
+        copy_of(scene->materials.items, scene->materials.count, sizeof *scene->materials.items);
+    scaled.objects.items = copy_of(scene->objects.items, scene->objects.count, sizeof *scene->objects.items);
+    scaled.meshes.items = copy_of(scene->meshes.items, scene->meshes.count, sizeof *scene->meshes.items);
+    for (size_t i = 0; i < scene->meshes.count; i++) {
+        const Mesh *mesh = &scene->meshes.items[i];
+        scaled.meshes.items[i].vertices = copy_of(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
+    }
+    scene_scale(&scaled, factor);
+    return scaled;
+}
+
+void scene_scaled_free(Scene *scaled)
+{
+    for (size_t i = 0; i < scaled->meshes.count; i++)
+        free(scaled->meshes.items[i].vertices);
+    free(scaled->lights.items);
+    free(scaled->materials.items);
+    free(scaled->objects.items);
+    free(scaled->meshes.items);
+    *scaled = (Scene){0};
+}
+
+static void vector_mirror(Vector3 *vector, double factor)
+{
+    vector->x *= factor;
+}
+
+// A checker's squares lie at floor(x / size), which mirrors an even one to an odd one.
+void scene_mirror(Scene *scene)
+{
+    scene_for_each_vector(scene, vector_mirror, -1);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        if (object->kind != SHAPE_BOX) continue;
+        double low = object->as.box.max.x;
+        object->as.box.max.x = object->as.box.min.x;
+        object->as.box.min.x = low;
+    }
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        Color *colors = scene->materials.items[i].checker_colors, first = colors[0];
+        colors[0] = colors[1];
+        colors[1] = first;
+    }
+}
+
+static void vector_turn(Vector3 *vector, double unused)
+{
+    (void)unused;
+    *vector = (Vector3){vector->z, vector->x, vector->y};
+}
+
+void scene_turn_axes(Scene *scene)
+{
+    scene_for_each_vector(scene, vector_turn, 1);
+}

@@ -1,0 +1,285 @@
+#include "host/verify/families.h"
+
+#include "host/base/array.h"
+#include "host/import/load.h"
+#include <math.h>
+#include <string.h>
+
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF // gcc contracts nothing at -std=c11
+#endif
+
+const Vector3 far_sphere_center = {148376, 1234, -223423};
+
+// The finalizer of splitmix64 (Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014).
+static uint64_t mixed(uint64_t state)
+{
+    state = (state ^ state >> 30) * 0xbf58476d1ce4e5b9u;
+    state = (state ^ state >> 27) * 0x94d049bb133111ebu;
+    return state ^ state >> 31;
+}
+
+static double part_of_one(uint64_t state)
+{
+    return (double)(state >> 11) * 0x1p-53;
+}
+
+double random_at(unsigned seed, uint64_t index, unsigned place)
+{
+    return part_of_one(mixed((((uint64_t)seed << 40) + index * 32 + place + 1) * 0x9e3779b97f4a7c15u));
+}
+
+double random_symmetric(unsigned seed, uint64_t index, unsigned place)
+{
+    return 2 * random_at(seed, index, place) - 1;
+}
+
+static unsigned random_choice(unsigned seed, uint64_t index, unsigned place, unsigned count)
+{
+    return (unsigned)(random_at(seed, index, place) * count);
+}
+
+static Vector3 unit(Vector3 a)
+{
+    double length = sqrt(a.x * a.x + a.y * a.y + a.z * a.z);
+    return (Vector3){a.x / length, a.y / length, a.z / length};
+}
+
+Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_place)
+{
+    return unit((Vector3){random_symmetric(seed, index, first_place),
+                          random_symmetric(seed, index, first_place + 1),
+                          random_symmetric(seed, index, first_place + 2)});
+}
+
+// a x + b y + c z + d
+static Vector3 combine(double a, Vector3 x, double b, Vector3 y, double c, Vector3 z, Vector3 d)
+{
+    return (Vector3){a * x.x + b * y.x + c * z.x + d.x, a * x.y + b * y.y + c * z.y + d.y,
+                     a * x.z + b * y.z + c * z.z + d.z};
+}
+
+static const Vector3 nowhere;
+const Vector3 sliver_corners[3] = {{1, 2, 3}, {8.5, 5.7, -4.5}, {7.5, 5.8, -3.6}};
+
+static TraceRay ray_along(Vector3 origin, Vector3 direction)
+{
+    return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+}
+
+static TraceRay ray_toward(Vector3 origin, Vector3 target)
+{
+    return ray_along(origin, vector_subtract(target, origin));
+}
+
+// A point of the unit circle, by its rational parametrization.
+static void on_circle(double turn, double *cosine, double *sine)
+{
+    unsigned quarter = (unsigned)(turn * 4);
+    double w = turn * 4 - quarter;
+    double c = (1 - w * w) / (1 + w * w), s = 2 * w / (1 + w * w);
+    const double cosines[] = {c, -s, -c, s}, sines[] = {s, c, -s, -c};
+    *cosine = cosines[quarter];
+    *sine = sines[quarter];
+}
+
+TraceRay family_disc_rim(uint64_t i)
+{
+    static const double distances[] = {5, 500, 5e4};
+    const Vector3 center = {10, 20, 30};
+    Vector3 e = unit((Vector3){1, -1, 0}), f = unit((Vector3){1, 1, -2});
+    Vector3 away = random_unit(3, i, 0);
+    unsigned steps = 1 + random_choice(3, i, 3, 64);
+    double side = random_at(3, i, 4) < 0.5 ? 1 : -1;
+    double radius = 2 * (1 + side * steps * 0x1p-22);
+    double c, s;
+    on_circle(random_at(3, i, 5), &c, &s);
+    Vector3 target = combine(radius * c, e, radius * s, f, 0, nowhere, center);
+    return ray_toward(combine(distances[i % 3], away, 0, nowhere, 0, nowhere, center), target);
+}
+
+TraceRay family_in_room(uint64_t i)
+{
+    unsigned axis = random_choice(5, i, 0, 3);
+    double target[3];
+    for (unsigned k = 0; k < 3; k++)
+        target[k] = random_at(5, i, 1 + k) < 0.5 ? 1 : -1;
+    if (i % 3 != 1) target[axis] = random_symmetric(5, i, 4);
+    if (i % 3 == 2) target[(axis + 1) % 3] = random_symmetric(5, i, 5);
+    return ray_toward((Vector3){0.1, 0.2, 0.3}, (Vector3){target[0], target[1], target[2]});
+}
+
+TraceRay family_cylinder_rim(uint64_t i)
+{
+    const Vector3 base = {5, 5, 5}, axis = {1.0 / 3, 2.0 / 3, 2.0 / 3};
+    const Vector3 e = {2.0 / 3, 1.0 / 3, -2.0 / 3}, f = {2.0 / 3, -2.0 / 3, 1.0 / 3};
+    bool outside = i % 2 == 1;
+    double pull = outside ? 1e-5 : 0;
+    double height = random_at(14, i, 0) < 0.5 ? pull : 2 - pull;
+    double c, s;
+    on_circle(random_at(14, i, 1), &c, &s);
+    double radius = 1 - pull;
+    Vector3 target = combine(radius * c, e, radius * s, f, height, axis, base);
+    Vector3 inner = combine(1, axis, 0, nowhere, 0, nowhere, base);
+    if (!outside) return ray_toward(inner, target);
+    Vector3 away = random_unit(14, i, 2);
+    return ray_toward(combine(5, away, 0, nowhere, 0, nowhere, inner), target);
+}
+
+TraceRay family_along_torus_axis(uint64_t i)
+{
+    Vector3 origin = {1.3 * random_symmetric(22, i, 0), 1.3 * random_symmetric(22, i, 1), 10};
+    return ray_along(origin, (Vector3){0, 0, -1});
+}
+
+TraceRay family_across_torus(uint64_t i)
+{
+    Vector3 origin = {-5, 1.3 * random_symmetric(23, i, 0), 1e-6 * random_symmetric(23, i, 1)};
+    return ray_along(origin, (Vector3){1, 0, 0});
+}
+
+TraceRay family_beside_sliver(uint64_t i)
+{
+    const Vector3 a = sliver_corners[0];
+    Vector3 ab = vector_subtract(sliver_corners[1], a), ac = vector_subtract(sliver_corners[2], a);
+    Vector3 n = unit(vector_cross(ab, ac));
+    Vector3 e = unit(ab), f = vector_cross(n, e);
+    double c, s;
+    on_circle(random_at(34, i, 0), &c, &s);
+    Vector3 direction = unit(combine(c, e, s, f, 0.009076, n, nowhere));
+    Vector3 target = combine(random_at(34, i, 1), ab, 0.3 * random_symmetric(34, i, 2), ac, 0, nowhere, a);
+    return ray_along(combine(-100, direction, 0, nowhere, 0, nowhere, target), direction);
+}
+
+Scene scene_empty(void)
+{
+    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
+    Material material = material_default();
+    scene_add_material(&scene, &material, "");
+    return scene;
+}
+
+void scene_add_triangle(Scene *scene, const Vector3 vertices[3])
+{
+    Object object = {.kind = SHAPE_TRIANGLE};
+    memcpy(object.as.triangle.vertices, vertices, sizeof object.as.triangle.vertices);
+    array_push(scene->objects, object);
+}
+
+// Corner i has the signs of its bits.
+static Vector3 room_corner(unsigned i)
+{
+    return (Vector3){i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1};
+}
+
+void scene_triangle_room(Scene *scene)
+{
+    static const unsigned faces[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                         {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}};
+    for (size_t i = 0; i < 6; i++) {
+        const unsigned *face = faces[i];
+        Vector3 a = room_corner(face[0]), b = room_corner(face[1]);
+        Vector3 c = room_corner(face[2]), d = room_corner(face[3]);
+        scene_add_triangle(scene, (Vector3[]){a, b, c});
+        scene_add_triangle(scene, (Vector3[]){a, c, d});
+    }
+}
+
+// Off the unit sphere by up to a fifth, by the vertex' own bits: the same wherever it is met.
+static Vector3 jittered(Vector3 vertex)
+{
+    const double parts[] = {vertex.x + 0.0, vertex.y + 0.0, vertex.z + 0.0};
+    uint64_t state = 31;
+    for (size_t k = 0; k < 3; k++) {
+        uint64_t bits;
+        memcpy(&bits, &parts[k], sizeof bits);
+        state = mixed(state + bits);
+    }
+    double size = 1 + 0.2 * (2 * part_of_one(state) - 1);
+    return (Vector3){size * vertex.x, size * vertex.y, size * vertex.z};
+}
+
+typedef struct {
+    Vector3 corners[3];
+} Corners;
+
+// One of the 4^depth parts of a triangle on the sphere: each two bits of `path`, from the highest, say which.
+static Corners icosphere_part(Corners whole, unsigned depth, unsigned path)
+{
+    while (depth-- > 0) {
+        Vector3 a = whole.corners[0], b = whole.corners[1], c = whole.corners[2];
+        Vector3 ab = unit(vector_add(a, b)), bc = unit(vector_add(b, c)), ca = unit(vector_add(c, a));
+        const Corners parts[] = {{{a, ab, ca}}, {{ab, b, bc}}, {{ca, bc, c}}, {{ab, bc, ca}}};
+        whole = parts[path >> (2 * depth) & 3];
+    }
+    return (Corners){{jittered(whole.corners[0]), jittered(whole.corners[1]), jittered(whole.corners[2])}};
+}
+
+enum {
+    ICOSPHERE_DEPTH = 5,
+    ICOSPHERE_PARTS = 1 << 2 * ICOSPHERE_DEPTH,
+    ICOSPHERE_COUNT = 20 * ICOSPHERE_PARTS
+};
+
+static Vector3 icosahedron_corner(unsigned i)
+{
+    double g = (1 + sqrt(5)) / 2;
+    double one = i & 1 ? 1 : -1, golden = i & 2 ? -g : g;
+    if (i < 4) return unit((Vector3){one, golden, 0});
+    if (i < 8) return unit((Vector3){0, one, golden});
+    return unit((Vector3){golden, 0, one});
+}
+
+static Corners icosphere_triangle(unsigned index)
+{
+    static const unsigned char faces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                               {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                               {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                               {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+    const unsigned char *face = faces[index / ICOSPHERE_PARTS];
+    Corners whole = {{icosahedron_corner(face[0]), icosahedron_corner(face[1]), icosahedron_corner(face[2])}};
+    return icosphere_part(whole, ICOSPHERE_DEPTH, index % ICOSPHERE_PARTS);
+}
+
+void scene_icosphere(Scene *scene)
+{
+    for (unsigned i = 0; i < ICOSPHERE_COUNT; i++)
+        scene_add_triangle(scene, icosphere_triangle(i).corners);
+}
+
+TraceRay family_from_within(uint64_t i)
+{
+    unsigned point = random_choice(31, i, 0, 100);
+    Vector3 origin = {0.17 * random_symmetric(32, point, 0), 0.17 * random_symmetric(32, point, 1),
+                      0.17 * random_symmetric(32, point, 2)};
+    Corners triangle = icosphere_triangle(random_choice(31, i, 1, ICOSPHERE_COUNT));
+    unsigned first = random_choice(31, i, 2, 3);
+    Vector3 a = triangle.corners[first], b = triangle.corners[(first + 1) % 3],
+            c = triangle.corners[(first + 2) % 3];
+    double u = 0, v = 0;
+    if (i % 5 < 2 || i % 5 == 4) u = random_at(31, i, 3);
+    if (i % 5 == 4) v = (1 - u) * random_at(31, i, 4);
+    Vector3 target = combine(u, vector_subtract(b, a), v, vector_subtract(c, a), 0, nowhere, a);
+    return ray_toward(origin, target);
+}
+
+void scene_far_sphere(Scene *scene)
+{
+    enum { ROWS = 50, COLUMNS = 50 };
+    static Vector3 points[ROWS + 1][COLUMNS];
+    for (unsigned row = 0; row <= ROWS; row++)
+        for (unsigned column = 0; column < COLUMNS; column++) {
+            double down = M_PI * row / ROWS, around = 2 * M_PI * column / COLUMNS;
+            double across = row % ROWS == 0 ? 0 : sin(down);
+            Vector3 out = {across * cos(around), cos(down), across * sin(around)};
+            points[row][column] = vector_add(far_sphere_center, vector_scale(out, 2));
+        }
+    for (unsigned row = 0; row < ROWS; row++)
+        for (unsigned column = 0; column < COLUMNS; column++) {
+            unsigned next = (column + 1) % COLUMNS;
+            Vector3 a = points[row][column], b = points[row][next];
+            Vector3 c = points[row + 1][next], d = points[row + 1][column];
+            if (row > 0) scene_add_triangle(scene, (Vector3[]){a, b, c});
+            if (row + 1 < ROWS) scene_add_triangle(scene, (Vector3[]){a, c, d});
+        }
+}

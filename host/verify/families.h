@@ -1,0 +1,34 @@
+// Rays and meshes at random, the same on every machine, and the same as tests/oracle/families.py has them:
+// made by
+// + - * / and square roots only.
+#pragma once
+
+#include "host/render/trace.h"
+#include "host/scene/scene.h"
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef TraceRay (*RayFamily)(uint64_t index);
+
+// From 0 to 1: the value at a place of an item of a series, by its number.
+double random_at(unsigned seed, uint64_t index, unsigned place);
+double random_symmetric(unsigned seed, uint64_t index, unsigned place); // from -1 to 1
+Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_place);
+
+TraceRay family_disc_rim(uint64_t index);         // P3
+TraceRay family_in_room(uint64_t index);          // P5
+TraceRay family_cylinder_rim(uint64_t index);     // C4
+TraceRay family_along_torus_axis(uint64_t index); // T2
+TraceRay family_across_torus(uint64_t index);     // T3
+TraceRay family_beside_sliver(uint64_t index);    // M4
+TraceRay family_from_within(uint64_t index);      // M1
+
+// An empty scene with a camera and one material.
+Scene scene_empty(void);
+void scene_add_triangle(Scene *scene, const Vector3 vertices[3]);
+void scene_triangle_room(Scene *scene); // the cube from -1 to 1
+void scene_icosphere(Scene *scene);     // 20480 triangles, radii off by up to a fifth
+// A sphere of radius 2 around a center far away, 50 by 50 quadrilaterals.
+void scene_far_sphere(Scene *scene);
+extern const Vector3 far_sphere_center;
+extern const Vector3 sliver_corners[3]; // M4's triangle

@@ -1,0 +1,166 @@
+// Pictures and rays through glass.
+#include "host/base/memory.h"
+#include "host/verify/exact.h"
+#include "host/verify/families.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+// The signature of a way that passes each object of a list and ends at the last, by the rule in
+// kernels/types.h.
+static uint32_t passed_path(const uint32_t *objects, size_t count)
+{
+    const uint32_t events = 8, refracted = 2;
+    uint32_t path = 0x811c9dc5u;
+    for (size_t i = 0; i < count; i++)
+        path = (path ^ ((objects[i] + 1) * events + (i + 1 < count ? refracted : 0))) * 0x01000193u;
+    return path;
+}
+
+// A red ball in a coat of glass thinner than most epsilons: all that is seen through the glass is the ball,
+// at any scale.
+void verify_nested_spheres(VerifyRun *run)
+{
+    static const double ratios[] = {1 + 4e-5, 1 + 0x1p-16}, scales[] = {1, 1000, 0.001};
+    const uint32_t ball_then_coat[] = {1, 0};
+    const uint32_t expected = passed_path(ball_then_coat, 2);
+    for (size_t k = 0; k < 6; k++) {
+        double scale = scales[k % 3], ratio = ratios[k / 3];
+        Scene scene = verify_scene("ambient: [1, 1, 1]\n"
+                                   "materials:\n  red: {color: [1, 0, 0]}\n"
+                                   "  glass: {transmission: 1, ior: 1.5, diffuse: 0, ambient: 0}\n"
+                                   "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: red}\n"
+                                   "  - sphere: {center: [0, 0, 0], radius: 1, material: glass}\n");
+        scene.objects.items[0].as.sphere.radius = scale;
+        scene.objects.items[1].as.sphere.radius = scale * ratio;
+        const Vector3 eye = {1.5 * scale, 2 * scale, 2.5 * scale}, center = {0, 0, 0};
+        scene.camera = verify_camera(eye, center, 40);
+        PictureLayers picture = verify_render(run, &scene, false, 192, 192);
+        Long coat = verify_rounded(run, scale * ratio);
+        size_t seen = 0;
+        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            ExactHit exact =
+                exact_sphere(exact_from_eye(run, center, eye), coat, exact_pixel_ray(&picture, i));
+            if (picture.object[i] != 1) {
+                // at the rim the coat may be missed, but the ball behind it may not be seen without it
+                run->result->wrong += picture.object[i] != UINT32_MAX || exact.margin > 1e-5L;
+                continue;
+            }
+            seen++;
+            run->result->wrong += picture.path[i] != expected;
+        }
+        run->result->wrong += seen == 0;
+        layers_free(&picture);
+        scene_free(&scene);
+    }
+}
+
+static Scene matched_scene(const char *object)
+{
+    char text[600];
+    snprintf(text, sizeof text,
+             "background: [0.2, 0.3, 0.4]\nambient: [0.1, 0.1, 0.1]\n"
+             "lights:\n  - point: {position: [-3, 4, -6]}\n"
+             "materials:\n  tiles: {checker: {colors: [[1, 1, 1], [0.1, 0.1, 0.1]], size: 0.5}}\n"
+             "  glass: {transmission: 1, ior: 1, diffuse: 0, ambient: 0}\n"
+             "objects:\n  - plane: {point: [0, 0, 5], normal: [0, 0, -1], material: tiles}\n%s",
+             object);
+    Scene scene = verify_scene(text);
+    const Vector3 eye = {0, 0, -5}, ahead = {0, 0, 5};
+    scene.camera = verify_camera(eye, ahead, 30);
+    return scene;
+}
+
+static const char *const matched[] = {
+    "  - sphere: {center: [0, 0, 0], radius: 1, material: glass}\n",
+    "  - box: {min: [-0.9, -0.8, -0.7], max: [0.7, 0.8, 0.9], material: glass}\n"};
+
+// How far a pixel's tile is from the next, in pixels.
+static double edge_distance(const PictureLayers *empty, size_t pixel)
+{
+    const double *d = &empty->ray[3 * pixel];
+    double nearest = INFINITY, step = 2 * tan(15 * (M_PI / 180)) * 10 / empty->height;
+    for (size_t axis = 0; axis < 2; axis++) {
+        double place = d[axis] / d[2] * 10 / 0.5;
+        nearest = fmin(nearest, fabs(place - round(place)) * 0.5 / step);
+    }
+    return nearest;
+}
+
+// Rays into a closed body of index 1: they come out of it again, and keep their direction.
+static void judge_straight_rays(VerifyRun *run, const char *object, unsigned seed)
+{
+    enum { COUNT = 20000 };
+    TraceRay *rays = memory_allocate(COUNT, sizeof *rays), *inner = memory_allocate(COUNT, sizeof *inner);
+    TraceHit *first = memory_allocate(COUNT, sizeof *first), *second = memory_allocate(COUNT, sizeof *second);
+    for (uint64_t i = 0; i < COUNT; i++) {
+        Vector3 from = vector_scale(random_unit(seed, i, 0), 4);
+        Vector3 at = vector_scale(random_unit(seed, i, 3), random_at(seed, i, 6));
+        Vector3 d = vector_normalize(vector_subtract(at, from));
+        rays[i] = (TraceRay){{from.x, from.y, from.z}, {d.x, d.y, d.z}, 0, INFINITY};
+        verify_round_ray(run, &rays[i]);
+    }
+    Scene scene = matched_scene(object);
+    scene.objects.items[0].as.plane.point.z = 1e6; // out of the way
+    void *opened = run->renderer->open(run->renderer->context, &scene, false);
+    verify_trace_opened(run, opened, rays, COUNT, first);
+    for (size_t i = 0; i < COUNT; i++) {
+        inner[i] = rays[i];
+        if (first[i].object != 1) continue;
+        for (size_t axis = 0; axis < 3; axis++) {
+            inner[i].origin[axis] = first[i].passed_origin[axis];
+            inner[i].direction[axis] = first[i].passed_direction[axis];
+        }
+        verify_round_ray(run, &inner[i]);
+    }
+    verify_trace_opened(run, opened, inner, COUNT, second);
+    run->renderer->close(opened);
+    scene_free(&scene);
+    size_t entered = 0;
+    for (size_t i = 0; i < COUNT; i++) {
+        if (first[i].object != 1) continue;
+        LongVector d = long_unit(long_vector(verify_vector(rays[i].direction)));
+        if (fabsl(long_dot(d, long_vector(verify_vector(first[i].normal)))) < 1e-4L) continue;
+        entered++;
+        if (second[i].object != 1) {
+            run->result->leaks++;
+            continue;
+        }
+        LongVector passed = long_vector(verify_vector(second[i].passed_direction));
+        LongVector off = long_subtract(passed, d);
+        Long largest = fmaxl(fabsl(off.x), fmaxl(fabsl(off.y), fabsl(off.z)));
+        // two cosines, roots each, and a unit vector, a root and a quotient
+        double bound = run->renderer->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
+        verify_note(run, (double)largest / verify_roundoff(run), bound, "u");
+    }
+    // most of the places aimed at lie within the body
+    run->result->wrong += entered < COUNT / 2;
+    free(rays);
+    free(inner);
+    free(first);
+    free(second);
+}
+
+// Glass of index 1 is not there.
+void verify_matched_glass(VerifyRun *run)
+{
+    Scene without = matched_scene("");
+    PictureLayers empty = verify_render(run, &without, false, 256, 256);
+    scene_free(&without);
+    for (unsigned k = 0; k < sizeof matched / sizeof *matched; k++) {
+        Scene scene = matched_scene(matched[k]);
+        PictureLayers picture = verify_render(run, &scene, false, 256, 256);
+        scene_free(&scene);
+        size_t through = 0;
+        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            through += picture.object[i] == 1;
+            if (edge_distance(&empty, i) < 1e-3) continue;
+            for (size_t c = 3 * i; c < 3 * i + 3; c++)
+                verify_note(run, fabs(picture.color[c] - empty.color[c]), 1e-5, "of 1");
+        }
+        run->result->wrong += through == 0;
+        layers_free(&picture);
+        judge_straight_rays(run, matched[k], 71 + k);
+    }
+    layers_free(&empty);
+}

@@ -1,0 +1,66 @@
+// Pictures of Phong's highlights, from dull to a thousandth of a radian wide.
+#include "host/verify/exact.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+// Where on the unit sphere the highlight is seen.
+static Vector3 highlight_middle(Vector3 eye, Vector3 to_light)
+{
+    Vector3 middle = vector_normalize(vector_add(vector_normalize(eye), to_light));
+    for (int i = 0; i < 60; i++) {
+        Vector3 to_eye = vector_normalize(vector_subtract(eye, middle));
+        middle = vector_normalize(vector_add(to_eye, to_light));
+    }
+    return middle;
+}
+
+void verify_highlights(VerifyRun *run)
+{
+    static const double powers[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
+    // what the tier owes at 1e4 and at 1e6
+    const double owed_power = run->tier == TIER_B ? 1e4 : 1e6, owed = run->tier == TIER_B ? 2e-3 : 1e-4;
+    const Vector3 eye = {0.4, -0.3, 5}, light_beside = {-0.3, -0.2, -1}, light_behind = {1, 0.1, 0.3};
+    for (size_t k = 0; k < 16; k++) {
+        double power = powers[k / 2];
+        bool closely = k % 2;
+        char text[300];
+        snprintf(text, sizeof text,
+                 "lights:\n  - directional: {direction: [0, 0, 1]}\n"
+                 "materials:\n  shiny: {diffuse: 0, specular: 1, ambient: 0, shininess: %.17g}\n"
+                 "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
+                 power);
+        Scene scene = verify_scene(text);
+        // whole, lit from the side and partly behind; closely, lit from beside the eye
+        Vector3 direction = vector_normalize(closely ? light_beside : light_behind);
+        scene.lights.items[0].direction = direction;
+        const Vector3 center = {0, 0, 0};
+        scene.camera = verify_camera(eye, center, 30);
+        if (closely) {
+            scene.camera.look_at = highlight_middle(eye, vector_scale(direction, -1));
+            scene.camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
+        }
+        PictureLayers picture = verify_render(run, &scene, false, 96, 96);
+        LongVector to_light = {-verify_rounded(run, direction.x), -verify_rounded(run, direction.y),
+                               -verify_rounded(run, direction.z)};
+        size_t seen = 0;
+        double brightest = 0;
+        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            double value = picture.color[3 * i];
+            run->result->wrong += value < 0 || value > 1 + 0x1p-20;
+            seen += picture.object[i] == 0;
+            brightest = fmax(brightest, value);
+            if (run->tier == TIER_A || picture.object[i] != 0 || power > owed_power) continue;
+            LongVector normal = long_vector(verify_vector(picture.normal + 3 * i));
+            Long facing = long_dot(normal, to_light);
+            // whether light that grazes reaches the surface at all is the shadow's matter
+            if (fabsl(facing) < 16 * (Long)verify_roundoff(run)) continue;
+            Long exact = exact_highlight(normal, to_light, exact_pixel_ray(&picture, i), power);
+            verify_note(run, (double)fabsl(value - exact), owed, "of 1");
+        }
+        // closely, the highlight's middle lies in the picture's
+        run->result->wrong += seen == 0 || (closely && brightest < 0.5);
+        layers_free(&picture);
+        scene_free(&scene);
+    }
+}

@@ -1,0 +1,63 @@
+// Pictures of ground up to its horizon.
+#include "host/verify/exact.h"
+#include <math.h>
+#include <stdlib.h>
+
+// The first row, from the bottom, whose pixel of the column hits nothing; counts what is hit above it.
+static uint32_t column_horizon(VerifyRun *run, const PictureLayers *picture, uint32_t column)
+{
+    uint32_t row = picture->height;
+    while (row > 0 && verify_pixel_found(picture, (size_t)(row - 1) * picture->width + column))
+        row--;
+    for (uint32_t above = 0; above < row; above++)
+        run->result->wrong += verify_pixel_found(picture, (size_t)above * picture->width + column);
+    return row;
+}
+
+// From the bottom up to the horizon the ground's distance never falls, and the horizon is where it is
+// exactly.
+void verify_ground_horizon(VerifyRun *run)
+{
+    static const struct {
+        double fov;  // in degrees
+        double rise; // slope of the way ahead; the horizon's is -sqrt(2e-6)
+    } views[] = {{60, 0}, {0.5, 0}, {0.02, -0.0014142}};
+    Scene scene = verify_scene("objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
+    const Vector3 eye = {0, 1, 0};
+    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+        scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
+        PictureLayers picture = verify_render(run, &scene, false, 128, 512);
+        LongVector center = exact_from_eye(run, scene.objects.items[0].as.sphere.center, eye);
+        for (uint32_t column = 0; column < picture.width; column++) {
+            uint32_t horizon = column_horizon(run, &picture, column), exact = picture.height;
+            for (uint32_t row = picture.height - 1; row > horizon; row--) {
+                size_t pixel = (size_t)row * picture.width + column;
+                run->result->wrong += picture.t[pixel - picture.width] < picture.t[pixel];
+            }
+            while (exact > 0) {
+                size_t pixel = (size_t)(exact - 1) * picture.width + column;
+                if (!exact_sphere(center, 1e6L, exact_pixel_ray(&picture, pixel)).found) break;
+                exact--;
+            }
+            verify_note(run, fabs((double)horizon - (double)exact), 1, "rows");
+        }
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}
+
+// Seen horizontally the plane ends in every column at the picture's middle, whether that lies on a row of
+// pixels or between two.
+void verify_plane_horizon(VerifyRun *run)
+{
+    Scene scene = verify_scene("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
+    const Vector3 eye = {0, 1.7, 0}, ahead = {0, 1.7, 1};
+    scene.camera = verify_camera(eye, ahead, 60);
+    for (uint32_t height = 511; height <= 512; height++) {
+        PictureLayers picture = verify_render(run, &scene, false, 512, height);
+        for (uint32_t column = 0; column < picture.width; column++)
+            run->result->wrong += column_horizon(run, &picture, column) != (height + 1) / 2;
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}

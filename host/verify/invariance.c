@@ -1,0 +1,222 @@
+// A scene of every shape, scaled, mirrored and turned: the picture may change in the known way only.
+#include "host/scene/transform.h"
+#include "host/verify/run.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The eye is the origin, so that rays can be given to the scene as it is.
+static const char every_shape[] =
+    "background: [0.1, 0.15, 0.25]\nambient: [0.08, 0.07, 0.06]\n"
+    "lights:\n"
+    "  - point:       {position: [-5.9, 4.6, 4.1], color: [1, 0.9, 0.7], intensity: 0.6}\n"
+    "  - directional: {direction: [-0.4, -1, 0.55], color: [0.35, 0.4, 0.5]}\n"
+    "  - spot:        {position: [0.8, 3.1, 5.9], look_at: [0.9, -3.1, 10.4], angle: 31, penumbra: 9}\n"
+    "materials:\n"
+    "  floor:  {checker: {colors: [[0.9, 0.85, 0.8], [0.25, 0.3, 0.35]], size: 0.83}, diffuse: 0.9}\n"
+    "  red:    {color: [0.85, 0.2, 0.15], diffuse: 0.8, specular: 0.5, shininess: 37}\n"
+    "  matt:   {color: [0.8, 0.75, 0.7], diffuse: 0.85, specular: 0.2, shininess: 0}\n"
+    "  cubes:  {checker: {colors: [[0.95, 0.7, 0.2], [0.2, 0.2, 0.3]], size: 0.37}, diffuse: 0.8, "
+    "specular: 0.4, shininess: 40}\n"
+    "  mirror: {color: [0.4, 0.4, 0.45], diffuse: 0.4, specular: 0.6, shininess: 30, reflection: 0.6}\n"
+    "  glass:  {diffuse: 0.1, specular: 0.5, shininess: 50, transmission: 0.8, reflection: 0.1, ior: 1.45}\n"
+    "objects:\n"
+    "  - plane:    {point: [0.1, -3.15, 10.2], normal: [0.02, 1, -0.03], material: floor}\n"
+    "  - sphere:   {center: [-3.7, -2.2, 8.1], radius: 0.87, material: red}\n"
+    "  - sphere:   {center: [2.1, -0.2, 11.5], radius: 0.61, material: cubes}\n"
+    "  - disc:     {center: [-5, -0.8, 13.3], normal: [0.5, 0.3, -1], radius: 1.35, material: cubes}\n"
+    "  - box:      {min: [-2.05, -3.3, 9.05], max: [-0.95, -2.03, 10.33], material: cubes}\n"
+    "  - cylinder: {from: [-0.05, -3.1, 8.1], to: [0.3, -1.75, 8.5], radius: 0.46, material: red}\n"
+    "  - cylinder: {from: [3.5, -2.7, 10.9], to: [2.7, -1.2, 9.8], radius: 0.53, caps: false, "
+    "material: matt}\n"
+    "  - cylinder: {point: [-6.8, -3.1, 16.5], axis: [0.12, 1, 0.07], radius: 0.42, material: matt}\n"
+    "  - cone:     {from: [1.6, -3.1, 7.6], to: [1.7, -1.6, 7.8], radius: [0.66, 0], material: red}\n"
+    "  - cone:     {from: [0.3, -3, 12.1], to: [0.6, -0.9, 12.3], radius: [0.85, 0.35], material: matt}\n"
+    "  - cone:     {from: [-2.9, -1.5, 11.9], to: [-2.8, -0.2, 11.7], radius: [0.3, 0.75], caps: false, "
+    "material: matt}\n"
+    "  - cone:     {apex: [5.5, -0.7, 15.4], axis: [0.2, 1, 0.1], angle: 17, material: red}\n"
+    "  - triangle: {vertices: [[-1.5, -1.2, 12.9], [0.1, 0.5, 12.4], [-2, 0.8, 13.3]], material: red}\n"
+    "  - triangle: {vertices: [[1.1, -3, 6.6], [2.1, -3.05, 6.3], [1.5, -2.2, 6.8]], material: matt,\n"
+    "      normals: [[-0.4, 0.1, -1], [0.4, 0.1, -1], [0, 0.6, -1]]}\n"
+    "  - sphere:   {center: [-2.1, -0.7, 9.3], radius: 0.52, material: mirror}\n"
+    "  - sphere:   {center: [-1.3, -2.6, 6.8], radius: 0.49, material: glass}\n"
+    "  - torus:    {center: [3.3, -2.6, 7.5], axis: [0.3, 1, -0.4], major: 0.6, minor: 0.22, "
+    "material: matt}\n";
+
+static Scene every_shape_scene(void)
+{
+    Scene scene = verify_scene(every_shape);
+    const Vector3 eye = {0, 0, 0}, middle = {-0.5, -2, 10};
+    scene.camera = verify_camera(eye, middle, 40);
+    scene.camera.up = (Vector3){0.1, 1, 0};
+    return scene;
+}
+
+// Counts the objects of a scene that no pixel shows: two empty pictures would be alike.
+static void demand_every_object(VerifyRun *run, const Scene *scene, const PictureLayers *picture)
+{
+    for (size_t object = 0; object < scene->objects.count; object++) {
+        size_t pixel = 0;
+        while (pixel < layers_pixel_count(picture) && picture->object[pixel] != object)
+            pixel++;
+        run->result->wrong += pixel == layers_pixel_count(picture);
+    }
+}
+
+typedef struct {
+    const PictureLayers *picture;
+    double scale; // of lengths
+    bool mirrored;
+} View;
+
+static bool pixels_agree(const PictureLayers *a, size_t i, const View *view, size_t k)
+{
+    const PictureLayers *b = view->picture;
+    double side = view->mirrored ? -1 : 1, scale = view->scale;
+    bool same = a->object[i] == b->object[k] && a->path[i] == b->path[k];
+    same &= b->t[k] == a->t[i] * scale;
+    for (size_t axis = 0; axis < 3; axis++) {
+        double flip = axis == 0 ? side : 1;
+        same &= a->color[3 * i + axis] == b->color[3 * k + axis];
+        same &= a->normal[3 * i + axis] * flip == b->normal[3 * k + axis];
+        same &= a->position[3 * i + axis] * scale * flip == b->position[3 * k + axis];
+        same &= a->ray[3 * i + axis] * flip == b->ray[3 * k + axis];
+    }
+    for (size_t light = 0; light < a->light_count; light++)
+        same &= a->shadow[i * a->light_count + light] == b->shadow[k * a->light_count + light];
+    return same;
+}
+
+// Counts the pixels of two pictures that are not each other's, bit for bit but for the sign of a zero.
+static void compare(VerifyRun *run, const PictureLayers *a, const View *view)
+{
+    for (size_t i = 0; i < layers_pixel_count(a); i++) {
+        size_t column = i % a->width, other = view->mirrored ? i + a->width - 1 - 2 * column : i;
+        run->result->differing += !pixels_agree(a, i, view, other);
+    }
+}
+
+void verify_scaled_scenes(VerifyRun *run)
+{
+    static const int exponents[] = {-20, -10, -3, 3, 10, 20};
+    Scene scene = every_shape_scene();
+    PictureLayers picture = verify_render(run, &scene, false, 160, 120);
+    demand_every_object(run, &scene, &picture);
+    scene_free(&scene);
+    for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
+        double scale = ldexp(1, exponents[i]);
+        Scene scaled = every_shape_scene();
+        scene_scale(&scaled, scale);
+        PictureLayers other = verify_render(run, &scaled, i % 2, 160, 120);
+        compare(run, &picture, &(View){&other, scale, false});
+        layers_free(&other);
+        scene_free(&scaled);
+    }
+    layers_free(&picture);
+}
+
+// Whether a ray, or one turned by a few roundings, meets the object.
+static bool meets_nearby(VerifyRun *run, void *opened, const double direction[3], uint32_t object)
+{
+    enum { COUNT = 27 };
+    // A tier leaves open 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 (exact_is_open): as
+    // an angle 2 u whatever the distance, or up to 8 u. Either scene may be off by that, and each by as much
+    // for the rounding of its pixels' rays.
+    const double turn = 4 * 8 * verify_roundoff(run);
+    TraceRay rays[COUNT];
+    TraceHit hits[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        const int steps[] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+        rays[i] = (TraceRay){.tmax = INFINITY};
+        for (size_t axis = 0; axis < 3; axis++)
+            rays[i].direction[axis] = direction[axis] + turn * steps[axis];
+        verify_round_ray(run, &rays[i]);
+    }
+    verify_trace_opened(run, opened, rays, COUNT, hits);
+    for (int i = 0; i < COUNT; i++)
+        if (hits[i].object == object) return true;
+    return false;
+}
+
+static bool shadow_edge_beside(const PictureLayers *picture, size_t pixel, size_t light)
+{
+    size_t column = pixel % picture->width, row = pixel / picture->width;
+    uint32_t here = picture->shadow[pixel * picture->light_count + light];
+    for (size_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < picture->height; y++)
+        for (size_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < picture->width; x++)
+            if (picture->shadow[(y * picture->width + x) * picture->light_count + light] != here) return true;
+    return false;
+}
+
+// The scene with its axes exchanged. An object may differ where the other one is met within a few roundings
+// of the ray, a shadow at its edge; where neither does, colors are the same within 1e-5.
+static void judge_turned(VerifyRun *run, void *opened, const PictureLayers *picture,
+                         const PictureLayers *turned)
+{
+    for (size_t i = 0; i < layers_pixel_count(picture); i++) {
+        bool same = picture->object[i] == turned->object[i];
+        if (!same) run->result->wrong += !meets_nearby(run, opened, &picture->ray[3 * i], turned->object[i]);
+        for (size_t light = 0; light < picture->light_count && same; light++) {
+            size_t k = i * picture->light_count + light;
+            if (picture->shadow[k] == turned->shadow[k]) continue;
+            same = false;
+            run->result->wrong += !shadow_edge_beside(picture, i, light);
+        }
+        for (size_t k = 3 * i; k < 3 * i + 3 && same; k++)
+            verify_note(run, fabs(picture->color[k] - turned->color[k]), 1e-5, "of 1");
+    }
+}
+
+// Without checkers: the edge between two squares belongs to one of them, in the mirror to the other.
+static Scene unchecked_scene(void)
+{
+    Scene scene = every_shape_scene();
+    for (size_t i = 0; i < scene.materials.count; i++)
+        scene.materials.items[i].checker = false;
+    return scene;
+}
+
+// Nor any mirrors and glass, which show a rounding enlarged, nor a cone's tip, around which the normal turns
+// by as much as the point is off, over how near the tip is.
+static Scene plain_scene(void)
+{
+    Scene scene = unchecked_scene();
+    for (size_t i = 0; i < scene.materials.count; i++)
+        scene.materials.items[i].reflection = scene.materials.items[i].transmission = 0;
+    for (size_t i = 0; i < scene.objects.count; i++) {
+        Object *object = &scene.objects.items[i];
+        if (object->kind == SHAPE_CONE && object->as.cone.finite)
+            object->as.cone.radius[1] = fmax(object->as.cone.radius[1], 0.3);
+    }
+    return scene;
+}
+
+void verify_mirrored_scenes(VerifyRun *run)
+{
+    for (uint32_t width = 511; width <= 512; width++) {
+        Scene scene = unchecked_scene(), mirrored = unchecked_scene();
+        scene_mirror(&mirrored);
+        PictureLayers picture = verify_render(run, &scene, false, width, 128);
+        demand_every_object(run, &scene, &picture);
+        PictureLayers other = verify_render(run, &mirrored, false, width, 128);
+        compare(run, &picture, &(View){&other, 1, true});
+        layers_free(&picture);
+        layers_free(&other);
+        scene_free(&scene);
+        scene_free(&mirrored);
+    }
+    Scene scene = plain_scene(), turned = plain_scene();
+    PictureLayers picture = verify_render(run, &scene, false, 256, 192);
+    demand_every_object(run, &scene, &picture);
+    void *opened = run->renderer->open(run->renderer->context, &scene, false);
+    for (unsigned turns = 1; turns < 3; turns++) {
+        scene_turn_axes(&turned);
+        PictureLayers other = verify_render(run, &turned, false, 256, 192);
+        judge_turned(run, opened, &picture, &other);
+        layers_free(&other);
+    }
+    run->renderer->close(opened);
+    layers_free(&picture);
+    scene_free(&scene);
+    scene_free(&turned);
+}

@@ -1,0 +1,342 @@
+// Checks of triangles, and of the hierarchy, that no table holds.
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/import/load.h"
+#include "host/verify/exact.h"
+#include "host/verify/families.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static TraceRay ray_of(const VerifyRun *run, Vector3 origin, Vector3 direction)
+{
+    TraceRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    verify_round_ray(run, &ray);
+    return ray;
+}
+
+// From inside a mesh where neighboring floats are 1/64 apart no ray gets out.
+void verify_far_mesh(VerifyRun *run)
+{
+    enum { COUNT = 1 << 16, BATCHES = 16 };
+    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
+    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
+    Scene scene = scene_empty();
+    scene_far_sphere(&scene);
+    void *opened = run->renderer->open(run->renderer->context, &scene, true);
+    for (uint64_t batch = 0; batch < BATCHES; batch++) {
+        for (uint64_t i = 0; i < COUNT; i++) {
+            uint64_t index = batch * COUNT + i;
+            Vector3 off = {random_symmetric(65, index, 0), random_symmetric(65, index, 1),
+                           random_symmetric(65, index, 2)};
+            rays[i] = ray_of(run, vector_add(far_sphere_center, off), random_unit(65, index, 3));
+        }
+        verify_trace_opened(run, opened, rays, COUNT, hits);
+        for (size_t i = 0; i < COUNT; i++)
+            run->result->leaks += !verify_is_hit(&hits[i]);
+    }
+    run->renderer->close(opened);
+    scene_free(&scene);
+    free(rays);
+    free(hits);
+}
+
+// The same triangle at every power of two, all in one corner: through the middle of each the ray meets that
+// one first in the list, and the distances are each other's multiples, bit for bit.
+void verify_scale_ladder(VerifyRun *run)
+{
+    enum { SMALLEST = -40, LARGEST = 40, COUNT = LARGEST - SMALLEST + 1 };
+    TraceRay rays[COUNT];
+    TraceHit hits[COUNT];
+    Scene scene = scene_empty();
+    double third = verify_rounded(run, 1.0 / 3);
+    for (int k = SMALLEST; k <= LARGEST; k++) {
+        double s = ldexp(1, k), across = ldexp(third, k);
+        scene_add_triangle(&scene, (Vector3[]){{0, 0, 0}, {s, 0, 0}, {0, s, 0}});
+        rays[k - SMALLEST] = ray_of(run, (Vector3){across, across, -s}, (Vector3){0, 0, 1});
+    }
+    verify_trace(run, &scene, false, rays, COUNT, hits);
+    scene_free(&scene);
+    double unscaled = hits[-SMALLEST].t;
+    for (int k = SMALLEST; k <= LARGEST; k++) {
+        const TraceHit *hit = &hits[k - SMALLEST];
+        if (hit->object != (uint32_t)(k - SMALLEST)) {
+            run->result->wrong++;
+            continue;
+        }
+        run->result->differing += hit->t != ldexp(unscaled, k);
+        if (run->tier != TIER_A)
+            verify_note_error(run, fabs(hit->t - ldexp(1, k)) / verify_ulp(run, ldexp(1, k)), 8);
+    }
+}
+
+// Seen at half a degree the sliver is hit nowhere but between its own corners.
+void verify_within_triangle(VerifyRun *run)
+{
+    enum { COUNT = 100000 };
+    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
+    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
+    for (uint64_t i = 0; i < COUNT; i++) {
+        rays[i] = family_beside_sliver(i);
+        verify_round_ray(run, &rays[i]);
+    }
+    Scene scene = scene_empty();
+    scene_add_triangle(&scene, sliver_corners);
+    verify_trace(run, &scene, false, rays, COUNT, hits);
+    scene_free(&scene);
+    for (size_t i = 0; i < COUNT; i++) {
+        if (!verify_is_hit(&hits[i])) continue;
+        const double *o = rays[i].origin, *d = rays[i].direction;
+        double nearest = INFINITY, farthest = -INFINITY;
+        for (size_t k = 0; k < 3; k++) {
+            Vector3 v = sliver_corners[k];
+            double along = (verify_rounded(run, v.x) - o[0]) * d[0] +
+                           (verify_rounded(run, v.y) - o[1]) * d[1] +
+                           (verify_rounded(run, v.z) - o[2]) * d[2];
+            double t = along / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            nearest = fmin(nearest, t);
+            farthest = fmax(farthest, t);
+        }
+        double slack = 8 * verify_ulp(run, farthest);
+        run->result->wrong += hits[i].t < nearest - slack || hits[i].t > farthest + slack;
+    }
+    free(rays);
+    free(hits);
+}
+
+// Seen face to face from near, a triangle's distance is its plane's, however far its corners.
+void verify_facing_triangle(VerifyRun *run)
+{
+    enum { COUNT = 1000 };
+    static const Vector3 corners[] = {{2001, 1002, -1998}, {2001, -1998, 1002}, {-3999, 1002, 1002}};
+    TraceRay rays[COUNT];
+    TraceHit hits[COUNT];
+    for (uint64_t i = 0; i < COUNT; i++) {
+        Vector3 start = {random_symmetric(72, i, 0), random_symmetric(72, i, 1), random_symmetric(72, i, 2)};
+        rays[i] = ray_of(run, start, (Vector3){1, 2, 2});
+    }
+    Scene scene = scene_empty();
+    scene_add_triangle(&scene, corners);
+    verify_trace(run, &scene, false, rays, COUNT, hits);
+    scene_free(&scene);
+    for (size_t i = 0; i < COUNT; i++) {
+        const double *o = rays[i].origin;
+        Long t = 1 - ((Long)o[0] + 2 * (Long)o[1] + 2 * (Long)o[2]) / 9;
+        run->result->leaks += !verify_is_hit(&hits[i]);
+        if (verify_is_hit(&hits[i]) && run->tier > TIER_B)
+            verify_note_error(run, (double)fabsl(hits[i].t - t) / verify_ulp(run, (double)t), 4);
+    }
+}
+
+static Vector3 random_point(unsigned seed, uint64_t index, unsigned place)
+{
+    return (Vector3){random_symmetric(seed, index, place), random_symmetric(seed, index, place + 1),
+                     random_symmetric(seed, index, place + 2)};
+}
+
+static void add_random_triangles(Scene *scene, unsigned count, double size)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        Vector3 a = random_point(66, i, 0);
+        scene_add_triangle(scene, (Vector3[]){a, vector_add(a, vector_scale(random_point(66, i, 3), size)),
+                                              vector_add(a, vector_scale(random_point(66, i, 6), size))});
+    }
+}
+
+static bool is_refused(const char *vertex)
+{
+    char text[200];
+    int length = snprintf(text, sizeof text,
+                          "camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n"
+                          "objects:\n  - triangle: {vertices: [[%s, 0, 0], [1, 0, 0], [0, 1, 0]]}\n",
+                          vertex);
+    Source source = {"verify", text, (size_t)length};
+    MessageList messages = {0};
+    Scene scene = {0};
+    bool read = scene_read_yaml(&scene, &source, &messages);
+    bool refused = !read && message_count(&messages, MESSAGE_ERROR) > 0;
+    message_list_free(&messages);
+    scene_free(&scene);
+    return refused;
+}
+
+// Triangles without area are never hit, and change nothing about the others; numbers that are none are
+// refused.
+void verify_degenerate_meshes(VerifyRun *run)
+{
+    enum { SOUND = 200 };
+    const size_t count = 4000;
+    static const Vector3 degenerate[][3] = {
+        {{0, 0, 0}, {0, 0, 0}, {1, 1, 1}},       // a vertex twice
+        {{0, 0, 0}, {0.5, 0.5, 0.5}, {1, 1, 1}}, // in one line
+        {{0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}},
+        {{-1, 0.5, 0}, {1, 0.5, 0}, {0, 0.5, 0}},
+    };
+    TraceRay *rays = memory_allocate(count, sizeof *rays);
+    TraceHit *hits = memory_allocate(count, sizeof *hits), *clean = memory_allocate(count, sizeof *clean);
+    for (uint64_t i = 0; i < count; i++) {
+        Vector3 origin = vector_scale(random_unit(67, i, 0), 4);
+        Vector3 target = random_point(67, i, 3);
+        if (i % 2) {
+            const Vector3 *corners = degenerate[i / 2 % 4];
+            Vector3 along = vector_subtract(corners[2], corners[0]);
+            target = vector_add(corners[0], vector_scale(along, i % 4 == 1 ? 0.5 : random_at(67, i, 6)));
+        }
+        rays[i] = ray_of(run, origin, vector_subtract(target, origin));
+    }
+    Scene scene = scene_empty();
+    add_random_triangles(&scene, SOUND, 0.5);
+    verify_trace(run, &scene, true, rays, count, clean);
+    for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++)
+        scene_add_triangle(&scene, degenerate[i]);
+    verify_trace(run, &scene, true, rays, count, hits);
+    scene_free(&scene);
+    for (size_t i = 0; i < count; i++) {
+        run->result->wrong += verify_is_hit(&hits[i]) && hits[i].object >= SOUND;
+        run->result->differing += !verify_same_bits(&hits[i], &clean[i]);
+    }
+    static const char *const no_numbers[] = {".nan", ".inf", "-.inf"};
+    for (size_t i = 0; i < sizeof no_numbers / sizeof *no_numbers; i++)
+        run->result->wrong += !is_refused(no_numbers[i]);
+    free(rays);
+    free(hits);
+    free(clean);
+}
+
+enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 50, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 16 };
+
+static void add_other(Scene *scene, ShapeKind kind, uint64_t index)
+{
+    Object object = {.kind = kind};
+    Vector3 a = random_point(68, index, 0);
+    double size = 0.02 + 0.08 * random_at(68, index, 3);
+    Vector3 axis = vector_scale(random_unit(68, index, 4), size);
+    switch (kind) {
+    case SHAPE_SPHERE:
+        object.as.sphere.center = a;
+        object.as.sphere.radius = size;
+        break;
+    case SHAPE_DISC:
+        object.as.disc.center = a;
+        object.as.disc.normal = axis;
+        object.as.disc.radius = size;
+        break;
+    case SHAPE_BOX:
+        object.as.box.min = a;
+        object.as.box.max = (Vector3){a.x + size, a.y + fabs(axis.y), a.z + fabs(axis.z)};
+        break;
+    case SHAPE_CYLINDER:
+        object.as.cylinder.from = a;
+        object.as.cylinder.axis = axis;
+        object.as.cylinder.radius = size / 3;
+        object.as.cylinder.finite = true;
+        object.as.cylinder.caps = index % 2;
+        break;
+    case SHAPE_CONE:
+        object.as.cone.from = a;
+        object.as.cone.axis = axis;
+        object.as.cone.radius[0] = size / 2;
+        object.as.cone.finite = true;
+        object.as.cone.caps = index % 2;
+        break;
+    case SHAPE_TORUS:
+        object.as.torus.center = a;
+        object.as.torus.axis = axis;
+        object.as.torus.major = size;
+        object.as.torus.minor = size / 4;
+        break;
+    case SHAPE_PLANE: // without end, so in no hierarchy
+    case SHAPE_TRIANGLE:
+    case SHAPE_MESH: // as CROWD_TRIANGLES
+    case SHAPE_COUNT:
+        return;
+    }
+    array_push(scene->objects, object);
+}
+
+static Scene crowd_make(void)
+{
+    static const ShapeKind others[] = {SHAPE_SPHERE,   SHAPE_DISC, SHAPE_BOX,
+                                       SHAPE_CYLINDER, SHAPE_CONE, SHAPE_TORUS};
+    Scene scene = scene_empty();
+    add_random_triangles(&scene, CROWD_TRIANGLES, 0.05);
+    for (size_t k = 0; k < sizeof others / sizeof *others; k++)
+        for (uint64_t i = 0; i < CROWD_OTHERS; i++)
+            add_other(&scene, others[k], k * CROWD_OTHERS + i);
+    return scene;
+}
+
+// A place far from a triangle in its plane, from which it is seen edge-on.
+static Vector3 crowd_in_plane(const Vector3 vertices[3], uint64_t index)
+{
+    Vector3 ab = vector_subtract(vertices[1], vertices[0]), ac = vector_subtract(vertices[2], vertices[0]);
+    Vector3 along = vector_add(vector_scale(ab, random_symmetric(69, index, 1)),
+                               vector_scale(ac, random_symmetric(69, index, 2)));
+    return vector_add(vertices[0], vector_scale(vector_normalize(along), 3));
+}
+
+// A quarter of them at random, a quarter along an axis in the plane of a triangle's corner, a quarter at
+// corners, every other one of triangles seen edge-on, a quarter from where another ray was reflected.
+static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first, const TraceHit *reflected,
+                       TraceRay *rays)
+{
+    for (uint64_t i = first; i < first + CROWD_RAYS; i++) {
+        uint64_t triangle = (uint64_t)(random_at(69, i, 0) * CROWD_TRIANGLES);
+        Vector3 corner = scene->objects.items[triangle].as.triangle.vertices[i % 3];
+        Vector3 origin = vector_scale(random_unit(69, i, 1), 3), direction = random_point(69, i, 4);
+        if (i % 4 == 0) direction = vector_subtract(direction, origin);
+        if (i % 4 == 1) {
+            double parts[] = {0, 0, 0};
+            parts[i / 4 % 3] = i / 16 % 2 ? 1 : -1;
+            direction = (Vector3){parts[0], parts[1], parts[2]};
+            origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
+        }
+        if (i % 4 == 2 && i / 4 % 2)
+            origin = crowd_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);
+        if (i % 4 == 2) direction = vector_subtract(corner, origin);
+        if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
+            const TraceHit *hit = &reflected[i - first - 3];
+            origin = (Vector3){hit->mirrored_origin[0], hit->mirrored_origin[1], hit->mirrored_origin[2]};
+            direction =
+                (Vector3){hit->mirrored_direction[0], hit->mirrored_direction[1], hit->mirrored_direction[2]};
+        }
+        rays[i - first] = ray_of(run, origin, direction);
+    }
+}
+
+// The hierarchy gives what every object in turn gives, and whether anything is hit before a distance says the
+// same as what is hit first: cut an ulp before it and an ulp behind it.
+void verify_hierarchy(VerifyRun *run)
+{
+    TraceRay *rays = memory_allocate(CROWD_RAYS, sizeof *rays);
+    TraceHit *hits = memory_allocate(CROWD_RAYS, sizeof *hits),
+             *plain = memory_allocate(CROWD_RAYS, sizeof *plain);
+    Scene scene = crowd_make();
+    void *tree = run->renderer->open(run->renderer->context, &scene, true);
+    void *list = run->renderer->open(run->renderer->context, &scene, false);
+    const double parts[] = {INFINITY, 1 - 2 * verify_roundoff(run), 1 + 2 * verify_roundoff(run)};
+    for (uint64_t batch = 0; batch < CROWD_BATCHES; batch++) {
+        crowd_rays(run, &scene, batch * CROWD_RAYS, NULL, rays);
+        verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
+        crowd_rays(run, &scene, batch * CROWD_RAYS, hits, rays);
+        verify_trace_opened(run, list, rays, CROWD_RAYS, plain);
+        double endless = rays[0].tmax;
+        for (size_t cut = 0; cut < sizeof parts / sizeof *parts; cut++) {
+            for (size_t i = 0; i < CROWD_RAYS; i++)
+                if (verify_is_hit(&plain[i]))
+                    rays[i].tmax = fmin(endless, verify_rounded(run, plain[i].t * parts[cut]));
+            verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
+            for (size_t i = 0; i < CROWD_RAYS; i++) {
+                bool hit = verify_is_hit(&plain[i]) && plain[i].t < rays[i].tmax;
+                bool same = verify_is_hit(&hits[i]) == hit && hits[i].light == (hit ? 0 : 1);
+                run->result->differing += !same || (hit && !verify_same_bits(&hits[i], &plain[i]));
+            }
+        }
+    }
+    run->renderer->close(tree);
+    run->renderer->close(list);
+    scene_free(&scene);
+    free(rays);
+    free(hits);
+    free(plain);
+}

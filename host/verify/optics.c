@@ -1,0 +1,116 @@
+// Checks of refraction and of the camera's frame.
+#include "host/base/memory.h"
+#include "host/import/load.h"
+#include "host/verify/run.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { AROUND = 2048, STEEP = 24, ANGLES = 2 * AROUND + 1 + STEEP };
+
+// From inside glass of index 1.5 through the plane z = 0: sines around the critical angle's 2/3, and near 1.
+static void angles_make(const VerifyRun *run, TraceRay *rays)
+{
+    for (int i = 0; i < ANGLES; i++) {
+        int j = i - 2 * AROUND;
+        double sine = j <= 0 ? 2.0 / 3 + (i - AROUND) * 0x1p-24 : 1 - ldexp(1, -j);
+        rays[i] = (TraceRay){{0, 0, -1}, {sine, 0, sqrt((1 - sine) * (1 + sine))}, 0, INFINITY};
+        verify_round_ray(run, &rays[i]);
+    }
+}
+
+// All is reflected where the squared cosine behind the surface is below 0, unless that is within 16 u.
+void verify_critical_angle(VerifyRun *run)
+{
+    TraceRay *rays = memory_allocate(ANGLES, sizeof *rays);
+    TraceHit *hits = memory_allocate(ANGLES, sizeof *hits);
+    angles_make(run, rays);
+    Scene scene =
+        verify_scene("materials:\n  glass: {transmission: 1, ior: 1.5}\n"
+                     "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 0, 1], material: glass}\n");
+    verify_trace(run, &scene, false, rays, ANGLES, hits);
+    scene_free(&scene);
+    const double u = verify_roundoff(run);
+    for (size_t i = 0; i < ANGLES; i++) {
+        const double *passed = hits[i].passed_direction;
+        if (!verify_is_hit(&hits[i])) {
+            run->result->leaks++;
+            continue;
+        }
+        run->result->unsound += hits[i].passed != 0 && hits[i].passed != 1;
+        if (run->tier == TIER_A) continue;
+        long double x = rays[i].direction[0], z = rays[i].direction[2];
+        double squared = (double)(1 - 2.25L * (x * x) / (x * x + z * z));
+        if (fabs(squared) <= 16 * u) continue;
+        bool total = hits[i].passed == 0;
+        if (total != (squared < 0)) {
+            run->result->wrong++;
+            continue;
+        }
+        if (total) continue;
+        double length = sqrt(passed[0] * passed[0] + passed[1] * passed[1] + passed[2] * passed[2]);
+        run->result->unsound += fabs(length - 1) > 4 * u;
+        double cosine = sqrt(squared), ulp = verify_ulp(run, cosine);
+        verify_note_error(run, fabs(passed[2] - cosine) / ulp, 8 * u / cosine / ulp);
+    }
+    free(rays);
+    free(hits);
+}
+
+static bool is_camera_refused(const char *camera)
+{
+    char text[200];
+    int length = snprintf(text, sizeof text, "camera: {%s}\nobjects: []\n", camera);
+    Source source = {"verify", text, (size_t)length};
+    MessageList messages = {0};
+    Scene scene = {0};
+    bool read = scene_read_yaml(&scene, &source, &messages);
+    bool refused = !read && message_count(&messages, MESSAGE_ERROR) > 0;
+    message_list_free(&messages);
+    scene_free(&scene);
+    return refused;
+}
+
+static bool is_orthonormal(const Vector3 axes[3])
+{
+    for (size_t i = 0; i < 3; i++)
+        for (size_t j = 0; j <= i; j++) {
+            double product = vector_dot(vector_normalize(axes[i]), vector_normalize(axes[j]));
+            if (!(fabs(product - (i == j)) <= 1e-6)) return false;
+        }
+    return true;
+}
+
+// Cameras whose `up` says nothing get a frame all the same; those that see nothing are refused.
+void verify_camera_frames(VerifyRun *run)
+{
+    static const char *const refused[] = {
+        "position: [1, 2, 3], look_at: [1, 2, 3], fov: 40",
+        "position: [0, 0, 0], look_at: [0, 0, 1], fov: 0",
+        "position: [0, 0, 0], look_at: [0, 0, 1], fov: 180",
+        "position: [0, 0, 0], look_at: [0, 0, 1], fov: -20",
+        "position: [0, 0, 0], look_at: [0, 0, 1], fov: .nan",
+        "position: [0, .nan, 0], look_at: [0, 0, 1], fov: 40",
+    };
+    static const Camera cameras[] = {
+        {.look_at = {0, -1, 0}, .up = {0, 1, 0}, .half_tangent = 1},
+        {.look_at = {0, 1, 0}, .up = {0, 1, 0}, .half_tangent = 1},
+        {.look_at = {3, 4, 5}, .up = {6, 8, 10}, .half_tangent = 1},
+        {.look_at = {3, 4, 5}, .up = {-3, -4, -5}, .half_tangent = 1},
+        {.look_at = {0, 0, 1}, .half_tangent = 1},
+        {.look_at = {0, -1, 0}, .up = {1e-7, 1, 0}, .half_tangent = 1},
+        {.look_at = {0, -1, 0}, .up = {1e-14, 1, 0}, .half_tangent = 1},
+        {.look_at = {0, 0, 1}, .up = {0, 1, 0}, .half_tangent = 8.7e-6},
+        {.look_at = {0, 0, 1}, .up = {0, 1, 0}, .half_tangent = 1146},
+        {.position = {1e7, 1e7, 1e7}, .look_at = {1e7, 1e7 + 1, 1e7}, .up = {0, 1, 0}, .half_tangent = 1},
+        {.look_at = {1e-30, 0, 0}, .up = {0, 1e30, 0}, .half_tangent = 1},
+        {.look_at = {0, 0, 1e30}, .up = {0, 1e-30, 0}, .half_tangent = 1},
+    };
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+        run->result->wrong += !is_camera_refused(refused[i]);
+    for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
+        Vector3 axes[3];
+        run->renderer->camera_axes(&cameras[i], axes);
+        run->result->unsound += !is_orthonormal(axes);
+    }
+}

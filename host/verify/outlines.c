@@ -1,0 +1,251 @@
+// Pictures of what is far, thin or pointed: each pixel's hit or miss against the exact one for the ray that
+// was traced.
+#include "host/base/memory.h"
+#include "host/base/percentile.h"
+#include "host/verify/exact.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static const Vector3 origin;
+
+// Of rays from the center outward no pixel that is farther out is brighter.
+static void judge_radial_brightness(VerifyRun *run, const PictureLayers *picture)
+{
+    const uint32_t side = picture->width;
+    for (unsigned k = 0; k < 16; k++) {
+        double x = cos(k * M_PI / 8), y = sin(k * M_PI / 8), brightness = INFINITY;
+        int64_t farthest = -1;
+        for (uint32_t step = 0; step < side / 2; step++) {
+            int64_t column = (int64_t)floor(side / 2.0 + x * step),
+                    row = (int64_t)floor(side / 2.0 + y * step);
+            int64_t dx = 2 * column + 1 - side, dy = 2 * row + 1 - side;
+            // the pixels along the way are not quite on it: only those farther out than all before count
+            if (dx * dx + dy * dy <= farthest) continue;
+            farthest = dx * dx + dy * dy;
+            double value = picture->color[3 * (size_t)(row * side + column)];
+            run->result->wrong += value > brightness + 2.0 / 255;
+            brightness = fmin(brightness, value);
+        }
+    }
+}
+
+// Lambert's cosine for light from the eye's side, at each pixel that is hit; the 99.9th percentile counts.
+static void judge_lambert(VerifyRun *run, const PictureLayers *picture, LongVector center, double bound)
+{
+    float *errors = memory_allocate(layers_pixel_count(picture), sizeof *errors);
+    size_t count = 0;
+    for (size_t i = 0; i < layers_pixel_count(picture); i++) {
+        ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(picture, i));
+        if (!exact.found || !verify_pixel_found(picture, i)) continue;
+        Long shade = fmaxl(exact.normal.z, 0);
+        errors[count++] = (float)fabsl(picture->color[3 * i] - shade);
+    }
+    if (count > 0) verify_note(run, percentile_999(errors, count), bound, "of 1");
+    free(errors);
+}
+
+void verify_far_fringe(VerifyRun *run)
+{
+    Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, -1]}\n"
+                               "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
+    static const double distances[] = {10, 100, 1e3, 1e4};
+    for (size_t k = 0; k < sizeof distances / sizeof *distances; k++) {
+        double distance = distances[k];
+        const Vector3 eye = {0, 0, distance};
+        scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
+        PictureLayers picture = verify_render(run, &scene, false, 512, 512);
+        LongVector center = exact_from_eye(run, origin, eye);
+        judge_radial_brightness(run, &picture);
+        for (size_t i = 0; i < layers_pixel_count(&picture) && run->tier != TIER_A; i++) {
+            ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(&picture, i));
+            exact_judge(run, &exact, verify_pixel_found(&picture, i), picture.t[i]);
+        }
+        if (run->tier == TIER_B && distance <= 1e3) judge_lambert(run, &picture, center, 2e-3);
+        if (run->tier > TIER_B) judge_lambert(run, &picture, center, 1e-5);
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}
+
+// Holds each pixel to the oracle.
+#define JUDGE_PIXELS(picture, exact_of_direction)                                                            \
+    for (size_t i = 0; i < layers_pixel_count(picture) && run->tier != TIER_A; i++) {                        \
+        LongVector direction = exact_pixel_ray(picture, i);                                                  \
+        ExactHit exact = exact_of_direction;                                                                 \
+        exact_judge(run, &exact, verify_pixel_found(picture, i), (picture)->t[i]);                           \
+    }
+
+// Every column has a stretch of pixels without a gap.
+void verify_wire(VerifyRun *run)
+{
+    Scene scene =
+        verify_scene("objects:\n  - cylinder: {from: [-10000, 0, 0], to: [10000, 0, 0], radius: 0.001}\n");
+    const Vector3 eye = {0, 0, -10};
+    scene.camera = verify_camera(eye, origin, 0.293);
+    PictureLayers picture = verify_render(run, &scene, false, 1024, 64);
+    LongVector center = exact_from_eye(run, origin, eye);
+    const LongVector axis = {1, 0, 0};
+    Long radius = verify_rounded(run, 0.001);
+    JUDGE_PIXELS(&picture, exact_cylinder(center, axis, radius, 1e4, direction))
+    for (uint32_t column = 0; column < picture.width; column++) {
+        size_t stretches = 0;
+        for (uint32_t row = 0; row < picture.height; row++) {
+            size_t pixel = (size_t)row * picture.width + column;
+            bool above = row > 0 && verify_pixel_found(&picture, pixel - picture.width);
+            stretches += verify_pixel_found(&picture, pixel) && !above;
+        }
+        run->result->leaks += stretches != 1;
+    }
+    layers_free(&picture);
+    scene_free(&scene);
+}
+
+// Seen along the axis, the light behind the eye, the tip is as bright as the side around it; from beside it
+// there are no more than numbers to ask for.
+void verify_apex(VerifyRun *run)
+{
+    static const struct {
+        Vector3 eye;
+        const char *light;
+    } views[] = {{{0, 0, -5}, "[0, 0, 1]"}, {{5, 0, 0}, "[-1, 0, 0]"}};
+    enum { SIDE = 65 };
+    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+        char text[160];
+        snprintf(text, sizeof text,
+                 "lights:\n  - directional: {direction: %s}\n"
+                 "objects:\n  - cone: {from: [0, 0, 0], to: [0, 0, 10], radius: [0, 5]}\n",
+                 views[k].light);
+        Scene scene = verify_scene(text);
+        scene.camera = verify_camera(views[k].eye, origin, 0);
+        scene.camera.half_tangent = SIDE * 1e-4 / 2 / 5;
+        PictureLayers picture = verify_render(run, &scene, false, SIDE, SIDE);
+        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            if (k == 0) run->result->wrong += !verify_pixel_found(&picture, i) || !(picture.color[3 * i] > 0);
+            if (!verify_pixel_found(&picture, i)) continue;
+            const double u = verify_roundoff(run);
+            double length = vector_length(verify_vector(picture.normal + 3 * i));
+            // a root and a quotient more
+            verify_note(run, fabs(length - 1) / u, run->renderer->inexact ? 4 + 6 + 4 : 4, "u");
+        }
+        layers_free(&picture);
+        scene_free(&scene);
+    }
+}
+
+static Scene torus_scene(double minor)
+{
+    char text[120];
+    snprintf(text, sizeof text,
+             "objects:\n  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: %g}\n", minor);
+    return verify_scene(text);
+}
+
+void verify_far_torus(VerifyRun *run)
+{
+    static const double distances[] = {10, 50, 1000};
+    Scene scene = torus_scene(0.25);
+    for (size_t k = 0; k < sizeof distances / sizeof *distances; k++) {
+        const Vector3 eye = {0.3 * distances[k], 0.4 * distances[k], -0.866 * distances[k]};
+        scene.camera = verify_camera(eye, origin, 0);
+        scene.camera.half_tangent = 1.3 / distances[k];
+        PictureLayers picture = verify_render(run, &scene, false, 160, 160);
+        LongVector center = exact_from_eye(run, origin, eye);
+        JUDGE_PIXELS(&picture, exact_torus(center, 1, 0.25L, direction))
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}
+
+// Along the tangents the distance says little; the point has to lie on the torus all the same.
+void verify_tangent_circle(VerifyRun *run)
+{
+    static const double heights[] = {0.25, 0.25 - 0x1p-26, 0.25 + 0x1p-25};
+    enum { COUNT = sizeof heights / sizeof *heights };
+    if (run->tier == TIER_A) return;
+    TraceRay rays[COUNT];
+    TraceHit hits[COUNT];
+    for (size_t i = 0; i < COUNT; i++) {
+        rays[i] = (TraceRay){{-5, 0, heights[i]}, {1, 0, 0}, 0, INFINITY};
+        verify_round_ray(run, &rays[i]);
+    }
+    Scene scene = torus_scene(0.25);
+    verify_trace(run, &scene, false, rays, COUNT, hits);
+    for (size_t i = 0; i < COUNT; i++) {
+        if (!verify_is_hit(&hits[i])) continue;
+        LongVector point = {-5 + (Long)hits[i].t, 0, rays[i].origin[2]};
+        Long off = exact_surface_distance(run, &scene.objects.items[0], point);
+        run->result->off += off > 16 * verify_roundoff(run);
+    }
+    scene_free(&scene);
+}
+
+// Pixels still to be looked at, and those that were.
+typedef struct {
+    const PictureLayers *picture;
+    uint32_t (*pending)[2]; // column, row
+    size_t pending_count;
+    bool *seen;
+} Flood;
+
+static bool flood_take(Flood *flood, uint32_t column, uint32_t row)
+{
+    size_t pixel = (size_t)row * flood->picture->width + column;
+    if (flood->seen[pixel] || !verify_pixel_found(flood->picture, pixel)) return false;
+    flood->seen[pixel] = true;
+    uint32_t *place = flood->pending[flood->pending_count++];
+    place[0] = column;
+    place[1] = row;
+    return true;
+}
+
+static void flood_run(Flood *flood)
+{
+    const PictureLayers *picture = flood->picture;
+    while (flood->pending_count > 0) {
+        const uint32_t *place = flood->pending[--flood->pending_count];
+        uint32_t column = place[0], row = place[1];
+        for (uint32_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < picture->height; y++)
+            for (uint32_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < picture->width; x++)
+                flood_take(flood, x, y);
+    }
+}
+
+// How many parts the hit pixels fall into, where those that touch at a corner belong together.
+static size_t count_parts(const PictureLayers *picture)
+{
+    size_t parts = 0, pixels = layers_pixel_count(picture);
+    Flood flood = {picture, memory_allocate(pixels, sizeof *flood.pending), 0,
+                   memory_allocate_zeroed(pixels, sizeof *flood.seen)};
+    for (uint32_t row = 0; row < picture->height; row++)
+        for (uint32_t column = 0; column < picture->width; column++) {
+            if (!flood_take(&flood, column, row)) continue;
+            parts++;
+            flood_run(&flood);
+        }
+    free(flood.pending);
+    free(flood.seen);
+    return parts;
+}
+
+// At 30 degrees the ring is half a pixel thick, so that the exact one has gaps as well; the second picture,
+// where it is 1.4 pixels thick, has none.
+void verify_thin_ring(VerifyRun *run)
+{
+    static const struct {
+        double fov;
+        uint32_t side;
+    } views[] = {{30, 1024}, {17.2, 1536}};
+    const Vector3 eye = {0, -5, 5};
+    Scene scene = torus_scene(0.001);
+    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+        scene.camera = verify_camera(eye, origin, views[k].fov);
+        PictureLayers picture = verify_render(run, &scene, false, views[k].side, views[k].side);
+        LongVector center = exact_from_eye(run, origin, eye);
+        Long minor = verify_rounded(run, 0.001);
+        JUDGE_PIXELS(&picture, exact_torus(center, 1, minor, direction))
+        if (k == 1) run->result->leaks += count_parts(&picture) != 1;
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}

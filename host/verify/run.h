@@ -1,0 +1,93 @@
+// Inside a run of the hard cases: what its parts share.
+#pragma once
+
+#include "host/verify/verify.h"
+
+typedef struct {
+    const VerifyRenderer *renderer;
+    VerifyTier tier;
+    VerifyResult *result;
+} VerifyRun;
+
+// What of a case is not in the tables. Counts what is wrong in the run's result.
+typedef void VerifyCheck(VerifyRun *run);
+
+VerifyCheck verify_scaled_directions; // S6
+VerifyCheck verify_leaving_spheres;   // S6
+VerifyCheck verify_points_on_faces;   // P5
+VerifyCheck verify_coincident_faces;  // P7
+VerifyCheck verify_far_mesh;          // M2
+VerifyCheck verify_scale_ladder;      // M3
+VerifyCheck verify_within_triangle;   // M4
+VerifyCheck verify_facing_triangle;   // M4
+VerifyCheck verify_degenerate_meshes; // M5
+VerifyCheck verify_hierarchy;         // M6
+VerifyCheck verify_critical_angle;    // R4
+VerifyCheck verify_camera_frames;     // R8
+
+VerifyCheck verify_far_fringe;       // S2
+VerifyCheck verify_ground_horizon;   // S4
+VerifyCheck verify_plane_horizon;    // P1
+VerifyCheck verify_plane_acne;       // P2
+VerifyCheck verify_thin_plate;       // P6
+VerifyCheck verify_wire;             // C3
+VerifyCheck verify_apex;             // C6
+VerifyCheck verify_far_torus;        // T1
+VerifyCheck verify_tangent_circle;   // T4
+VerifyCheck verify_thin_ring;        // T5
+VerifyCheck verify_contact_shadow;   // R1
+VerifyCheck verify_nested_spheres;   // R2
+VerifyCheck verify_matched_glass;    // R3
+VerifyCheck verify_highlights;       // R5
+VerifyCheck verify_scaled_scenes;    // R6
+VerifyCheck verify_mirrored_scenes;  // R7
+VerifyCheck verify_degenerate_views; // R8
+
+static inline bool verify_is_wide(const VerifyRun *run)
+{
+    return run->tier == TIER_D;
+}
+
+double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1
+double verify_ulp(const VerifyRun *run, double value);
+double verify_rounded(const VerifyRun *run, double value); // to the precision at work
+// Rounds the ray's numbers as the renderer will, so that exact answers are of the same ray; a tmax beyond the
+// precision's range becomes the largest number in it.
+void verify_round_ray(const VerifyRun *run, TraceRay *ray);
+
+static inline bool verify_is_hit(const TraceHit *hit)
+{
+    return hit->object != UINT32_MAX;
+}
+
+// Hits of rays at a scene, the hierarchy used or not. The sound ones are told from the others, which are
+// counted.
+void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const TraceRay *rays, size_t count,
+                  TraceHit *hits);
+// The same at a scene that is open already.
+void verify_trace_opened(VerifyRun *run, void *opened, const TraceRay *rays, size_t count, TraceHit *hits);
+bool verify_same_bits(const TraceHit *a, const TraceHit *b); // object, distance and normal
+
+// Notes an error of t, in ulp of it, and counts it as wrong where it is beyond the bound.
+void verify_note_error(VerifyRun *run, double error, double bound);
+// The same for an error in another unit.
+void verify_note(VerifyRun *run, double error, double bound, const char *unit);
+
+// Reads a scene that the program itself carries: native YAML, all but the camera. A text that cannot be read
+// is a program's fault. Caller frees it with scene_free.
+Scene verify_scene(const char *objects);
+Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
+
+// Renders a picture, all of it kept, and counts what is unsound in it; layers_free frees it.
+PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+                            uint32_t height);
+
+static inline bool verify_pixel_found(const PictureLayers *picture, size_t pixel)
+{
+    return picture->object[pixel] != UINT32_MAX;
+}
+
+static inline Vector3 verify_vector(const double *parts)
+{
+    return (Vector3){parts[0], parts[1], parts[2]};
+}

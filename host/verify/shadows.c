@@ -1,0 +1,132 @@
+// Pictures of shadows: none where nothing stands in the light, and none missing.
+#include "host/base/array.h"
+#include "host/verify/exact.h"
+#include <math.h>
+#include <stdlib.h>
+
+// A plane alone in light from just above it to steeply above it, near and far from the origin, small and
+// large: no pixel lies in shadow, and all have one color, the light's cosine with the normal.
+void verify_plane_acne(VerifyRun *run)
+{
+    static const double sizes_places[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
+    static const double elevations[] = {0.01, 1, 45};
+    const Vector3 normal = {1, 2, 3}, unit = vector_normalize(normal);
+    const Vector3 across = vector_normalize(vector_cross(normal, (Vector3){1, 0, 0}));
+    for (size_t k = 0; k < sizeof sizes_places / sizeof *sizes_places; k++) {
+        double size = sizes_places[k][0], place = sizes_places[k][1];
+        Vector3 point = vector_add(vector_scale((Vector3){0.3, -0.2, 0.5}, size),
+                                   vector_scale((Vector3){1, -2, 0.5}, place));
+        Vector3 eye =
+            vector_add(point, vector_add(vector_scale(unit, 3 * size), vector_scale(across, 0.5 * size)));
+        for (size_t light = 0; light < sizeof elevations / sizeof *elevations; light++) {
+            double angle = elevations[light] * (M_PI / 180);
+            Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, 1]}\n"
+                                       "objects:\n  - plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n");
+            Vector3 to_light = vector_add(vector_scale(across, cos(angle)), vector_scale(unit, sin(angle)));
+            scene.lights.items[0].direction = vector_scale(to_light, -1);
+            scene.objects.items[0].as.plane.point = point;
+            scene.camera = verify_camera(eye, point, 60);
+            PictureLayers picture = verify_render(run, &scene, false, 128, 128);
+            Vector3 direction = vector_normalize(scene.lights.items[0].direction);
+            LongVector stored = {verify_rounded(run, direction.x), verify_rounded(run, direction.y),
+                                 verify_rounded(run, direction.z)};
+            Long cosine = -long_dot(long_unit(long_vector(normal)), stored);
+            double least = INFINITY, most = 0;
+            for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+                run->result->leaks += picture.object[i] != 0;
+                run->result->wrong += picture.shadow[i] != 0;
+                least = fmin(least, picture.color[3 * i]);
+                most = fmax(most, picture.color[3 * i]);
+            }
+            run->result->wrong += !(least > 0);
+            verify_note(run, (most - least) / verify_ulp(run, most), 2, "ulp");
+            const double u = verify_roundoff(run);
+            verify_note(run, (double)fmaxl(fabsl(most - cosine), fabsl(least - cosine)) / u, 8, "u");
+            layers_free(&picture);
+            scene_free(&scene);
+        }
+    }
+}
+
+// A plate a millionth as thick as wide, lit from one side: the other is dark, and the lit one is lit.
+void verify_thin_plate(VerifyRun *run)
+{
+    Scene scene = verify_scene("lights:\n  - point: {position: [0.5, 0.5, -2]}\n"
+                               "  - directional: {direction: [0.1, 0.2, 1]}\n"
+                               "objects:\n  - box: {min: [0, 0, 0], max: [1, 1, 1e-6]}\n");
+    for (size_t k = 0; k < 4; k++) {
+        bool above = k & 1, light_above = k & 2;
+        const Vector3 eye = {0.5, 0.5, above ? 2 : -2}, center = {0.5, 0.5, 0};
+        scene.camera = verify_camera(eye, center, 40);
+        scene.lights.items[0].position.z = light_above ? 2 : -2;
+        scene.lights.items[1].direction.z = light_above ? -1 : 1;
+        PictureLayers picture = verify_render(run, &scene, false, 256, 256);
+        size_t seen = 0;
+        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            if (picture.object[i] == UINT32_MAX) continue;
+            seen++;
+            const double *color = picture.color + 3 * i;
+            if (above == light_above)
+                run->result->wrong += !(color[0] > 0) || picture.shadow[2 * i] || picture.shadow[2 * i + 1];
+            else
+                run->result->leaks += color[0] != 0 || !picture.shadow[2 * i] || !picture.shadow[2 * i + 1];
+        }
+        run->result->wrong += seen == 0;
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}
+
+// Counts a pixel that does not show the nearest of plane 0 and sphere 1. The sphere's rim, and where the two
+// are equally far, are open.
+static void judge_nearest(VerifyRun *run, uint32_t object, const ExactHit *plane, const ExactHit *sphere)
+{
+    const Long open = 1e-5L;
+    if (fabsl(sphere->margin) < open) return;
+    if (sphere->found && plane->found && fabsl(sphere->t - plane->t) < open * plane->t) return;
+    bool sphere_first = sphere->found && (!plane->found || sphere->t < plane->t);
+    uint32_t nearest = sphere_first ? 1 : plane->found ? 0 : UINT32_MAX;
+    run->result->leaks += object == UINT32_MAX && nearest != UINT32_MAX;
+    run->result->wrong += object != UINT32_MAX && object != nearest;
+}
+
+// A sphere on a plane, lit from above: its shadow is a disc with a radius known exactly, up to the point
+// where they touch.
+void verify_contact_shadow(VerifyRun *run)
+{
+    static const struct {
+        Vector3 eye;
+        double fov;
+    } views[] = {{{3, 2, 3}, 60}, {{3, 0.001, 3}, 0.5}, {{0.2, 0.02, 0.2}, 40}};
+    const Vector3 touched = {0, 0, 0}, light = {0, 10, 0}, middle = {0, 1, 0}, up = {0, 1, 0};
+    const Long edge = 10 / sqrtl(80);
+    Scene scene = verify_scene("lights:\n  - point: {position: [0, 10, 0]}\n"
+                               "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                               "  - sphere: {center: [0, 1, 0], radius: 1}\n");
+    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+        const Vector3 eye = views[k].eye;
+        scene.camera = verify_camera(eye, touched, views[k].fov);
+        PictureLayers picture = verify_render(run, &scene, false, 384, 384);
+        LongVector to_light = exact_from_eye(run, light, eye), ground = exact_from_eye(run, touched, eye);
+        LongVector center = exact_from_eye(run, middle, eye);
+        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            LongVector direction = exact_pixel_ray(&picture, i);
+            bool dark = picture.shadow[i];
+            ExactHit plane = exact_plane(ground, long_vector(up), direction);
+            ExactHit sphere = exact_sphere(center, 1, direction);
+            judge_nearest(run, picture.object[i], &plane, &sphere);
+            if (picture.object[i] == 0 && plane.found) {
+                LongVector p = long_subtract(long_scale(direction, plane.t), ground);
+                Long radius = hypotl(p.x, p.z);
+                run->result->leaks += !dark && radius < edge * (1 - 1e-5L);
+                run->result->wrong += dark && radius > edge * (1 + 1e-5L);
+            } else if (picture.object[i] == 1 && sphere.found) {
+                LongVector p = long_scale(direction, sphere.t);
+                Long facing = long_dot(sphere.normal, long_unit(long_subtract(to_light, p)));
+                run->result->wrong += fabsl(facing) > 1e-5L && dark != (facing < 0);
+            }
+        }
+        layers_free(&picture);
+    }
+    scene_free(&scene);
+}

@@ -1,0 +1,226 @@
+// Checks of spheres and boxes that no table holds.
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/verify/families.h"
+#include "host/verify/run.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static TraceRay ray_of(const VerifyRun *run, Vector3 origin, Vector3 direction)
+{
+    TraceRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    verify_round_ray(run, &ray);
+    return ray;
+}
+
+// A direction 2^20 times as long, or as short, gives the same hits at distances exactly as many times
+// shorter, or longer.
+void verify_scaled_directions(VerifyRun *run)
+{
+    enum { COUNT = 100 };
+    static const int exponents[] = {0, 20, -20};
+    TraceRay rays[3][COUNT];
+    TraceHit hits[3][COUNT];
+    for (uint64_t i = 0; i < COUNT; i++) {
+        Vector3 origin = vector_scale(random_unit(61, i, 0), i % 2 ? 0.7 : 3);
+        Vector3 target = vector_scale(random_unit(61, i, 3), 0.9);
+        rays[0][i] = ray_of(run, origin, vector_subtract(target, origin));
+        for (size_t k = 1; k < 3; k++) {
+            rays[k][i] = rays[0][i];
+            for (size_t axis = 0; axis < 3; axis++)
+                rays[k][i].direction[axis] = ldexp(rays[0][i].direction[axis], exponents[k]);
+        }
+    }
+    Scene scene = verify_scene("objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
+    verify_trace(run, &scene, false, rays[0], 3 * (size_t)COUNT, hits[0]);
+    scene_free(&scene);
+    for (size_t i = 0; i < COUNT; i++) {
+        run->result->wrong += !verify_is_hit(&hits[0][i]);
+        for (size_t k = 1; k < 3; k++)
+            run->result->differing += ldexp(hits[k][i].t, exponents[k]) != hits[0][i].t;
+    }
+}
+
+enum { SPHERES = 50, GROUPS = 20, DIRECTIONS = 500 };
+
+// Radii and centers over eight powers of ten.
+static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
+{
+    Scene scene = scene_empty();
+    for (uint64_t i = 0; i < SPHERES; i++) {
+        uint64_t index = group * SPHERES + i;
+        double center[3];
+        for (unsigned k = 0; k < 3; k++) {
+            double size = pow(10, 4 * random_symmetric(62, index, k));
+            center[k] = verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
+        }
+        Object object = {.kind = SHAPE_SPHERE};
+        object.as.sphere.center = verify_vector(center);
+        object.as.sphere.radius = verify_rounded(run, pow(10, 4 * random_symmetric(62, index, 6)));
+        array_push(scene.objects, object);
+    }
+    return scene;
+}
+
+// The far crossing of a ray that starts inside; NAN where it starts outside or runs along the surface.
+static double sphere_exit(const Object *sphere, const TraceRay *ray)
+{
+    const double center[] = {sphere->as.sphere.center.x, sphere->as.sphere.center.y,
+                             sphere->as.sphere.center.z};
+    long double radius = sphere->as.sphere.radius, a = 0, b = 0, c = 0;
+    for (size_t axis = 0; axis < 3; axis++) {
+        long double f = (long double)ray->origin[axis] - center[axis], d = ray->direction[axis];
+        a += d * d;
+        b += f * d;
+        c += f * f;
+    }
+    c -= radius * radius;
+    if (c >= 0 || -b < 0.1L * radius * sqrtl(a)) return NAN;
+    return (double)((sqrtl(b * b - a * c) - b) / a);
+}
+
+// A ray to each sphere from outside.
+static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned group, TraceRay rays[SPHERES])
+{
+    for (uint64_t i = 0; i < SPHERES; i++) {
+        uint64_t index = group * SPHERES + i;
+        Vector3 center = scene->objects.items[i].as.sphere.center;
+        double radius = scene->objects.items[i].as.sphere.radius;
+        double away = radius * (1 + pow(10, 2 * random_symmetric(63, index, 0)));
+        Vector3 origin = vector_add(center, vector_scale(random_unit(63, index, 1), away));
+        double off = 0.9 * radius * random_at(63, index, 4);
+        Vector3 target = vector_add(center, vector_scale(random_unit(63, index, 5), off));
+        rays[i] = ray_of(run, origin, vector_subtract(target, origin));
+    }
+}
+
+// From where the first ray met the sphere: half of the rays leave it, none may meet it again; half run into
+// it, and come to its other side.
+static void leave_sphere(VerifyRun *run, const Scene *scene, void *opened, size_t sphere,
+                         const TraceHit *first)
+{
+    static TraceRay rays[2 * DIRECTIONS];
+    static TraceHit hits[2 * DIRECTIONS];
+    for (uint64_t i = 0; i < DIRECTIONS; i++) {
+        Vector3 direction = random_unit(64, sphere * DIRECTIONS + i, 0);
+        if (vector_dot(direction, verify_vector(first->normal)) < 0) direction = vector_scale(direction, -1);
+        rays[i] = ray_of(run, verify_vector(first->mirrored_origin), direction);
+        rays[DIRECTIONS + i] = ray_of(run, verify_vector(first->passed_origin), vector_scale(direction, -1));
+    }
+    verify_trace_opened(run, opened, rays, 2 * (size_t)DIRECTIONS, hits);
+    for (size_t i = 0; i < DIRECTIONS; i++) {
+        run->result->wrong += hits[i].object == sphere;
+        double exit = sphere_exit(&scene->objects.items[sphere], &rays[DIRECTIONS + i]);
+        const TraceHit *far = &hits[DIRECTIONS + i];
+        if (isnan(exit)) continue;
+        run->result->leaks += !verify_is_hit(far);
+        if (far->object != sphere) continue;
+        if (run->tier == TIER_A)
+            run->result->wrong += far->t < exit / 2;
+        else
+            verify_note_error(run, fabs(far->t - exit) / verify_ulp(run, exit), 16);
+    }
+}
+
+void verify_leaving_spheres(VerifyRun *run)
+{
+    for (unsigned group = 0; group < GROUPS; group++) {
+        TraceRay rays[SPHERES];
+        TraceHit hits[SPHERES];
+        Scene scene = spheres_of_all_sizes(run, group);
+        rays_at_spheres(run, &scene, group, rays);
+        void *opened = run->renderer->open(run->renderer->context, &scene, false);
+        verify_trace_opened(run, opened, rays, SPHERES, hits);
+        for (size_t i = 0; i < SPHERES; i++)
+            if (hits[i].object == i) leave_sphere(run, &scene, opened, i, &hits[i]);
+        run->renderer->close(opened);
+        scene_free(&scene);
+    }
+}
+
+// The hit lies on the very face that the normal is of.
+void verify_points_on_faces(VerifyRun *run)
+{
+    enum { COUNT = 30000 };
+    if (run->tier == TIER_A) return;
+    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
+    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
+    for (uint64_t i = 0; i < COUNT; i++) {
+        rays[i] = family_in_room(i);
+        verify_round_ray(run, &rays[i]);
+    }
+    Scene scene = verify_scene("objects:\n  - box: {min: [-1, -1, -1], max: [1, 1, 1]}\n");
+    verify_trace(run, &scene, false, rays, COUNT, hits);
+    scene_free(&scene);
+    for (size_t i = 0; i < COUNT; i++) {
+        if (!verify_is_hit(&hits[i])) continue;
+        size_t on_face = 0;
+        for (size_t axis = 0; axis < 3; axis++)
+            if (fabs(hits[i].normal[axis]) == 1) on_face += fabs(hits[i].position[axis]) == 1;
+        run->result->wrong += on_face != 1;
+    }
+    free(rays);
+    free(hits);
+}
+
+static const char *const coincident[] = {
+    "box: {min: [0, 0, 0], max: [1, 1, 1]}",
+    "box: {min: [1, 0, 0], max: [2, 1, 1]}",
+    "plane: {point: [0, 0, 0], normal: [0, 1, 0]}",
+    "triangle: {vertices: [[-1, 0.25, 0.25], [3, 0.25, 0.25], [1, 0.25, 2]]}",
+    "triangle: {vertices: [[0, 0.25, 0], [2, 0.25, 0.5], [0, 0.25, 3]]}",
+    "disc: {center: [1, 0.5, 0.5], normal: [1, 0, 0], radius: 0.75}",
+};
+enum { COINCIDENT = sizeof coincident / sizeof *coincident };
+
+// Of objects that are met at the same distance the first in the list is seen; the distance does not depend on
+// the list's order. Each object alone tells how far it is.
+void verify_coincident_faces(VerifyRun *run)
+{
+    enum { COUNT = 1200 };
+    static TraceRay rays[COUNT];
+    static TraceHit alone[COINCIDENT][COUNT], hits[COUNT];
+    for (uint64_t i = 0; i < COUNT; i++) {
+        Vector3 origin = {0.5, random_at(7, i, 0), random_at(7, i, 1)}, direction = {1, 0, 0};
+        if (i % 2)
+            direction = vector_subtract((Vector3){2 * random_at(7, i, 2), 0, random_at(7, i, 3)}, origin);
+        rays[i] = ray_of(run, origin, direction);
+    }
+    for (size_t k = 0; k < COINCIDENT; k++) {
+        char text[128];
+        snprintf(text, sizeof text, "objects:\n  - %s\n", coincident[k]);
+        Scene scene = verify_scene(text);
+        verify_trace(run, &scene, false, rays, COUNT, alone[k]);
+        scene_free(&scene);
+    }
+    for (size_t order = 0; order < 2 * (size_t)COINCIDENT; order++) {
+        size_t place_of[COINCIDENT];
+        Scene scene = verify_scene("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
+        scene.objects.count = 0;
+        for (size_t k = 0; k < COINCIDENT; k++) {
+            place_of[k] = (order < COINCIDENT ? k + order : COINCIDENT - 1 - k + order) % COINCIDENT;
+            char text[128];
+            snprintf(text, sizeof text, "objects:\n  - %s\n", coincident[place_of[k]]);
+            Scene one = verify_scene(text);
+            array_push(scene.objects, one.objects.items[0]);
+            scene.objects.items[k].material = 0;
+            scene_free(&one);
+        }
+        verify_trace(run, &scene, order % 2, rays, COUNT, hits);
+        scene_free(&scene);
+        for (size_t i = 0; i < COUNT; i++) {
+            uint32_t nearest = UINT32_MAX;
+            double t = INFINITY;
+            for (uint32_t k = 0; k < COINCIDENT; k++) {
+                const TraceHit *hit = &alone[place_of[k]][i];
+                if (!verify_is_hit(hit) || hit->t >= t) continue;
+                nearest = k;
+                t = hit->t;
+            }
+            run->result->differing += hits[i].object != nearest || (nearest != UINT32_MAX && hits[i].t != t);
+        }
+    }
+    for (size_t i = 0; i < COUNT; i += 2)
+        run->result->wrong += alone[0][i].t != 0.5 || alone[1][i].t != 0.5;
+}

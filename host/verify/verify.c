@@ -1,0 +1,401 @@
+#include "host/verify/verify.h"
+#include "host/import/load.h"
+
+#include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/base/text.h"
+#include "host/verify/exact.h"
+#include "host/verify/tables.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { CHECKS_LARGEST = 3, BATCH = 1 << 16 };
+
+// Each has the tables of its name, and its own checks.
+static const struct {
+    const char *name, *title;
+    VerifyCheck *checks[CHECKS_LARGEST];
+} cases[] = {
+    {"S1", "sphere, from 100 to a million radii away", {0}},
+    {"S2", "sphere seen from up to 10,000 radii away", {verify_far_fringe}},
+    {"S3", "tiny sphere", {0}},
+    {"S4", "ground sphere, from a millionth of its radius above", {verify_ground_horizon}},
+    {"S5", "rays an ulp beside a sphere's tangent", {0}},
+    {"S6", "inside a sphere, and leaving it", {verify_scaled_directions, verify_leaving_spheres}},
+    {"P1", "plane up to the horizon", {verify_plane_horizon}},
+    {"P2", "a plane's own shadow", {verify_plane_acne}},
+    {"P3", "disc's rim from far away", {0}},
+    {"P4", "rays in a box's faces", {0}},
+    {"P5", "closed room: edges and corners", {verify_points_on_faces}},
+    {"P6", "plate thinner than an epsilon", {verify_thin_plate}},
+    {"P7", "coincident faces", {verify_coincident_faces}},
+    {"C1", "along a cylinder's axis", {0}},
+    {"C2", "nearly along a cylinder's axis", {0}},
+    {"C3", "wire, ten million times as long as thick", {verify_wire}},
+    {"C4", "seam between a cylinder's side and caps", {0}},
+    {"C5", "cylinder's tangent from far away", {0}},
+    {"C6", "cone's apex", {verify_apex}},
+    {"C7", "along a cone's side, and its other nappe", {0}},
+    {"T1", "torus from a thousand radii away", {verify_far_torus}},
+    {"T2", "torus' hole and inner wall", {0}},
+    {"T3", "in a torus' equatorial plane", {0}},
+    {"T4", "a torus' circle of tangents", {verify_tangent_circle}},
+    {"T5", "thin ring", {verify_thin_ring}},
+    {"T6", "torus that failed in production", {0}},
+    {"M1", "closed mesh: edges and vertices", {0}},
+    {"M2", "closed mesh, far from the origin", {verify_far_mesh}},
+    {"M3", "triangles from 2^-40 to 2^40", {verify_scale_ladder}},
+    {"M4", "slivers, and triangles seen edge-on", {verify_within_triangle, verify_facing_triangle}},
+    {"M5", "degenerate triangles", {verify_degenerate_meshes}},
+    {"M6", "hierarchy against every object; any hit against the closest", {verify_hierarchy}},
+    {"R1", "shadow of a sphere, up to where it stands", {verify_contact_shadow}},
+    {"R2", "a ball in a thin coat of glass", {verify_nested_spheres}},
+    {"R3", "glass of index 1", {verify_matched_glass}},
+    {"R4", "total reflection around the critical angle", {verify_critical_angle}},
+    {"R5", "highlights of powers up to a million", {verify_highlights}},
+    {"R6", "scenes 2^-20 to 2^20 times as large", {verify_scaled_scenes}},
+    {"R7", "mirrored scenes, and exchanged axes", {verify_mirrored_scenes}},
+    {"R8", "degenerate cameras", {verify_camera_frames, verify_degenerate_views}},
+};
+
+bool verify_holds(const VerifyResult *result)
+{
+    return result->wrong + result->leaks + result->unsound + result->off + result->turned +
+               result->differing ==
+           0;
+}
+
+double verify_roundoff(const VerifyRun *run)
+{
+    return verify_is_wide(run) ? 0x1p-53 : 0x1p-24;
+}
+
+double verify_ulp(const VerifyRun *run, double value)
+{
+    int exponent;
+    frexp(value, &exponent);
+    return ldexp(verify_roundoff(run), exponent);
+}
+
+double verify_rounded(const VerifyRun *run, double value)
+{
+    if (verify_is_wide(run)) return value;
+    volatile float narrow = (float)value; // keeps the rounding, as in host/compile/flatten.c
+    return narrow;
+}
+
+void verify_round_ray(const VerifyRun *run, TraceRay *ray)
+{
+    for (size_t axis = 0; axis < 3; axis++) {
+        ray->origin[axis] = verify_rounded(run, ray->origin[axis]);
+        ray->direction[axis] = verify_rounded(run, ray->direction[axis]);
+    }
+    ray->tmin = verify_rounded(run, ray->tmin);
+    ray->tmax = fmin(ray->tmax, verify_is_wide(run) ? DBL_MAX : (double)FLT_MAX);
+}
+
+static bool is_finite(const double vector[3])
+{
+    return isfinite(vector[0]) && isfinite(vector[1]) && isfinite(vector[2]);
+}
+
+static bool is_unit(const VerifyRun *run, const double v[3])
+{
+    return fabs(sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - 1) <= 4 * verify_roundoff(run);
+}
+
+static bool is_sound(const VerifyRun *run, const TraceRay *ray, const TraceHit *hit)
+{
+    if (!verify_is_hit(hit)) return true;
+    if (!isfinite(hit->t) || !(hit->t > ray->tmin) || !(hit->t < ray->tmax)) return false;
+    if (!is_finite(hit->normal) || !is_finite(hit->position)) return false;
+    if (!is_finite(hit->mirrored_origin) || !is_finite(hit->mirrored_direction)) return false;
+    if (!is_finite(hit->passed_origin) || !is_finite(hit->passed_direction)) return false;
+    return run->tier == TIER_A || is_unit(run, hit->normal);
+}
+
+// FNV-1a (Fowler, Noll, Vo) by words of 64 bits, with the upper half folded into the lower.
+static void hash_word(VerifyRun *run, uint64_t word)
+{
+    uint64_t hash = (run->result->hash ^ word) * 0x100000001b3u;
+    run->result->hash = hash ^ hash >> 32;
+}
+
+static void hash_numbers(VerifyRun *run, const double *numbers, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        uint64_t bits;
+        memcpy(&bits, &numbers[i], sizeof bits);
+        hash_word(run, bits);
+    }
+}
+
+static void hash_integers(VerifyRun *run, const uint32_t *integers, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        hash_word(run, integers[i]);
+}
+
+// Of a miss only `light` has a meaning.
+static void hash_hit(VerifyRun *run, const TraceHit *hit)
+{
+    hash_word(run, hit->object);
+    hash_numbers(run, &hit->light, 1);
+    if (!verify_is_hit(hit)) return;
+    hash_numbers(run, &hit->t, 1);
+    hash_numbers(run, hit->normal, 3);
+    hash_numbers(run, hit->position, 3);
+    hash_numbers(run, hit->mirrored_origin, 3);
+    hash_numbers(run, hit->mirrored_direction, 3);
+    hash_numbers(run, hit->passed_origin, 3);
+    hash_numbers(run, hit->passed_direction, 3);
+    hash_numbers(run, &hit->passed, 1);
+}
+
+void verify_trace_opened(VerifyRun *run, void *opened, const TraceRay *rays, size_t count, TraceHit *hits)
+{
+    run->renderer->trace(opened, rays, count, hits);
+    run->result->ray_count += count;
+    for (size_t i = 0; i < count; i++) {
+        run->result->unsound += !is_sound(run, &rays[i], &hits[i]);
+        hash_hit(run, &hits[i]);
+    }
+}
+
+void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const TraceRay *rays, size_t count,
+                  TraceHit *hits)
+{
+    void *opened = run->renderer->open(run->renderer->context, scene, hierarchy);
+    verify_trace_opened(run, opened, rays, count, hits);
+    run->renderer->close(opened);
+}
+
+static bool is_pixel_sound(const VerifyRun *run, const PictureLayers *picture, size_t i)
+{
+    const double *color = &picture->color[3 * i], *normal = &picture->normal[3 * i];
+    if (!is_finite(color) || color[0] < 0 || color[1] < 0 || color[2] < 0) return false;
+    if (!is_finite(&picture->ray[3 * i])) return false;
+    if (picture->object[i] == UINT32_MAX) return isinf(picture->t[i]);
+    if (!(picture->t[i] > 0) || !isfinite(picture->t[i])) return false;
+    if (!is_finite(normal) || !is_finite(&picture->position[3 * i])) return false;
+    return run->tier == TIER_A || is_unit(run, normal);
+}
+
+PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+                            uint32_t height)
+{
+    PictureLayers picture = layers_allocate(width, height, (uint32_t)scene->lights.count);
+    const size_t pixels = layers_pixel_count(&picture);
+    picture.position = memory_allocate(3 * pixels, sizeof *picture.position);
+    picture.ray = memory_allocate(3 * pixels, sizeof *picture.ray);
+    run->renderer->render(run->renderer->context, scene, hierarchy, &picture);
+    run->result->ray_count += pixels;
+    for (size_t i = 0; i < pixels; i++)
+        run->result->unsound += !is_pixel_sound(run, &picture, i);
+    const double *const vectors[] = {picture.color, picture.normal, picture.position, picture.ray};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        hash_numbers(run, vectors[i], 3 * pixels);
+    hash_numbers(run, picture.t, pixels);
+    hash_integers(run, picture.object, pixels);
+    hash_integers(run, picture.shadow, pixels * picture.light_count);
+    hash_integers(run, picture.path, pixels);
+    return picture;
+}
+
+bool verify_same_bits(const TraceHit *a, const TraceHit *b)
+{
+    if (a->object != b->object || !verify_is_hit(a)) return a->object == b->object;
+    return memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0;
+}
+
+void verify_note(VerifyRun *run, double error, double bound, const char *unit)
+{
+    VerifyResult *result = run->result;
+    if (!(error <= bound)) result->wrong++;
+    if (bound == INFINITY) return;
+    double part = bound > 0 ? error / bound : error > 0 ? INFINITY : 0;
+    double worst_part = result->bound > 0 ? result->worst / result->bound : result->worst > 0 ? INFINITY : 0;
+    if (part > worst_part || (result->worst == 0 && bound > result->bound)) {
+        result->worst = error;
+        result->bound = bound;
+        result->unit = unit;
+    }
+}
+
+void verify_note_error(VerifyRun *run, double error, double bound)
+{
+    verify_note(run, error, bound, "ulp");
+}
+
+Scene verify_scene(const char *objects)
+{
+    Text text = {0};
+    text_appendf(&text, "camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n%s", objects);
+    Source source = {"verify", text_c(&text), text.count};
+    MessageList messages = {0};
+    Scene scene = {0};
+    if (!scene_read_yaml(&scene, &source, &messages))
+        fault("a scene of verify cannot be read:\n%s", source.bytes);
+    message_list_free(&messages);
+    text_free(&text);
+    return scene;
+}
+
+Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
+{
+    return (Camera){.position = position,
+                    .look_at = look_at,
+                    .up = {0, 1, 0},
+                    .half_tangent = tan(fov_degrees * (M_PI / 360))};
+}
+
+static void judge(VerifyRun *run, const TraceHit *hit, const Expected *expected)
+{
+    size_t place = verify_is_wide(run) ? 0 : (size_t)run->tier;
+    bool open = expected->open >> place & 1;
+    bool should_hit = expected->object != MISS;
+    if (verify_is_hit(hit) != should_hit) {
+        run->result->wrong += !open;
+        return;
+    }
+    if (!should_hit) return;
+    if (expected->object != ANY_OBJECT && hit->object != expected->object) {
+        run->result->wrong++;
+        return;
+    }
+    double ulp = verify_ulp(run, expected->t);
+    verify_note_error(run, fabs(hit->t - expected->t - expected->rest) / ulp, expected->bounds[place] / ulp);
+}
+
+static void judge_surface(VerifyRun *run, const Scene *scene, const TraceRay *ray, const TraceHit *hit)
+{
+    // in these scenes an object's id is its place in the list
+    if (verify_is_hit(hit)) exact_judge_surface(run, &scene->objects.items[hit->object], ray, hit);
+}
+
+static double nudged(const VerifyRun *run, double value, double toward)
+{
+    return verify_is_wide(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
+}
+
+typedef struct {
+    TraceRay *items;
+    size_t count, capacity;
+} RayList;
+
+// The ray and those beside it. A component of 0 has only subnormal numbers beside it, and stays.
+static void rays_add(RayList *rays, const VerifyRun *run, const PlainRay *plain)
+{
+    TraceRay ray = {.tmin = plain->start, .tmax = INFINITY};
+    memcpy(ray.origin, plain->origin, sizeof ray.origin);
+    memcpy(ray.direction, plain->direction, sizeof ray.direction);
+    verify_round_ray(run, &ray);
+    array_push(*rays, ray);
+    double *const moved[] = {&ray.origin[0], &ray.direction[0]};
+    for (size_t k = 0; k < 2; k++) {
+        double x = *moved[k];
+        if (x == 0) continue;
+        *moved[k] = nudged(run, x, copysign(INFINITY, x));
+        array_push(*rays, ray);
+        *moved[k] = nudged(run, x, 0);
+        array_push(*rays, ray);
+        *moved[k] = x;
+    }
+}
+
+// Rays one by one: hits are exact, and do not depend on the rays' order.
+static void run_rays(VerifyRun *run, const ProbeTable *table, const Scene *scene)
+{
+    RayList rays = {0};
+    for (size_t i = 0; i < table->ray_count; i++)
+        rays_add(&rays, run, &table->rays[i]);
+    size_t width = verify_is_wide(run), count = rays.count;
+    if (count != table->expected_count[width]) fault("case %s has %zu rays", table->name, count);
+    TraceRay *turned = memory_allocate(count, sizeof *turned);
+    for (size_t i = 0; i < count; i++)
+        turned[i] = rays.items[count - 1 - i];
+    TraceHit *hits = memory_allocate(2 * count, sizeof *hits);
+    verify_trace(run, scene, false, rays.items, count, hits);
+    verify_trace(run, scene, true, turned, count, hits + count);
+    for (size_t i = 0; i < count; i++) {
+        judge(run, &hits[i], &table->expected[width][i]);
+        judge_surface(run, scene, &rays.items[i], &hits[i]);
+        run->result->differing += !verify_same_bits(&hits[i], &hits[2 * count - 1 - i]);
+    }
+    free(rays.items);
+    free(turned);
+    free(hits);
+}
+
+static void run_family(VerifyRun *run, const ProbeTable *table, const Scene *scene)
+{
+    size_t width = verify_is_wide(run);
+    TraceRay *rays = memory_allocate(BATCH, sizeof *rays);
+    TraceHit *hits = memory_allocate(BATCH, sizeof *hits);
+    void *opened = run->renderer->open(run->renderer->context, scene, table->scene_make != NULL);
+    for (size_t first = 0; first < table->ray_count; first += BATCH) {
+        size_t count = table->ray_count - first < BATCH ? table->ray_count - first : BATCH;
+        for (size_t i = 0; i < count; i++) {
+            rays[i] = table->family(first + i);
+            verify_round_ray(run, &rays[i]);
+        }
+        verify_trace_opened(run, opened, rays, count, hits);
+        for (size_t i = 0; i < count; i++) {
+            run->result->leaks += table->closed && !verify_is_hit(&hits[i]);
+            if (first + i < table->expected_count[width])
+                judge(run, &hits[i], &table->expected[width][first + i]);
+            judge_surface(run, scene, &rays[i], &hits[i]);
+        }
+    }
+    run->renderer->close(opened);
+    free(rays);
+    free(hits);
+}
+
+static void run_table(VerifyRun *run, const ProbeTable *table)
+{
+    Scene scene;
+    if (table->scene_make) {
+        scene = scene_empty();
+        table->scene_make(&scene);
+    } else {
+        scene = verify_scene(table->scene);
+    }
+    if (table->rays)
+        run_rays(run, table, &scene);
+    else
+        run_family(run, table, &scene);
+    scene_free(&scene);
+}
+
+bool verify_is_case(const char *name)
+{
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        if (strcmp(cases[i].name, name) == 0) return true;
+    return false;
+}
+
+static bool is_chosen(const VerifyChoice *choice, const char *name)
+{
+    for (size_t i = 0; choice && i < choice->count; i++)
+        if (strcmp(choice->names[i], name) == 0) return true;
+    return !choice;
+}
+
+void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
+                void *context)
+{
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        if (!is_chosen(choice, cases[i].name)) continue;
+        VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
+        VerifyRun run = {renderer, tier, &result};
+        for (size_t k = 0; k < probe_table_count; k++)
+            if (strcmp(probe_tables[k].name, result.name) == 0) run_table(&run, &probe_tables[k]);
+        for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
+            cases[i].checks[k](&run);
+        sink(context, &result);
+    }
+}

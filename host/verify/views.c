@@ -1,0 +1,118 @@
+// Pictures by cameras whose numbers are extreme or say too little.
+#include "host/verify/exact.h"
+#include <math.h>
+#include <stdlib.h>
+
+enum { SIDE = 65 };
+
+static Scene tiled_scene(Vector3 place)
+{
+    Scene scene =
+        verify_scene("ambient: [1, 1, 1]\nbackground: [0.2, 0.3, 0.4]\n"
+                     "lights:\n  - directional: {direction: [0.3, -1, 0.2]}\n"
+                     "materials:\n"
+                     "  tiles: {checker: {colors: [[1, 1, 1], [0.5, 0.5, 0.5]], size: 1}, diffuse: 0}\n"
+                     "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: tiles}\n"
+                     "  - sphere: {center: [0, 0, 0], radius: 0.5}\n");
+    scene.objects.items[0].as.plane.point = place;
+    scene.objects.items[1].as.sphere.center = place;
+    return scene;
+}
+
+static PictureLayers view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Vector3 up, double fov)
+{
+    Scene scene = tiled_scene(place);
+    scene.camera = verify_camera(eye, look_at, fov);
+    scene.camera.up = up;
+    PictureLayers picture = verify_render(run, &scene, false, SIDE, SIDE);
+    scene_free(&scene);
+    return picture;
+}
+
+static void compare(VerifyRun *run, const PictureLayers *a, const PictureLayers *b)
+{
+    for (size_t i = 0; i < layers_pixel_count(a); i++) {
+        run->result->differing += a->object[i] != b->object[i] || a->t[i] != b->t[i];
+        run->result->differing += vector_length(vector_subtract(verify_vector(&a->color[3 * i]),
+                                                                verify_vector(&b->color[3 * i]))) != 0;
+    }
+}
+
+// Where `up` says nothing the world axis least aligned with the view stands in for it.
+static void judge_views_without_up(VerifyRun *run)
+{
+    static const struct {
+        Vector3 eye, look_at, axis;
+    } views[] = {{{0.3, 5, 0.4}, {0.3, 0, 0.4}, {1, 0, 0}}, {{2, 4, 6}, {0, 0, 0}, {1, 0, 0}}};
+    const Vector3 here = {0, 0, 0};
+    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+        Vector3 toward = vector_subtract(views[k].look_at, views[k].eye);
+        PictureLayers expected = view(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
+        const Vector3 ups[] = {toward, vector_scale(toward, -0.5), {0, 0, 0}};
+        for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
+            PictureLayers picture = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
+            compare(run, &picture, &expected);
+            layers_free(&picture);
+        }
+        if (k == 0) {
+            // nearly along the view is not along it
+            PictureLayers picture =
+                view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
+            compare(run, &picture, &expected);
+            layers_free(&picture);
+        }
+        layers_free(&expected);
+    }
+}
+
+// Straight down on the tiles: each pixel has the color of the tile that it sees.
+static void judge_tiles(VerifyRun *run)
+{
+    const Vector3 here = {0, 0, 0}, eye = {0.3, 5, 0.4}, below = {0.3, 0, 0.4}, up = {0, 1, 0};
+    PictureLayers picture = view(run, here, eye, below, up, 60);
+    size_t counts[2] = {0};
+    for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        if (picture.object[i] != 0) continue;
+        const double *d = picture.ray + 3 * i;
+        double x = eye.x - eye.y * d[0] / d[1], z = eye.z - eye.y * d[2] / d[1];
+        if (fmin(fabs(x - round(x)), fabs(z - round(z))) < 1e-5) continue;
+        bool even = fmod(floor(x) + floor(z), 2) == 0, white = picture.color[3 * i] > 0.75;
+        // which of the colors comes first is the plane's own affair
+        counts[white == even]++;
+    }
+    run->result->wrong += counts[0] < counts[1] ? counts[0] : counts[1];
+    run->result->wrong += counts[0] + counts[1] == 0;
+    layers_free(&picture);
+}
+
+// From nearly no field of view to nearly all there is, far from the origin, and a single pixel.
+static void judge_extremes(VerifyRun *run)
+{
+    const Vector3 here = {0, 0, 0}, far = {1e7, -1e7, 2e7}, up = {0, 1, 0}, eye = {2, 4, 6};
+    static const double fovs[] = {1e-3, 179.9};
+    const size_t middle = (SIDE * SIDE - 1) / 2;
+    for (size_t i = 0; i < sizeof fovs / sizeof *fovs; i++) {
+        PictureLayers picture = view(run, here, eye, here, up, fovs[i]);
+        run->result->wrong += picture.object[middle] != 1 || !(picture.color[3 * middle] > 0);
+        layers_free(&picture);
+    }
+    PictureLayers near = view(run, here, eye, here, up, 40);
+    PictureLayers away = view(run, far, vector_add(far, eye), far, up, 40);
+    for (size_t i = 0; i < layers_pixel_count(&near); i++)
+        run->result->differing += near.object[i] != away.object[i] || near.t[i] != away.t[i];
+    layers_free(&near);
+    layers_free(&away);
+    Scene scene = tiled_scene(here);
+    scene.camera = verify_camera(eye, here, 40);
+    PictureLayers one = verify_render(run, &scene, true, 1, 1);
+    run->result->wrong += one.object[0] != 1 || !(one.color[0] > 0);
+    layers_free(&one);
+    scene_free(&scene);
+}
+
+void verify_degenerate_views(VerifyRun *run)
+{
+    judge_views_without_up(run);
+    judge_tiles(run);
+    judge_extremes(run);
+}

@@ -1,0 +1,255 @@
+// Arithmetic whose error is known: correct division and square root, products without cancellation, pairs of
+// reals that carry twice the precision, and the few functions shading needs.
+//
+// Nothing here may be contracted or reassociated; fma is written where it is meant.
+#ifndef NUMERICS_H
+#define NUMERICS_H
+
+#include "numerics/perturb.h"
+
+// Whether intersections use the compensated forms.
+#define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
+
+// Where a device's own quotients and roots are inexact (REPAIRS_DIVIDE, at `strict`, in floats) they are
+// taken of the operands' mantissas alone, so that nothing on the way is too large or too small, brought
+// within an ulp by a Newton step, and then chosen among three neighbors by comparisons that are exact. A
+// Newton step cannot choose: of 1 - 2^-24 the root lies 2^-27 ulp from the middle between two floats.
+#define EXPONENT_BITS ((integer)(0x7f800000))
+#define SIGN_BIT      ((integer)(~0x7fffffff))
+#define BITS_OF_ONE   ((integer)(0x3f800000))
+
+static inline mask real_is_normal(real a)
+{
+    return (fabs(a) >= (real)(0x1p-126f)) & (fabs(a) <= (real)(LARGEST));
+}
+
+static inline real real_power_of_two(integer exponent)
+{
+    return real_from_bits(BITS_OF_ONE + (exponent << 23));
+}
+
+// The neighbors of a > 0.
+static inline real real_above(real a)
+{
+    return real_from_bits(bits_from_real(a) + (integer)(1));
+}
+
+static inline real real_below(real a)
+{
+    return real_from_bits(bits_from_real(a) - (integer)(1));
+}
+
+// Of a quotient within an ulp the remainder is exact, and so is its comparison with half the way to a
+// neighbor.
+static inline real repaired_quotient(real a, real b)
+{
+    integer a_bits = bits_from_real(a), b_bits = bits_from_real(b);
+    a = real_from_bits((a_bits & MANTISSA) | BITS_OF_ONE);
+    b = real_from_bits((b_bits & MANTISSA) | BITS_OF_ONE);
+    real quotient = device_divide(a, b);
+    quotient = fma(fma(-quotient, b, a), device_divide((real)(1), b), quotient);
+    real remainder_ = fma(-quotient, b, a), half_b = (real)(0.5f) * b;
+    real up = real_above(quotient), down = real_below(quotient);
+    mask rises = remainder_ > (up - quotient) * half_b, falls = remainder_ < (down - quotient) * half_b;
+    quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
+    quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & SIGN_BIT));
+    // in two factors: one may be beyond the largest real where the product is not
+    integer exponent = ((a_bits & EXPONENT_BITS) >> 23) - ((b_bits & EXPONENT_BITS) >> 23);
+    integer half_exponent = exponent >> 1;
+    return quotient * real_power_of_two(half_exponent) * real_power_of_two(exponent - half_exponent);
+}
+
+// By Tuckerman's test: root (root - ulp) < a <= root (root + ulp) (Agarwal, Cooley, Gustavson, Shearer,
+// Slishman, Tuckerman, New scalar and vector elementary functions for the IBM System/370, IBM Journal of
+// Research and Development 30(2), 1986).
+static inline real repaired_root(real a)
+{
+    integer half_exponent = (bits_from_real(a) - BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
+    a = real_from_bits(bits_from_real(a) - (half_exponent << 24));
+    real root = device_sqrt(a);
+    root = fma(fma(-root, root, a), device_divide((real)(0.5f), root), root);
+    real up = real_above(root), down = real_below(root);
+    mask rises = fma(-root, up, a) > (real)(0), falls = fma(-root, down, a) <= (real)(0);
+    return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
+}
+
+// Correctly rounded at `strict` on every device, but for numbers below the smallest normal one.
+static inline real real_divide(real a, real b)
+{
+    real quotient = device_divide(a, b);
+    if (!REPAIRS_DIVIDE) return quotient;
+    mask ordinary = real_is_normal(a) & real_is_normal(b) & real_is_normal(quotient);
+    return lanes_select(ordinary, repaired_quotient(a, b), quotient);
+}
+
+// Correctly rounded at `strict`, likewise; 0 for 0. The argument is never negative.
+static inline real real_sqrt(real a)
+{
+    real root = device_sqrt(a);
+    if (!REPAIRS_DIVIDE) return root;
+    return lanes_select(real_is_normal(a), repaired_root(a), root);
+}
+
+// One over the power of two at or below a > 0; huge for 0.
+static inline real real_inverse_power(real a)
+{
+#if IS_DOUBLE
+    return real_from_bits((integer)(0x7fe0000000000000L) -
+                          (bits_from_real(a) & (integer)(0x7ff0000000000000L)));
+#else
+    return real_from_bits((integer)(0x7f000000) - (bits_from_real(a) & (integer)(0x7f800000)));
+#endif
+}
+
+// a b - c d to 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of Kahan's
+// algorithm for the accurate computation of 2x2 determinants, Math. Comp. 82, 2013).
+static inline real product_difference(real a, real b, real c, real d)
+{
+    real cd = c * d;
+    real rest = fma(-c, d, cd);
+    return fma(a, b, -cd) + rest;
+}
+
+// Sums and products of pairs follow Joldes, Muller, Popescu, Tight and rigorous error bounds for basic
+// building blocks of double-word arithmetic, ACM TOMS 44(2), 2017: the sum is algorithm 6, the product
+// algorithm 11, with error bounds of 3 u^2 and 5 u^2.
+static inline Pair pair_of(real value)
+{
+    return (Pair){value, (real)(0)};
+}
+
+static inline Pair pair_fast_sum(real large, real small_)
+{
+    real sum = large + small_;
+    return (Pair){sum, small_ - (sum - large)};
+}
+
+static inline Pair pair_negate(Pair a)
+{
+    return (Pair){-a.high, -a.low};
+}
+
+static inline Pair pair_add(Pair a, Pair b)
+{
+    Pair high = pair_sum(a.high, b.high);
+    Pair low = pair_sum(a.low, b.low);
+    Pair sum = pair_fast_sum(high.high, high.low + low.high);
+    return pair_fast_sum(sum.high, low.low + sum.low);
+}
+
+static inline Pair pair_subtract(Pair a, Pair b)
+{
+    return pair_add(a, pair_negate(b));
+}
+
+static inline Pair pair_multiply(Pair a, Pair b)
+{
+    Pair product = pair_product(a.high, b.high);
+    return pair_fast_sum(product.high, product.low + fma(a.high, b.low, a.low * b.high));
+}
+
+static inline Pair pair_scale(Pair a, real factor)
+{
+    Pair product = pair_product(a.high, factor);
+    return pair_fast_sum(product.high, fma(a.low, factor, product.low));
+}
+
+// a b - c d in pairs.
+static inline Pair pair_product_difference(Pair a, Pair b, Pair c, Pair d)
+{
+    return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
+}
+
+// ln(1 - s) for 0 <= s < 1: -2 artanh(s / (2 - s)) after the power of two is taken out, by its Taylor series
+// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). For small s no bit of s is lost, which is
+// the point of it: 1 - s itself would lose them.
+static inline real real_log_complement(real s)
+{
+    real rest = (real)(1) - s;
+    // rest = 2^exponent m with m in [0.7, 1.4]; s <= 0.29 keeps exponent 0 and s itself
+#if IS_DOUBLE
+    integer exponent = (bits_from_real(rest) - (integer)(0x3fe6a09e667f3bcdL)) >> 52;
+    real m = real_from_bits(bits_from_real(rest) - (exponent << 52));
+#else
+    integer exponent = (bits_from_real(rest) - (integer)(0x3f3504f3)) >> 23;
+    real m = real_from_bits(bits_from_real(rest) - (exponent << 23));
+#endif
+    real f = lanes_select(exponent == (integer)(0), -s, m - (real)(1));
+    real z = real_divide(f, (real)(2) + f);
+    real zz = z * z;
+    real series = (real)(0);
+#if IS_DOUBLE
+    for (scalar n = 23; n >= 3; n -= 2)
+        series = fma(series, zz, (real)(1.0 / n));
+    const real ln2_high = (real)(0x1.62e42fefa39efp-1), ln2_low = (real)(0x1.abc9e3b39803fp-56);
+#else
+    series = fma(zz, (real)(1.0f / 9), (real)(1.0f / 7));
+    series = fma(series, zz, (real)(1.0f / 5));
+    series = fma(series, zz, (real)(1.0f / 3));
+    const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
+#endif
+    real two_z = z + z;
+    real log_m = fma(two_z * zz, series, two_z);
+    real k = real_from_integer(exponent);
+    return fma(k, ln2_high, fma(k, ln2_low, log_m));
+}
+
+// Below this real_exp_negative is 0.
+#if IS_DOUBLE
+#define EXP_LOWEST (-708.0)
+#else
+#define EXP_LOWEST (-87.0f)
+#endif
+
+// e^x for x <= 0: 2^k times the Taylor series of the rest, |rest| <= ln(2)/2 (Abramowitz, Stegun, 4.2.1). 0
+// where the result would be subnormal.
+static inline real real_exp_negative(real x)
+{
+#if IS_DOUBLE
+    const real lowest = (real)(EXP_LOWEST), log2_e = (real)(0x1.71547652b82fep0);
+    const real ln2_high = (real)(0x1.62e42fefa39efp-1), ln2_low = (real)(0x1.abc9e3b39803fp-56);
+#else
+    const real lowest = (real)(EXP_LOWEST), log2_e = (real)(0x1.715476p0f);
+    const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
+#endif
+    real within = real_max(x, lowest);
+    real k = floor(fma(within, log2_e, (real)(0.5f)));
+    real r = fma(-k, ln2_low, fma(-k, ln2_high, within));
+    real series;
+#if IS_DOUBLE
+    series = (real)(1);
+    for (scalar n = 13; n >= 1; n -= 1)
+        series = fma(series, r * (real)(1 / n), (real)(1));
+    real power = real_from_bits((integer_from_real(k) + (integer)(1023)) << 52);
+#else
+    series = fma(r, (real)(1.0f / 5040), (real)(1.0f / 720));
+    series = fma(series, r, (real)(1.0f / 120));
+    series = fma(series, r, (real)(1.0f / 24));
+    series = fma(series, r, (real)(1.0f / 6));
+    series = fma(series, r, (real)(0.5f));
+    series = fma(series, r, (real)(1));
+    series = fma(series, r, (real)(1));
+    real power = real_from_bits((integer_from_real(k) + (integer)(127)) << 23);
+#endif
+    return lanes_select(x < lowest, (real)(0), series * power);
+}
+
+// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1. `fast` takes the device's own functions, as inaccurate as it
+// likes.
+static inline real real_complement_power(real s, real n)
+{
+#if IS_FAST
+    real power = device_exp2(n * device_log2((real)(1) - s));
+#else
+    real power = perturbed_power(real_exp_negative(n * real_log_complement(s)), s, n);
+#endif
+    return real_min(power, (real)(1));
+}
+
+// Where (1 - s)^n, which is at most e^(-n s), may be more than 0.
+static inline mask real_complement_power_counts(real s, real n)
+{
+    return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));
+}
+
+#endif

@@ -1,0 +1,102 @@
+// The operations that devices may give different results for, and errors to stand in for those devices:
+// divide, square root and the native functions are called here alone. With PERTURB each result is moved by
+// as much as the OpenCL C specification lets it be wrong (3.0, Relative Error as ULPs), times PERTURB_SCALE.
+//
+// The error is a hash of PERTURB_SEED, the operation and its operands, no more: what a device computes twice
+// it computes alike, whatever the work-item. Of the operands of divide and root it takes the mantissas, since
+// devices start from tables of these: operands' signs and powers of two change the result's alone.
+#ifndef PERTURB_H
+#define PERTURB_H
+
+#include "numerics/pair.h"
+
+#if IS_DOUBLE
+#define MANTISSA        ((integer)(0xfffffffffffffL))
+#define HALF_WORD       32
+#define HASH_MULTIPLIER ((natural)(0x9e3779b97f4a7c15UL))
+#else
+#define MANTISSA        ((integer)(0x7fffff))
+#define HALF_WORD       16
+#define HASH_MULTIPLIER ((natural)(0x9e3779b1U))
+#endif
+
+enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTURBED_LOG2, PERTURBED_COUNT };
+
+// In ulp. The device's own rounding comes on top.
+enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16, NATIVE_ERROR = 8192 };
+
+static inline natural perturb_hash(uint operation, integer a, integer b)
+{
+    natural hash = (natural)(PERTURB_SEED * PERTURBED_COUNT + operation) * HASH_MULTIPLIER;
+    hash = (hash ^ (hash >> HALF_WORD) ^ natural_from_integer(a)) * HASH_MULTIPLIER;
+    hash = (hash ^ (hash >> HALF_WORD) ^ natural_from_integer(b)) * HASH_MULTIPLIER;
+    return (hash ^ (hash >> HALF_WORD)) * HASH_MULTIPLIER;
+}
+
+// From -largest to largest.
+static inline integer perturb_steps(natural hash, uint largest)
+{
+    return integer_from_natural(mul_hi(hash, (natural)(2 * largest + 1))) -
+           (integer)((scalar_integer)largest);
+}
+
+// The real so many ulp away. 0, and what is nearly too small or too large for a real, stays.
+static inline real perturb(real value, natural hash, uint largest)
+{
+    integer steps = perturb_steps(hash, largest * PERTURB_SCALE);
+    mask ordinary = (fabs(value) > (real)(SMALLEST_RATIO)) & (fabs(value) < (real)(1 / SMALLEST_RATIO));
+    return lanes_select(ordinary, real_from_bits(bits_from_real(value) + steps), value);
+}
+
+// -cl-fast-relaxed-math promises nothing where an operand is beyond 2^-62 .. 2^62, but for reciprocals.
+static inline real device_divide(real a, real b)
+{
+    real quotient = a / b;
+    if (!PERTURB || IS_DOUBLE) return quotient;
+    natural hash = perturb_hash(PERTURBED_DIVIDE, bits_from_real(a) & MANTISSA, bits_from_real(b) & MANTISSA);
+    real moved = perturb(quotient, hash, DIVIDE_ERROR);
+    if (!IS_FAST) return moved;
+    mask promised = (fabs(a) > (real)(0x1p-62f)) & (fabs(a) < (real)(0x1p62f)) &
+                    (fabs(b) > (real)(0x1p-62f)) & (fabs(b) < (real)(0x1p62f));
+    return lanes_select(promised | (fabs(a) == (real)(1)), moved, perturb(quotient, hash, NATIVE_ERROR));
+}
+
+static inline real device_sqrt(real a)
+{
+    real root = sqrt(a);
+    if (!PERTURB || IS_DOUBLE) return root;
+    // the exponent's lowest bit with the mantissa
+    integer operand = bits_from_real(a) & (MANTISSA + MANTISSA + (integer)(1));
+    return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
+}
+
+// base^exponent, which the kernels work out themselves where they are not `fast`, moved as a device's own
+// power could be: what a picture may differ by where a device's functions stood in. Not at `strict`, whose
+// bits are promised.
+static inline real perturbed_power(real power, real base, real exponent)
+{
+    if (!PERTURB || IS_STRICT) return power;
+    return perturb(power, perturb_hash(PERTURBED_POWER, bits_from_real(base), bits_from_real(exponent)),
+                   POWER_ERROR);
+}
+
+#if IS_FAST
+static inline real device_exp2(real a)
+{
+    real power = native_exp2(a);
+    if (!PERTURB) return power;
+    return perturb(power, perturb_hash(PERTURBED_EXP2, bits_from_real(a), (integer)(0)), NATIVE_ERROR);
+}
+
+// Near 1, where the logarithm vanishes, off by 2^-21 as well, like log under -cl-fast-relaxed-math.
+static inline real device_log2(real a)
+{
+    real logarithm = native_log2(a);
+    if (!PERTURB) return logarithm;
+    natural hash = perturb_hash(PERTURBED_LOG2, bits_from_real(a), (integer)(0));
+    real steps = real_from_integer(perturb_steps(hash, NATIVE_ERROR * PERTURB_SCALE));
+    return fma(steps, (real)(0x1p-21f / NATIVE_ERROR), perturb(logarithm, hash, NATIVE_ERROR));
+}
+#endif
+
+#endif

@@ -1,0 +1,32 @@
+// Roots of a t^2 + 2 b t + c = 0 where the discriminant d = b^2 - a c is known by a better formula.
+#ifndef QUADRATIC_H
+#define QUADRATIC_H
+
+#include "traversal/ray.h"
+
+typedef struct {
+    real near, far; // near <= far
+} Roots;
+
+// For a = ray->squared, the first root beyond the ray's start, or the far one if only that counts. Without
+// cancellation: q = -(b + sign(b) sqrt d), roots c / q and q / a (Press et al., Numerical Recipes, 5.6; here
+// with half of b); d < 0 counts as 0. From outside the first is c / q, and q / a is left out where no lane
+// asks.
+static inline real quadratic_first_root(const Ray *ray, real b, real c, real d, bool only_far)
+{
+    real root = real_sqrt(real_max(d, (real)(0)));
+    mask ahead = b < (real)(0);
+    real q = lanes_select(ahead, root - b, -(root + b));
+    mask zero = q == (real)(0); // b = d = 0: both roots are 0
+    real t = lanes_select(zero, (real)(0), real_divide(c, lanes_select(zero, (real)(1), q)));
+    // ahead c / q is the nearer root, else the farther one
+    mask other = lanes_select(ahead, !(t > ray->near), ray->near < (real)(0));
+    if (only_far) other = ahead;
+    if (lanes_any(other)) {
+        real q_over_a = IS_COMPENSATED ? real_divide(q, ray->squared) : q * ray->inverse_squared;
+        t = lanes_select(other & (ahead | (q_over_a > ray->near)), q_over_a, t);
+    }
+    return t;
+}
+
+#endif

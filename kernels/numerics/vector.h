@@ -1,0 +1,160 @@
+// Vectors with one value per lane. dot and cross are written out: the built-in ones may be off by any
+// relative error (The OpenCL C Specification 3.0, Relative Error as ULPs).
+#ifndef VECTOR_H
+#define VECTOR_H
+
+#include "numerics/numerics.h"
+
+typedef struct {
+    real x, y, z;
+} Vector;
+
+static inline Vector vector_of(scalar4 v)
+{
+    return (Vector){(real)(v.x), (real)(v.y), (real)(v.z)};
+}
+
+static inline Vector vector_add(Vector a, Vector b)
+{
+    return (Vector){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+static inline Vector vector_subtract(Vector a, Vector b)
+{
+    return (Vector){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+static inline Vector vector_scale(Vector a, real factor)
+{
+    return (Vector){a.x * factor, a.y * factor, a.z * factor};
+}
+
+// a + b factor
+static inline Vector vector_fma(Vector b, real factor, Vector a)
+{
+    return (Vector){fma(b.x, factor, a.x), fma(b.y, factor, a.y), fma(b.z, factor, a.z)};
+}
+
+static inline Vector vector_negate(Vector a)
+{
+    return (Vector){-a.x, -a.y, -a.z};
+}
+
+static inline Vector vector_select(mask condition, Vector yes, Vector no)
+{
+    return (Vector){lanes_select(condition, yes.x, no.x), lanes_select(condition, yes.y, no.y),
+                    lanes_select(condition, yes.z, no.z)};
+}
+
+static inline real vector_dot(Vector a, Vector b)
+{
+    return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
+}
+
+// The dot product as if in twice the precision (Ogita, Rump, Oishi, Accurate sum and dot product, SIAM J.
+// Sci. Comput. 26(6), 2005, algorithm 5.3).
+static inline real vector_dot_exactly(Vector a, Vector b)
+{
+    Pair x = pair_product(a.x, b.x), y = pair_product(a.y, b.y), z = pair_product(a.z, b.z);
+    Pair two = pair_sum(x.high, y.high), three = pair_sum(two.high, z.high);
+    return three.high + (((x.low + y.low) + z.low) + (two.low + three.low));
+}
+
+// Each component to 1.5 ulp.
+static inline Vector vector_cross(Vector a, Vector b)
+{
+    return (Vector){product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),
+                    product_difference(a.x, b.y, a.y, b.x)};
+}
+
+static inline real vector_length(Vector a)
+{
+    return real_sqrt(vector_dot(a, a));
+}
+
+// Unit to 2.5 u. The zero vector stays zero.
+static inline Vector vector_normalize(Vector a)
+{
+    real length_ = vector_length(a);
+    mask zero = length_ == (real)(0);
+    return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), length_)));
+}
+
+// The same for what is unit but for some rounding, e: by Newton's step, whose error is e^2.
+static inline Vector vector_renormalize(Vector a)
+{
+    if (IS_COMPENSATED) return vector_normalize(a);
+    return vector_scale(a, fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
+}
+
+// |x| + |y| + |z|: what error bounds are proportional to.
+static inline real vector_magnitude(Vector a)
+{
+    return fabs(a.x) + fabs(a.y) + fabs(a.z);
+}
+
+// What of it counts along a unit vector: how far errors in proportion to coordinates may put a point off a
+// surface of that normal. Those along the surface leave it there.
+static inline real vector_magnitude_along(Vector unit, Vector a)
+{
+    return fma(fabs(unit.x), fabs(a.x), fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
+}
+
+// Vectors of pairs, for the compensated forms.
+typedef struct {
+    Pair x, y, z;
+} PairVector;
+
+static inline PairVector pair_vector_difference(Vector a, Vector b)
+{
+    return (PairVector){pair_sum(a.x, -b.x), pair_sum(a.y, -b.y), pair_sum(a.z, -b.z)};
+}
+
+static inline PairVector pair_vector_of(Vector a)
+{
+    return (PairVector){pair_of(a.x), pair_of(a.y), pair_of(a.z)};
+}
+
+static inline Pair pair_vector_dot(PairVector a, PairVector b)
+{
+    return pair_add(pair_add(pair_multiply(a.x, b.x), pair_multiply(a.y, b.y)), pair_multiply(a.z, b.z));
+}
+
+static inline Pair pair_vector_dot_vector(PairVector a, Vector b)
+{
+    return pair_add(pair_add(pair_scale(a.x, b.x), pair_scale(a.y, b.y)), pair_scale(a.z, b.z));
+}
+
+// a x b
+static inline PairVector pair_vector_cross(PairVector a, Vector b)
+{
+    return (PairVector){pair_subtract(pair_scale(a.y, b.z), pair_scale(a.z, b.y)),
+                        pair_subtract(pair_scale(a.z, b.x), pair_scale(a.x, b.z)),
+                        pair_subtract(pair_scale(a.x, b.y), pair_scale(a.y, b.x))};
+}
+
+static inline Vector pair_vector_high(PairVector a)
+{
+    return (Vector){a.x.high, a.y.high, a.z.high};
+}
+
+// a . b rounded about once, in a third of the operations of pairs: vector_dot_exactly of the high parts, with
+// the low parts' product beside the errors it adds up.
+static inline real pair_vector_dot_once(PairVector a, Vector b)
+{
+    Pair x = pair_product(a.x.high, b.x), y = pair_product(a.y.high, b.y), z = pair_product(a.z.high, b.z);
+    Pair two = pair_sum(x.high, y.high), three = pair_sum(two.high, z.high);
+    real low = fma(a.x.low, b.x, fma(a.y.low, b.y, a.z.low * b.z));
+    return three.high + ((((x.low + y.low) + z.low) + (two.low + three.low)) + low);
+}
+
+// a x b, each component to 2 ulp.
+static inline Vector pair_vector_cross_once(PairVector a, Vector b)
+{
+    Vector high = vector_cross(pair_vector_high(a), b);
+    return (Vector){high.x + fma(a.y.low, b.z, -(a.z.low * b.y)),
+                    high.y + fma(a.z.low, b.x, -(a.x.low * b.z)),
+                    high.z + fma(a.x.low, b.y, -(a.y.low * b.x))};
+}
+
+#endif

@@ -1,0 +1,85 @@
+// A ray's whole way through the scene, over mirrors and through glass, and the color it brings back.
+// SIGNS_PATHS, defined as 0 or 1 before this file is included, says whether the way itself is asked for.
+#ifndef PATH_H
+#define PATH_H
+
+#include "shading/bounce.h"
+#include "shading/phong.h"
+
+// What a surface shows by itself: ambient light and each light that reaches it.
+static inline Color3 surface_color(const Scene *scene, const Surface *surface)
+{
+    Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
+    Color3 color = color_multiply(ambient, surface->color);
+    for (uint i = 0; i < scene->header->picture.w; i++) {
+        mask shadowed;
+        color = vector_add(color, phong_light(scene, surface, i, &shadowed));
+    }
+    return color;
+}
+
+// Takes up what a ray met and which rays came of it.
+static inline natural path_sign(natural path, const Ray *ray, const Hit *hit, mask mirrored, mask passed,
+                                mask total)
+{
+    const integer none = (integer)(0);
+    integer events = lanes_select(mirrored, (integer)(PATH_REFLECTED), none) |
+                     lanes_select(passed, (integer)(PATH_REFRACTED), none) |
+                     lanes_select(mirrored & total, (integer)(PATH_TOTAL_REFLECTION), none);
+    natural word = natural_from_integer((hit->object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
+    natural longer = ((path ^ word) * (natural)(PATH_FACTOR)) & (natural)(0xffffffffu);
+    return lanes_select(ray->active, longer, path);
+}
+
+// Follows a ray and all that it becomes: at each surface the mirrored ray first, with all that comes of it,
+// then the one that passes. Where SIGNS_PATHS, *path is the signature (types.h) of the way taken, which in a
+// lane does not depend on the others, and the color is without meaning.
+static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
+{
+    *path = (natural)(PATH_START);
+    const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
+    Color3 background = vector_of(scene->header->background);
+    Color3 color = black, weight = white;
+    Bounce waiting[HAS_TRANSMISSION ? BOUNCES_LARGEST : 1];
+    uint waiting_count = 0, depth = 0;
+    for (;;) {
+        Hit hit = closest_hit(scene, &ray);
+        Surface surface;
+        surface.found = hit_found(&hit);
+        if (depth == 0) rays_count(scene, RAYS_CAMERA_HITS, surface.found);
+        Color3 seen = background;
+        bool any_found = lanes_any(surface.found);
+        if (any_found) {
+            surface = surface_seen(scene, &ray, &hit);
+            if (!SIGNS_PATHS) seen = vector_select(surface.found, surface_color(scene, &surface), background);
+        }
+        if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
+            if (SIGNS_PATHS) *path = path_sign(*path, &ray, &hit, mask_none(), mask_none(), mask_none());
+            return seen;
+        }
+        color = color_add_weighted(color, weight, vector_select(ray.active, seen, black));
+
+        Bounce next = {ray.origin, ray.direction, black, depth + 1, ray.travelled}, other = next;
+        mask total = mask_none();
+        if (any_found && depth < scene->header->bounces.x)
+            total = surface_bounce(&surface, vector_renormalize(ray.direction), weight, false, &next, &other);
+        if (SIGNS_PATHS)
+            *path = path_sign(*path, &ray, &hit, bounce_counts(&next), bounce_counts(&other), total);
+        rays_count(scene, RAYS_REFLECTED, bounce_counts(&next));
+        rays_count(scene, RAYS_REFRACTED, bounce_counts(&other));
+        if (!lanes_any(bounce_counts(&next))) {
+            next = other;
+        } else if (HAS_TRANSMISSION && lanes_any(bounce_counts(&other))) {
+            waiting[waiting_count++] = other;
+        }
+        if (!lanes_any(bounce_counts(&next))) {
+            if (waiting_count == 0) return color;
+            next = waiting[--waiting_count];
+        }
+        ray = bounce_ray(&next);
+        weight = next.weight;
+        depth = next.depth;
+    }
+}
+
+#endif

@@ -1,0 +1,96 @@
+// Lights and Phong's reflection (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
+#ifndef PHONG_H
+#define PHONG_H
+
+#include "shading/surface.h"
+
+typedef struct {
+    Vector direction; // from the surface to the light, unit
+    real strength;    // 0..1: a spot's edge
+    Ray shadow_ray;   // meets what stands between; its end is the light
+} LightRay;
+
+// 1 in a spot's full cone, 0 outside it, smooth between. The angle is measured as s = 1 - cos = |l - axis|^2
+// / 2, which keeps its bits for narrow cones where the cosine itself has none left.
+static inline real spot_strength(const Light *light, Vector from_light)
+{
+    Vector difference = vector_subtract(from_light, vector_of(light->direction));
+    real s = (real)(0.5f) * vector_dot(difference, difference);
+    real x = ((real)(light->cone.x) - s) * (real)(light->cone.z);
+    x = real_min(real_max(x, (real)(0)), (real)(1));
+    real soft = x * x * fma((real)(-2), x, (real)(3));
+    real hard = lanes_select(s <= (real)(light->cone.x), (real)(1), (real)(0));
+    return light->cone.z == 0 ? hard : soft;
+}
+
+// The ray to a light at a place runs from 0 to 1, unnormalized, and ends a rounding before the light.
+static inline LightRay light_ray(const Light *light, const Surface *surface)
+{
+    LightRay to_light;
+    Vector start = surface_leave(surface, false);
+    to_light.strength = (real)(1);
+    bool has_place = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
+    if (HAS_DIRECTIONAL_LIGHTS && (!has_place || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
+        to_light.direction = vector_negate(vector_of(light->direction));
+        to_light.shadow_ray = ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface->found);
+        return to_light;
+    }
+    Vector position = vector_of(light->position);
+    to_light.direction = vector_normalize(vector_subtract(position, surface->position));
+    if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
+        to_light.strength = spot_strength(light, vector_negate(to_light.direction));
+    to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),
+                                   (real)(1 - 32 * UNIT_ROUNDOFF), surface->found);
+    return to_light;
+}
+
+// max(0, cos)^shininess for the angle between two unit vectors, wanted in some lanes. Near the highlight's
+// center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has. A power of 0
+// gives 1.
+static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
+{
+    Vector difference = vector_subtract(reflected, to_eye);
+    real s = (real)(0.5f) * vector_dot(difference, difference);
+    mask counts = real_complement_power_counts(s, shininess);
+    real highlight = (real)(0);
+    if (lanes_any(wanted & counts))
+        highlight = lanes_select(
+            counts, real_complement_power(lanes_select(counts, s, (real)(0.5f)), shininess), highlight);
+    return lanes_select(shininess == (real)(0), (real)(1), highlight);
+}
+
+// The light that reaches the eye from one light, black where the surface turns away from it or lies in its
+// shadow; *shadowed tells which lanes do.
+static inline Color3 phong_light(const Scene *scene, const Surface *surface, uint index, mask *shadowed)
+{
+    const Color3 black = {(real)(0), (real)(0), (real)(0)};
+    Light light = scene->lights[index];
+    LightRay to_light = light_ray(&light, surface);
+    real facing = vector_dot(surface->shading_normal, to_light.direction);
+    mask lit = surface->found & (facing > (real)(0)) & (to_light.strength > (real)(0));
+    *shadowed = surface->found & !lit;
+    if (!lanes_any(lit)) return black;
+
+    to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
+    if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
+        ray_take_apex(&to_light.shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
+    rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
+    real passing = transmittance(scene, &to_light.shadow_ray);
+    lit = lit & (passing > (real)(0));
+    *shadowed = surface->found & !lit;
+    if (!lanes_any(lit)) return black;
+
+    Color3 reached = vector_scale(vector_of(light.color), to_light.strength * passing);
+    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), facing);
+    mask glossy = lit & (surface->specular > (real)(0));
+    if (lanes_any(glossy)) {
+        Vector reflected =
+            vector_fma(surface->shading_normal, facing + facing, vector_negate(to_light.direction));
+        real highlight =
+            surface->specular * phong_highlight(glossy, reflected, surface->to_eye, surface->shininess);
+        color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
+    }
+    return vector_select(lit, color_multiply(color, reached), black);
+}
+
+#endif

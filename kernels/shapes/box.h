@@ -1,0 +1,83 @@
+// Box along the axes, its faces included.
+#ifndef BOX_H
+#define BOX_H
+
+#include "numerics/quadratic.h"
+
+// Where the ray is between low and high on one axis. A direction of exactly 0 (of either sign) is always or
+// never between: decided by comparison, since 0 times infinity is no number.
+static inline Roots slab_crossings(real low, real high, real origin, real direction, real inverse)
+{
+    mask parallel = direction == (real)(0);
+    mask between = (origin >= low) & (origin <= high);
+    real to_low, to_high;
+    if (IS_COMPENSATED) {
+        real divisor = lanes_select(parallel, (real)(1), direction);
+        to_low = real_divide(low - origin, divisor);
+        to_high = real_divide(high - origin, divisor);
+    } else {
+        to_low = (low - origin) * inverse;
+        to_high = (high - origin) * inverse;
+    }
+    real always = lanes_select(between, (real)(LARGEST), (real)(-LARGEST));
+    return (Roots){lanes_select(parallel, -always, real_min(to_low, to_high)),
+                   lanes_select(parallel, always, real_max(to_low, to_high))};
+}
+
+static inline mask box_hit(const Box *box, const Ray *ray, real *t)
+{
+    Vector low = vector_of(box->low), high = vector_of(box->high);
+    Roots x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
+    Roots y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
+    Roots z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
+    real near = real_max(real_max(x.near, y.near), z.near);
+    real far = real_min(real_min(x.far, y.far), z.far);
+    *t = ray_first(ray, near, far);
+    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->near);
+}
+
+// How near t is to a slab's crossings, and on which of its faces that lies: a ray that runs towards larger
+// coordinates enters at the low face and leaves at the high one.
+static inline real slab_distance(Roots slab, real direction, real t, mask *low_face)
+{
+    real to_near = fabs(t - slab.near), to_far = fabs(t - slab.far);
+    mask entering = to_near <= to_far;
+    *low_face = entering == (direction > (real)(0));
+    return real_min(to_near, to_far);
+}
+
+static inline real slab_clamp(real value, real low, real high)
+{
+    return real_min(real_max(value, low), high);
+}
+
+// The face is the one whose crossing is t, x before y before z; the point is put on it exactly.
+static inline Patch box_patch(const Box *box, const Ray *ray, real t)
+{
+    Vector low = vector_of(box->low), high = vector_of(box->high);
+    Roots x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
+    Roots y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
+    Roots z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
+    mask low_x, low_y, low_z;
+    real to_x = slab_distance(x, ray->direction.x, t, &low_x);
+    real to_y = slab_distance(y, ray->direction.y, t, &low_y);
+    real to_z = slab_distance(z, ray->direction.z, t, &low_z);
+    mask on_x = (to_x <= to_y) & (to_x <= to_z);
+    mask on_y = !on_x & (to_y <= to_z);
+    mask on_z = !on_x & !on_y;
+
+    Vector position = ray_point(ray, t);
+    const real zero = (real)(0), one = (real)(1);
+    position.x =
+        lanes_select(on_x, lanes_select(low_x, low.x, high.x), slab_clamp(position.x, low.x, high.x));
+    position.y =
+        lanes_select(on_y, lanes_select(low_y, low.y, high.y), slab_clamp(position.y, low.y, high.y));
+    position.z =
+        lanes_select(on_z, lanes_select(low_z, low.z, high.z), slab_clamp(position.z, low.z, high.z));
+    Vector normal = {lanes_select(on_x, lanes_select(low_x, -one, one), zero),
+                     lanes_select(on_y, lanes_select(low_y, -one, one), zero),
+                     lanes_select(on_z, lanes_select(low_z, -one, one), zero)};
+    return patch_make(position, normal, zero);
+}
+
+#endif

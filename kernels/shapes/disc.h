@@ -1,0 +1,70 @@
+// Disc: a plane within a circle.
+#ifndef DISC_H
+#define DISC_H
+
+#include "shapes/plane.h"
+
+// The ray's height over the disc's plane, how fast it falls, and, times that, from the center to where it
+// crosses.
+typedef struct {
+    real height, along;
+    Vector across;
+} DiscCrossing;
+
+static inline DiscCrossing disc_crossing(Vector center, Vector normal, const Ray *ray)
+{
+    Vector f = vector_subtract(ray->origin, center);
+    return (DiscCrossing){-vector_dot(normal, f), vector_dot(normal, ray->direction),
+                          vector_cross(normal, vector_cross(f, ray->direction))};
+}
+
+static inline DiscCrossing disc_crossing_exactly(Vector center, Vector normal, const Ray *ray)
+{
+    PairVector f = pair_vector_difference(ray->origin, center);
+    return (DiscCrossing){
+        -pair_vector_dot_vector(f, normal).high,
+        pair_vector_dot_vector(pair_vector_of(normal), ray->direction).high,
+        pair_vector_high(pair_vector_cross(pair_vector_cross(f, ray->direction), normal)),
+    };
+}
+
+// Inside the rim: with v the crossing from the center, (n . d) v = n x E for the moment E = f x d, so that
+// |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a distance. Where the ray runs at
+// less than 4 degrees to the plane all three cancel: pairs there at any precision.
+static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
+{
+    Vector center = vector_of(disc->center_radius);
+    Vector normal = vector_of(disc->normal);
+    DiscCrossing crossing;
+    if (IS_COMPENSATED) {
+        crossing = disc_crossing_exactly(center, normal, ray);
+    } else {
+        crossing = disc_crossing(center, normal, ray);
+        real steepest_squared = vector_dot(normal, normal) * ray->squared;
+        mask grazing =
+            RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
+        if (lanes_any(grazing)) {
+            DiscCrossing exact = disc_crossing_exactly(center, normal, ray);
+            crossing.height = lanes_select(grazing, exact.height, crossing.height);
+            crossing.along = lanes_select(grazing, exact.along, crossing.along);
+            crossing.across = vector_select(grazing, exact.across, crossing.across);
+        }
+    }
+    mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
+    if (!lanes_any(hit)) return hit;
+    real radius = (real)(disc->center_radius.w);
+    // nearly in the disc's plane n . d says little about t, but it lies no farther from the center than the
+    // rim
+    real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
+    real half_chord = radius * real_sqrt(ray->inverse_squared);
+    *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
+    real reach = radius * crossing.along;
+    return hit & (vector_dot(crossing.across, crossing.across) <= reach * reach) & (*t > ray->near);
+}
+
+static inline Patch disc_patch(const Disc *disc, const Ray *ray, real t)
+{
+    return plane_crossing_patch(vector_of(disc->center_radius), disc->normal, ray, t);
+}
+
+#endif

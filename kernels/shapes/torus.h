@@ -1,0 +1,182 @@
+// Torus: the points at distance `minor` from a circle of radius `major`.
+//
+// Everything happens around the ray's closest approach to the center, where the quartic has no cubic term and
+// no large numbers: in s, the length along the ray from there, it is
+//     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
+// for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
+// The quartic only tells, by its derivative, where the distance to the surface stops falling or rising;
+// between two such places the distance itself,
+//     sqrt((rho - R)^2 + z^2) - r,
+// which is exact to a few u where the quartic cancels, is followed to its one zero. All by + - * / sqrt:
+// bracketing, so that axis-parallel and equatorial rays need no case of their own.
+#ifndef TORUS_H
+#define TORUS_H
+
+#include "traversal/ray.h"
+
+// The line s -> closest + s direction, |direction| = 1, in the torus' frame.
+typedef struct {
+    Vector across, turn; // (closest x axis) + s (direction x axis) has the length rho
+    real height, rise;   // z = height + s rise
+    real major, minor;
+} TorusLine;
+
+// From the tube's surface, negative inside it, and how fast that grows along the line.
+static inline real torus_distance(const TorusLine *line, real s, real *slope)
+{
+    Vector radial = vector_fma(line->turn, s, line->across);
+    real rho = vector_length(radial);
+    real z = fma(line->rise, s, line->height);
+    real off = rho - line->major;
+    real from_circle = real_sqrt(fma(off, off, z * z));
+    real rho_slope = vector_dot(radial, line->turn) * real_inverse_or_zero(rho);
+    *slope = fma(off, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
+    return from_circle - line->minor;
+}
+
+// The quartic's derivative, 4 s^3 + 2 p s + q.
+static inline real torus_cubic(real p, real q, real s, real *slope)
+{
+    *slope = fma((real)(12) * s, s, p + p);
+    return fma(fma((real)(4) * s, s, p + p), s, q);
+}
+
+// The next guess within a bracket: Newton's where it lies inside, else the middle.
+static inline real bracket_next(real low, real high, real s, real value, real slope)
+{
+    mask usable = fabs(value) * (real)(SMALLEST_RATIO) < fabs(slope);
+    real newton = s - real_divide(value, lanes_select(usable, slope, (real)(1)));
+    mask inside = usable & (newton > low) & (newton < high);
+    return lanes_select(inside, newton, (real)(0.5f) * (low + high));
+}
+
+// The cubic's zero between low and high, where it has different signs at the ends; else the end that is
+// nearer to one.
+static inline real torus_turning_point(real p, real q, real low, real high)
+{
+    real slope;
+    real at_low = torus_cubic(p, q, low, &slope), at_high = torus_cubic(p, q, high, &slope);
+    mask crosses = (at_low < (real)(0)) != (at_high < (real)(0));
+    mask rising = at_low < (real)(0);
+    real end = lanes_select(fabs(at_low) < fabs(at_high), low, high);
+    real s = (real)(0.5f) * (low + high);
+    for (uint i = 0; i < (IS_DOUBLE ? 40 : 20); i++) {
+        real value = torus_cubic(p, q, s, &slope);
+        mask before = (value < (real)(0)) == rising;
+        low = lanes_select(before, s, low);
+        high = lanes_select(before, high, s);
+        s = bracket_next(low, high, s, value, slope);
+    }
+    return lanes_select(crosses, s, end);
+}
+
+// The distance's zero between two places where it has different signs.
+static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
+{
+    real s = (real)(0.5f) * (low + high);
+    for (uint i = 0; i < (IS_DOUBLE ? 60 : 30); i++) {
+        real slope;
+        real value = torus_distance(line, s, &slope);
+        mask before = (value > (real)(0)) == entering;
+        low = lanes_select(before, s, low);
+        high = lanes_select(before, high, s);
+        real next = bracket_next(low, high, s, value, slope);
+        if (lanes_all(next == s)) break;
+        s = next;
+    }
+    return s;
+}
+
+// The ray's closest approach to the center, seen from there, and its t.
+static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *closest_t)
+{
+    Vector center = vector_of(torus->center_major);
+    if (IS_COMPENSATED) {
+        PairVector f = pair_vector_difference(ray->origin, center);
+        Vector moment = pair_vector_high(pair_vector_cross(f, ray->direction));
+        Pair squared = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
+        *closest_t = -real_divide(pair_vector_dot_vector(f, ray->direction).high, squared.high);
+        return vector_scale(vector_cross(ray->direction, moment), ray->inverse_squared);
+    }
+    Vector f = vector_subtract(ray->origin, center);
+    *closest_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
+    return vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
+}
+
+// The line's places, from where it enters the ball around the torus to where it leaves it: between any two
+// neighbors the distance has at most one zero. They are where the quartic's derivative has its zeros, which
+// its own turning points, at +-sqrt(-p / 6), keep apart.
+enum { TORUS_PLACES = 5 };
+
+static inline void torus_places(const TorusLine *line, real squared_distance, real span,
+                                real places[TORUS_PLACES])
+{
+    real k = fma(line->major, line->major, squared_distance) - line->minor * line->minor;
+    real squared_major = line->major * line->major;
+    real p = fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
+    real q = (real)(8) * squared_major * line->height * line->rise;
+    real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
+    places[0] = -span;
+    places[1] = torus_turning_point(p, q, -span, -bend);
+    places[2] = torus_turning_point(p, q, -bend, bend);
+    places[3] = torus_turning_point(p, q, bend, span);
+    places[4] = span;
+}
+
+static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
+{
+    real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
+    real closest_t;
+    Vector closest = torus_closest(torus, ray, &closest_t);
+    real reach = major + minor;
+    real squared_distance = vector_dot(closest, closest);
+    real half_chord_squared = fma(reach * (real)(1.001f), reach, -squared_distance);
+    mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
+    if (!lanes_any(hit)) return hit;
+
+    Vector axis = vector_of(torus->axis_minor);
+    real inverse_length = real_sqrt(ray->inverse_squared);
+    Vector direction = vector_scale(ray->direction, inverse_length);
+    TorusLine line = {vector_cross(closest, axis),
+                      vector_cross(direction, axis),
+                      vector_dot(closest, axis),
+                      vector_dot(direction, axis),
+                      major,
+                      minor};
+    real places[TORUS_PLACES];
+    torus_places(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), places);
+
+    real start = (ray->near - closest_t) * real_sqrt(ray->squared); // of the ray, as s
+    real slope, found_s = (real)(LARGEST);
+    real before = torus_distance(&line, places[0], &slope);
+    mask found = mask_none();
+    for (uint i = 0; i + 1 < TORUS_PLACES; i++) {
+        real after = torus_distance(&line, places[i + 1], &slope);
+        mask entering = before > (real)(0);
+        mask crosses = hit & !found & (entering != (after > (real)(0))) & (places[i + 1] > start);
+        if (lanes_any(crosses)) {
+            real s = torus_zero(&line, places[i], places[i + 1], entering);
+            mask first = crosses & (fma(s, inverse_length, closest_t) > ray->near);
+            found_s = lanes_select(first, s, found_s);
+            found = found | first;
+        }
+        before = after;
+    }
+    *t = lanes_select(found, fma(found_s, inverse_length, closest_t), *t);
+    return found;
+}
+
+static inline Patch torus_patch(const Torus *torus, const Ray *ray, real t)
+{
+    Vector center = vector_of(torus->center_major), axis = vector_of(torus->axis_minor);
+    real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
+    Vector p = ray_point_from(ray, center, t);
+    real z = vector_dot(p, axis);
+    Vector radial = vector_normalize(vector_fma(axis, -z, p));
+    Vector from_circle = vector_fma(radial, -major, p); // from the nearest point of the circle
+    Vector normal = vector_normalize(from_circle);
+    Vector position = vector_fma(normal, minor, vector_fma(radial, major, center));
+    return patch_make(position, normal, major + minor + vector_magnitude(center));
+}
+
+#endif
