@@ -427,9 +427,9 @@ static void test_bad_files(void **state)
     CHECK_REFUSED("hello", "neither PNG, JPEG, PPM, EXR nor NPY");
     CHECK_REFUSED("P6\n1 x\n255\n", "PPM: the header is damaged");
     CHECK_REFUSED("P6\n1 1\n70000\nabc", "PPM: the maximum must be 1 to 65535, not 70000");
-    CHECK_REFUSED("P6\n0 1\n255\n", "the picture is empty");
+    CHECK_REFUSED("P6\n0 1\n255\n", "the image is empty");
     CHECK_REFUSED("P6\n2 2\n255\n12345678901", "PPM: the file ends too early");
-    CHECK_REFUSED("P6\n2000000000 2000000000\n255\n123", "the file is too short for its picture");
+    CHECK_REFUSED("P6\n2000000000 2000000000\n255\n123", "the file is too short for its image");
     CHECK_REFUSED("P3 1 1 9 1 2 x", "PPM: value 3 of 3 is missing or no number");
     CHECK_REFUSED("P3 1 1 9 1 12 3", "PPM: value 2, 12, is above the maximum, 9");
     CHECK_REFUSED("\x93NUMPY\x04\0\0\0", "NPY: the header is damaged");
@@ -438,7 +438,7 @@ static void test_bad_files(void **state)
     CHECK_REFUSED("\x93NUMPY\x01\0\x27\0{'descr': '<f4', 'fortran_order': True}",
                   "NPY: the array must be in C order");
     CHECK_REFUSED("\x93NUMPY\x01\0\x38\0{'descr':'<f4','fortran_order':False,'shape':(2000, 2)}  ",
-                  "the file is too short for its picture");
+                  "the file is too short for its image");
     CHECK_REFUSED("\x93NUMPY\x01\0\x38\0{'descr':'<f4','fortran_order':False,'shape':(5,)}       ",
                   "NPY: the array must have 2 or 3 dimensions");
     CHECK_REFUSED("\x89PNG", "PNG: the file ends too early");
@@ -462,7 +462,7 @@ static void test_png_that_declares_too_much(void **state)
                   "\x49\x48\x44\x52\x02\xFA\xF0\x80\x7F\xFF\xFF\xFF\x10\x02\x00\x00\x00"
                   "\x3A\xFA\x01\x4B"
                   "\0\0\0\0IDAT\x35\xAF\x06\x1E",
-                  "the file is too short for its picture");
+                  "the file is too short for its image");
     assert_true(peak_kibibytes() - before < 64 * 1024);
 }
 

@@ -187,9 +187,9 @@ static void numbers_of_materials_are_finite(void **state)
     assert_true(scene_read_text(&scene, "scene.yaml", &text, false, &messages));
     assert_int_equal(messages.count, 2); // the same is told once
     assert_string_equal(messages.items[0].text,
-                        "a.obj: a color of material 'red' is not finite or too large: the default is taken");
+                        "a.obj: a color of material 'red' is not finite or too large: using the default");
     assert_string_equal(messages.items[1].text,
-                        "a.obj: a number of material 'red' is not finite or too large: the default is taken");
+                        "a.obj: a number of material 'red' is not finite or too large: using the default");
     const Material *red = material_of_triangle(&scene, 0);
     assert_vector(red->color, 1, 1, 1);
     assert_number(red->specular, 0);
@@ -398,7 +398,7 @@ static void faults_name_file_and_vertex(void **state)
         {"a.ply", PLY_HEADER("99999999", "1") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
          "a.ply: line 14: the file ends before vertex 4 (from 0) of 99999999"},
         {"a.ply", PLY_HEADER("3\rcomment\relement face 99999999", "1") "end_header\r\n0 0 0\n",
-         "a.ply: line 11: the header tells of 'face' twice"},
+         "a.ply: line 11: the header declares 'face' twice"},
         {"a.gltf", "{\"nodes\": {\"a\": {\"children\": [\"b\", \"b\"]}}}\n", "a.gltf: glTF 1.0, not 2.0"},
         {"a.gltf", "{\"nod\\u0065s\": []}", "a.gltf: the key 'nod\\u0065s' is not a plain word"},
         {"a.gltf", GLTF_OF_NODES("{\"children\": [1, 2]}, {\"children\": [2]}, {}"),

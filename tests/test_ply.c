@@ -191,9 +191,9 @@ static void faults_name_line_and_row(void **state)
         const char *text, *message;
     } cases[] = {
         {HEADER CORNERS "3 0 1 2\n2000000000 1 3 2\n",
-         "line 15: face 1 (from 0) promises 2000000000 numbers of 'vertex_indices', the line holds 3 more"},
+         "line 15: face 1 (from 0) declares 2000000000 numbers of 'vertex_indices', the line has 3 more"},
         {HEADER CORNERS "3 0 1\n3 1 3 2\n",
-         "line 14: face 0 (from 0) promises 3 numbers of 'vertex_indices', the line holds 2 more"},
+         "line 14: face 0 (from 0) declares 3 numbers of 'vertex_indices', the line has 2 more"},
         {HEADER CORNERS "3 0 1 2\n", "line 15: the file ends before face 1 (from 0) of 2"},
         {HEADER CORNERS, "line 14: the file ends before face 0 (from 0) of 2"},
         {HEADER "0 0 0\n1 0\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: vertex 1 (from 0) lacks its 'z'"},
@@ -217,7 +217,7 @@ static void faults_name_line_and_row(void **state)
         {ASCII XYZ END, "line 3: a property before the first element"},
         {ASCII "element vertex -4\n" END, "line 3: '-4' is no number of 'vertex'"},
         {ASCII "element vertex 4\n" XYZ "element vertex 4\n" XYZ END,
-         "line 11: the header tells of 'vertex' twice"},
+         "line 11: the header declares 'vertex' twice"},
         {ASCII "element vertex 4\n" XYZ
                "element tristrips 1\nproperty list int int vertex_indices\n" END CORNERS "4 0 1 2 3\n",
          "line 9: strips of triangles (tristrips) are not read, only faces"},
@@ -274,7 +274,7 @@ static void binary_faults_name_byte_and_row(void **state)
         Text text = binary_with_count(headers[cases[i].header], cases[i].count, type), message = {0};
         text_appendf(
             &message,
-            "byte %zu: face 1 (from 0) promises %s numbers of 'vertex_indices', the file holds 3 more",
+            "byte %zu: face 1 (from 0) declares %s numbers of 'vertex_indices', the file has 3 more",
             text.count - type->size - 12, cases[i].promise);
         assert_refused(&text, text_c(&message));
         text_free(&text);

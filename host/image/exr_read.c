@@ -1,4 +1,4 @@
-// OpenEXR in, through the C core: the first part's full resolution, rows or tiles, halves or floats.
+// OpenEXR input through the C core: the first part at full resolution, scan lines or tiles, halves or floats.
 #include "host/image/codec.h"
 
 #include "host/base/memory.h"
@@ -11,7 +11,7 @@ typedef struct {
     const ImageFile *file;
     exr_context_t context;
     const exr_attr_chlist_t *list;
-    int chosen[3]; // of the list, in the image's order
+    int chosen[3]; // indices in the channel list, in image order
     exr_attr_box2i_t window;
     char problem[256];
 } ExrReader;
@@ -22,7 +22,7 @@ static void exr_note_problem(exr_const_context_t context, exr_result_t code, con
     void *user_data = NULL;
     if (!context || exr_get_user_data(context, &user_data) != EXR_ERR_SUCCESS || !user_data) return;
     ExrReader *reader = user_data;
-    if (!reader->problem[0]) // the first is nearest to the cause
+    if (!reader->problem[0]) // the first message is closest to the cause
         snprintf(reader->problem, sizeof reader->problem, "%s", message);
 }
 
@@ -32,8 +32,8 @@ static int64_t exr_size(exr_const_context_t context, void *reader)
     return (int64_t)((ExrReader *)reader)->file->length;
 }
 
-// As pread: fewer bytes at the end of the file, for the library reads ahead of a header whose size it does
-// not know.
+// Like pread, returns fewer bytes at the end of the file: the library reads ahead past a header of unknown
+// size.
 static int64_t exr_read_bytes(exr_const_context_t context, void *reader, void *bytes, uint64_t size,
                               uint64_t offset, exr_stream_error_func_ptr_t fail)
 {
@@ -84,7 +84,7 @@ static bool exr_prepare(ExrReader *reader, Image *image)
     if (code == EXR_ERR_SUCCESS) code = exr_get_chunk_count(reader->context, 0, &chunk_count);
     if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
     if (reader->list->num_channels < 1 || chunk_count < 1)
-        return image_refuse(reader->file, "EXR: the picture is empty");
+        return image_refuse(reader->file, "EXR: the image is empty");
     uint32_t channels = channels_choose(reader);
     for (uint32_t i = 0; i < channels; i++) {
         const exr_attr_chlist_entry_t *entry = &reader->list->entries[reader->chosen[i]];
@@ -92,18 +92,17 @@ static bool exr_prepare(ExrReader *reader, Image *image)
             return image_refuse(reader->file, "EXR: channel %s is not of floats or not of full resolution",
                                 entry->name.str);
     }
-    // Each block has its place in a table and a start of its own; the densest compression (a picture of one
-    // color) stays below 65536 to 1.
+    // Each block has a table entry and a header; even a constant image compresses by less than 65536 to 1.
     int64_t width = (int64_t)reader->window.max.x - reader->window.min.x + 1;
     int64_t height = (int64_t)reader->window.max.y - reader->window.min.y + 1;
     if ((uint64_t)chunk_count > reader->file->length / 16)
-        return image_refuse(reader->file, "EXR: the file is too short for its picture");
+        return image_refuse(reader->file, "EXR: the file is too short for its image");
     return image_allocate(image, reader->file, width < 0 ? 0 : (uint64_t)width,
                           height < 0 ? 0 : (uint64_t)height, channels, 65536);
 }
 
-// Where the channel's values of a block go: to the image, or aside. OpenEXR 3.1 writes through the null
-// pointer that should make it skip a channel, where there are three channels of halves.
+// Destination of a channel's values: the image, or a scratch buffer. OpenEXR 3.1 writes through the null
+// pointer that should make it skip a channel if there are three channels of halves.
 static void channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t pixel_values,
                           uint32_t row_pixels)
 {
@@ -126,7 +125,7 @@ static void channels_place(const ExrReader *reader, Image *image, exr_decode_pip
     }
 }
 
-// Decodes one block of rows or one tile to its place in the image.
+// Decodes one block of rows or one tile into the image.
 static exr_result_t exr_chunk(const ExrReader *reader, Image *image, const exr_chunk_info_t *chunk,
                               uint32_t x, uint32_t y)
 {
@@ -181,7 +180,7 @@ static bool exr_pixels(ExrReader *reader, Image *image)
     exr_storage_t storage;
     exr_result_t code = exr_get_storage(reader->context, 0, &storage);
     if (code == EXR_ERR_SUCCESS && storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)
-        return image_refuse(reader->file, "EXR: deep pictures are not read");
+        return image_refuse(reader->file, "EXR: deep images are not supported");
     if (!exr_prepare(reader, image)) return false;
     if (code == EXR_ERR_SUCCESS)
         code = storage == EXR_STORAGE_TILED ? exr_tiles(reader, image) : exr_scanlines(reader, image);
@@ -196,7 +195,7 @@ bool exr_decode(Image *image, const ImageFile *file)
     settings.user_data = &reader;
     settings.read_fn = exr_read_bytes;
     settings.size_fn = exr_size;
-    settings.max_image_width = settings.max_image_height = 1 << 24; // strides are counted in 32 bits
+    settings.max_image_width = settings.max_image_height = 1 << 24; // strides are 32-bit
     settings.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
     exr_result_t code = exr_start_read(&reader.context, file->path, &settings);
     bool done = code == EXR_ERR_SUCCESS ? exr_pixels(&reader, image) : exr_refuse(&reader, code);

@@ -1,5 +1,5 @@
-// OpenEXR out, through the C core (Technical Introduction to OpenEXR, 2013): 32 bit floats, ZIP in blocks of
-// 16 rows.
+// OpenEXR output through the C core (Technical Introduction to OpenEXR, 2013): 32-bit floats, ZIP in blocks
+// of 16 rows.
 #include "host/image/codec.h"
 
 #include "host/base/fault.h"
@@ -16,12 +16,12 @@ typedef struct {
     exr_encode_pipeline_t pipeline;
     bool has_pipeline;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
-    float *block;                                              // the rows of the block not yet full
+    float *block;                                              // rows of the incomplete block
     uint32_t block_rows, rows_held, block_start;
     int write_error; // errno of a failed write
 } ExrWriter;
 
-// The library would print, and calls this with its lock held: nothing can be asked of the context here.
+// Silences the library, which calls this with its lock taken: the context must not be used here.
 static void exr_keep_silent(exr_const_context_t context, exr_result_t code, const char *message)
 {
     (void)context, (void)code, (void)message;
@@ -47,7 +47,7 @@ static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList
     return false;
 }
 
-// The first failure among calls in a row.
+// The first failure of a sequence of calls.
 #define EXR_STEP(code, call) ((code) = (code) ? (code) : (call))
 
 static exr_result_t exr_header(ImageWriter *writer)
@@ -58,7 +58,7 @@ static exr_result_t exr_header(ImageWriter *writer)
     settings.error_handler_fn = exr_keep_silent;
     settings.user_data = writer;
     settings.write_fn = exr_write_bytes;
-    // Files of level 4 were 4 to 8% larger than of level 9 on smooth pictures, and equal on noise.
+    // Level 4 makes files 4 to 8% larger than level 9 on smooth images, equal on noise.
     settings.zip_level = 4;
     exr_result_t code =
         exr_start_write(&state->context, writer->output.target, EXR_WRITE_FILE_DIRECTLY, &settings);
@@ -72,7 +72,7 @@ static exr_result_t exr_header(ImageWriter *writer)
         EXR_STEP(code, exr_add_channel(state->context, 0, (char[]){*name, '\0'}, EXR_PIXEL_FLOAT,
                                        EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
     for (const ImageNote *note = header->notes; note && note->key; note++) {
-        // The prefix keeps a key such as `version` from being taken for the format's own.
+        // The prefix separates keys such as `version` from the format's own.
         Text key = {0};
         text_appendf(&key, "glint.%s", note->key);
         EXR_STEP(code, exr_attr_set_string(state->context, 0, text_c(&key), note->value));
@@ -91,7 +91,7 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
     ExrWriter *state = writer->state = memory_allocate_zeroed(1, sizeof *state);
     if (header->channels != 1 && header->channels != 3)
         fault("EXR is written with 1 or 3 channels, not %u", header->channels);
-    // The table of blocks in front of them is filled in last.
+    // The block offset table precedes the blocks and is written last.
     if (fseeko(writer->output.file, 0, SEEK_SET) != 0) {
         message_add(messages, MESSAGE_ERROR, "cannot write '%s': EXR needs a file, not a pipe",
                     writer->output.target);
@@ -110,8 +110,8 @@ static size_t channel_place(const char *name)
     return *name == 'B' ? 2 : *name == 'G' ? 1 : 0;
 }
 
-// A block stored at its full size is read as it is. OpenEXR (3.1 and 3.4.7 do) stores compressed bytes there
-// where they happen to be just as many (its issue 2306).
+// A block of its uncompressed size is read as uncompressed. OpenEXR 3.1 and 3.4.7 store compressed bytes of
+// that size as well (its issue 2306).
 static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
 {
     const ExrWriter *state = pipeline->encoding_user_data;
@@ -121,7 +121,7 @@ static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
     return code;
 }
 
-// Writes the rows held as one block.
+// Writes the buffered rows as one block.
 static exr_result_t exr_block(ImageWriter *writer)
 {
     ExrWriter *state = writer->state;

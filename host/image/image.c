@@ -38,7 +38,7 @@ static const Encoder *encoder_of(ImageFormat format)
     case IMAGE_UNKNOWN:
         break;
     }
-    fault("a picture of no format");
+    fault("an image of unknown format");
 }
 
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages)
@@ -55,7 +55,7 @@ ImageWriter *image_writer_open(const char *path, const ImageHeader *header, Mess
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
 {
     if (row_count > writer->header.height - writer->rows_written)
-        fault("more rows than the picture has: %s", writer->output.target);
+        fault("more rows than the image has: %s", writer->output.target);
     if (writer->failed || !writer->encoder->rows(writer, pixels, row_count, messages)) {
         writer->failed = true;
         return false;
@@ -75,7 +75,7 @@ bool image_writer_settle(ImageWriter *writer, MessageList *messages)
 {
     if (writer->failed || writer->settled) return !writer->failed;
     if (writer->rows_written < writer->header.height)
-        fault("a picture without all its rows: %s", writer->output.target);
+        fault("an image with missing rows: %s", writer->output.target);
     writer->settled = (!writer->encoder->end || writer->encoder->end(writer, messages)) &&
                       output_settle(&writer->output, messages);
     writer->failed = !writer->settled;
@@ -108,15 +108,15 @@ bool image_refuse(const ImageFile *file, const char *format, ...)
 bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_t height, uint64_t channels,
                     uint64_t expansion)
 {
-    if (width == 0 || height == 0 || channels == 0) return image_refuse(file, "the picture is empty");
+    if (width == 0 || height == 0 || channels == 0) return image_refuse(file, "the image is empty");
     uint64_t values, bytes, most;
     if (__builtin_mul_overflow(file->length, expansion, &most)) most = UINT64_MAX;
     if (width > UINT32_MAX || height > UINT32_MAX || channels > UINT32_MAX ||
         __builtin_mul_overflow(width * height, channels, &values) ||
         __builtin_mul_overflow(values, sizeof *image->values, &bytes) || bytes > most)
-        return image_refuse(file, "the file is too short for its picture");
+        return image_refuse(file, "the file is too short for its image");
     image->values = calloc(values, sizeof *image->values);
-    if (!image->values) return image_refuse(file, "the picture does not fit into memory");
+    if (!image->values) return image_refuse(file, "the image does not fit into memory");
     image->width = (uint32_t)width;
     image->height = (uint32_t)height;
     image->channels = (uint32_t)channels;

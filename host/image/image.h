@@ -1,4 +1,4 @@
-// Pictures: float colors in, files out. Rows run from the top.
+// Images: float colors to files and back. Rows run from the top.
 #pragma once
 
 #include "host/base/message.h"
@@ -22,23 +22,23 @@ typedef struct {
     const ImageNote *notes;           // ended by a NULL key
 } ImageHeader;
 
-ImageFormat image_format_of(const char *path); // by its ending, any case
+ImageFormat image_format_of(const char *path); // by its ending, in any case
 
-// Written row by row, so that a large picture needs memory for its bands only; nothing is at the target until
-// image_writer_commit has renamed it.
+// Writes row by row, so that a large image needs memory for a band only. Nothing is at the target path until
+// image_writer_commit renames the file.
 typedef struct ImageWriter ImageWriter;
-// NULL with an error message where the file cannot be written. The header's notes are read here alone.
+// NULL with an error message if the file cannot be written. Reads the header's notes; they need not outlive
+// it.
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages);
-// `pixels`: row_count x width x channels values of npy_type ('f' for PNG, PPM, EXR), from the top down. False
-// with an error message where they cannot be written; no more rows are taken then, and the writer is still to
-// be committed, which fails without another message, or abandoned. More rows than the picture has are a
-// program's fault.
+// `pixels`: row_count x width x channels values of npy_type ('f' for PNG, PPM, EXR), from the top. Returns
+// false with an error message if they cannot be written; the writer must still be committed, which then fails
+// silently, or abandoned. More rows than the image has are a bug.
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
-// Completes the file, so that only the renaming is left: of several files none is put in place before all are
-// whole. False with an error message where that fails; the writer is still to be committed or abandoned.
+// Completes the file so that only the rename is left: of several files none is put in place before all are
+// complete. False with an error message on failure; the writer must still be committed or abandoned.
 bool image_writer_settle(ImageWriter *writer, MessageList *messages);
-// Completes the file unless it is settled, and renames it to its target; false with an error message where
-// that fails, and the target is as it was. Frees the writer either way. Missing rows are a program's fault.
+// Completes the file unless settled and renames it to its target. On failure returns false with an error
+// message and leaves the target unchanged. Frees the writer in either case. Missing rows are a bug.
 bool image_writer_commit(ImageWriter *writer, MessageList *messages);
 void image_writer_abandon(ImageWriter *writer); // removes the file and frees the writer; NULL is accepted
 
@@ -46,19 +46,18 @@ void image_writer_abandon(ImageWriter *writer); // removes the file and frees th
 // NaN gives 0. sRGB: IEC 61966-2-1:1999.
 uint32_t image_quantize(float value, Transfer transfer, unsigned bits);
 
-// A whole picture in memory; what `image_read` gives is linear unless the file holds display values, which
-// are then value / maximum with `transfer` telling the curve they were written with (PNG: from its sRGB
-// chunk).
+// An image in memory. `image_read` gives linear values; a file's display values become value / maximum, and
+// `transfer` is their curve (PNG: from its sRGB chunk).
 typedef struct {
     uint32_t width, height, channels;
     float *values;
     Transfer transfer;
     bool display; // 8 or 16 bit display values, scaled to 0..1, curve not undone
 } Image;
-// Reads PNG, JPEG, PPM, EXR or NPY, as its first bytes say. False with an error message; `image` is then
-// empty and need not be freed.
+// Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message
+// and an empty image that need not be freed.
 bool image_read(Image *image, const char *path, MessageList *messages);
-// The same, and returns its values in double: as the file has them where it holds doubles. Caller frees both.
-// NULL with an error message where it fails; `image` is then empty.
+// The same, and returns the values in double, exact if the file holds doubles. Caller frees both. NULL with
+// an error message and an empty image on failure.
 double *image_read_doubles(Image *image, const char *path, MessageList *messages);
 void image_free(Image *image);

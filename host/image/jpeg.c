@@ -1,10 +1,10 @@
-// JPEG through libjpeg-turbo, to read only.
+// JPEG input through libjpeg-turbo.
 #include "host/image/codec.h"
 
 #include <stdlib.h>
 #include <turbojpeg.h>
 
-// A file may hold next to nothing and declare any size: as much as a flat gray picture gets out of a byte.
+// Bounds the declared size by the file's: the expansion of a flat gray image.
 enum { JPEG_EXPANSION = 1 << 14 };
 
 bool jpeg_decode(Image *image, const ImageFile *file)
@@ -21,7 +21,7 @@ bool jpeg_decode(Image *image, const ImageFile *file)
         size_t count = (size_t)image->width * image->height * 3;
         bytes = calloc(count, 1);
         if (!bytes)
-            image_refuse(file, "the picture does not fit into memory");
+            image_refuse(file, "the image does not fit into memory");
         else if (tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
                                TJFLAG_ACCURATEDCT) != 0)
             image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));

@@ -54,7 +54,7 @@ static bool npy_rows(ImageWriter *writer, const void *pixels, uint32_t row_count
 
 const Encoder npy_encoder = {npy_begin, npy_rows, NULL, NULL};
 
-// What follows `'key':` in the header's dictionary, or NULL.
+// The value of `'key':` in the header's dictionary, or NULL.
 static const char *npy_entry(const char *dictionary, const char *key)
 {
     const char *at = strstr(dictionary, key);

@@ -12,11 +12,11 @@
 #include <string.h>
 #include <zlib.h>
 
-// What both directions share; libpng hands it back where it fails.
+// Shared by reading and writing; libpng passes it to the error handler.
 typedef struct {
     png_structp png;
     png_infop info;
-    uint8_t *bytes; // one row to write, all rows read
+    uint8_t *bytes; // the row to write, or all rows read
     char problem[256];
 } PngState;
 
@@ -49,7 +49,7 @@ static bool png_write_failed(ImageWriter *writer, MessageList *messages)
     return false;
 }
 
-// tEXt holds Latin-1, iTXt UTF-8; ASCII is in both, and more programs show tEXt.
+// tEXt is Latin-1, iTXt UTF-8; ASCII fits both, and more programs show tEXt.
 static void png_note(PngState *state, const ImageNote *note)
 {
     bool is_ascii = true;
@@ -84,7 +84,7 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
         png_note(state, note);
     png_set_filter(state->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
     png_set_compression_level(state->png, 1);
-    // of what the filter leaves runs are what repeats: as fast as a search for more, and smaller
+    // filtered rows repeat mostly in runs: RLE is as fast as a longer match search, and smaller
     png_set_compression_strategy(state->png, Z_RLE);
     png_write_info(state->png, state->info);
     return true;
@@ -137,7 +137,7 @@ static void png_read_bytes(png_structp png, png_bytep bytes, size_t size)
     reader->at += size;
 }
 
-// Sets the reader to give gray or RGB of 8 or 16 bits, and makes room for all rows.
+// Sets up the reader for gray or RGB of 8 or 16 bits and allocates all rows.
 static bool png_prepare(PngReader *reader, Image *image)
 {
     png_structp png = reader->state.png;
@@ -152,15 +152,15 @@ static bool png_prepare(PngReader *reader, Image *image)
     png_set_strip_alpha(png);
     png_set_interlace_handling(png);
 
-    // Deflate makes at most 1032 bytes of one (zlib, technical details); a byte holds at most 8 pixels of a
-    // palette. Checked before libpng makes room for a row of the declared width.
+    // Deflate expands a byte to at most 1032 (zlib, technical details), and a byte holds at most 8 palette
+    // pixels. Checked before libpng allocates a row of the declared width.
     if (!image_allocate(image, reader->file, png_get_image_width(png, info), png_get_image_height(png, info),
                         png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR ? 3 : 1,
                         UINT64_C(1032) * 8 * 3 * sizeof *image->values))
         return false;
     png_read_update_info(png, info);
     reader->state.bytes = calloc(image->height, png_get_rowbytes(png, info));
-    return reader->state.bytes || image_refuse(reader->file, "the picture does not fit into memory");
+    return reader->state.bytes || image_refuse(reader->file, "the image does not fit into memory");
 }
 
 static void png_values(const PngReader *reader, Image *image)

@@ -37,7 +37,7 @@ static void ppm_free(ImageWriter *writer)
 
 const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, ppm_free};
 
-// Reads the number at `*at` after white space and comments; false where there is none below 2^31.
+// Reads the number at `*at` after white space and comments; false unless it is below 2^31.
 static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)
 {
     while (*at < file->length && (isspace(file->bytes[*at]) || file->bytes[*at] == '#')) {
@@ -73,7 +73,7 @@ bool ppm_decode(Image *image, const ImageFile *file)
                         sizeof *image->values / value_size))
         return false;
     image->display = true;
-    at++; // the one white space after the maximum
+    at++; // the single white space after the maximum
     size_t count = (size_t)image->width * image->height * image->channels;
     if (!is_text && (at > file->length || count > (file->length - at) / value_size))
         return image_refuse(file, "PPM: the file ends too early");

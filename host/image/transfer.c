@@ -1,5 +1,5 @@
-// IEC 61966-2-1:1999, the sRGB curve. The curve only rises, so a display value is found by comparing with the
-// thresholds between neighboring display values, which are worked out once; no rounding error is left in it.
+// The sRGB curve (IEC 61966-2-1:1999). It is monotonic, so a display value follows exactly from comparisons
+// with the thresholds between neighboring display values, computed once.
 #include "host/image/transfer.h"
 #include "host/base/memory.h"
 #include "host/image/srgb.h"
@@ -10,10 +10,10 @@
 
 typedef struct {
     uint32_t maximum;
-    unsigned shift;    // bits of a float that are below a bucket
-    uint32_t first;    // the bucket of thresholds[1]
+    unsigned shift;    // bits of a float below the bucket index
+    uint32_t first;    // bucket of thresholds[1]
     float *thresholds; // [k]: the least float that gives k
-    uint16_t *starts;  // [bucket - first]: what the bucket's least float gives
+    uint16_t *starts;  // [bucket - first]: the display value of the bucket's least float
 } Curve;
 
 static Curve curve_8, curve_16;
@@ -25,7 +25,7 @@ static uint32_t float_bits(float value)
     return bits;
 }
 
-// No threshold lies within a part in 10^12 of a float, so that a double's error does not reach one.
+// No threshold lies within a relative 1e-12 of a float, so double precision decides each.
 static float float_at_least(double value)
 {
     float near = (float)value;
@@ -41,7 +41,7 @@ static void curve_prepare(Curve *curve, uint32_t maximum, unsigned bucket_bits)
         curve->thresholds[k] = float_at_least(srgb_decode((k - 0.5) / maximum));
     curve->thresholds[maximum + 1] = INFINITY;
 
-    // A float's upper bits, which order positive floats, name its bucket: some per power of two.
+    // A positive float's upper bits, which order floats, are its bucket: several per power of two.
     curve->shift = 23 - bucket_bits;
     curve->first = float_bits(curve->thresholds[1]) >> curve->shift;
     uint32_t end = float_bits(1.0F) >> curve->shift;

@@ -1,5 +1,5 @@
-// `.cfg`, the scenes of the article's own program: blocks such as `=>sphere :` with a key a line.
-// What is read and what is tolerated: docs/scene-format.md.
+// `.cfg`, the scenes of the article's program: blocks such as `=>sphere :` with one key per line.
+// docs/scene-format.md says what is read and tolerated.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
@@ -8,7 +8,7 @@
 
 static const Range range_radians = {0, M_PI_2, true, "greater than 0 and less than pi/2"};
 
-// Everything that a block may say.
+// The values of any block.
 typedef struct {
     Vector3 position, look_at, center, normal, color, diffuse, intensity;
     double radius, angle, specular;
@@ -56,7 +56,7 @@ static void camera_finish(CfgReader *reader, const BlockValues *values)
         .look_at = values->look_at,
         .up = {0, 1, 0},
         .field_axis = FIELD_HORIZONTAL,
-        .half_tangent = 0.25, // the program's frame of 1 at a focal length of 2
+        .half_tangent = 0.25, // the program's frame of width 1 at a focal length of 2
     };
 }
 
@@ -152,7 +152,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     return read && line_end(line);
 }
 
-// The next line that is not blank. False at the end of the source.
+// Moves to the next nonblank line. False at the end of the source.
 static bool line_next_filled(Line *line)
 {
     while (line_next(line, '\0')) {
@@ -166,7 +166,7 @@ static bool word_opens_block(Word word)
     return word.length >= 2 && !memcmp(word.text, "=>", 2);
 }
 
-// Reads to the closing brace. False, reported, where a fault keeps the block from being used.
+// Reads up to the closing brace. Reports an error and returns false if the block cannot be used.
 static bool block_read(CfgReader *reader, const Block *block, size_t start, BlockValues *values)
 {
     Line *line = &reader->line;
@@ -179,7 +179,7 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
         Word word = line_peek(line);
         if (word_opens_block(word)) {
             report_error(&reader->report, word.offset, "'}' is missing");
-            line->next = line->start; // the next block is read all the same
+            line->next = line->start; // the next block is still read
             return false;
         }
         if (word_is(word, "}")) break;
@@ -197,7 +197,7 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
     return all_read;
 }
 
-// The block that a line such as `=>sphere :` opens. NULL, reported, where there is none of that name.
+// The block opened by a line such as `=>sphere :`. Reports an error and returns NULL if the name is unknown.
 static const Block *block_find(CfgReader *reader)
 {
     Word arrow = line_word(&reader->line);

@@ -1,4 +1,4 @@
-// Scene files: the reader follows from the file's name.
+// Scene files; the name's ending chooses the reader.
 #pragma once
 
 #include "host/import/load.h"
@@ -9,16 +9,16 @@ typedef struct {
     bool lenient; // skip unknown elements of .rt with a warning
 } SceneOptions;
 
-// Reads a scene; the format follows from the name's ending (.yaml .yml .rt .cfg .nff). On a user's fault
-// returns false with the errors in `messages` and an empty scene; warnings may be there either way.
+// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff). On a mistake in the file returns
+// false with errors in `messages` and an empty scene. Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
-// The readers, from memory. `source->file` is used in messages only.
+// The readers, from memory; `source->file` is used in messages only.
 bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
 
-// For the readers. Closes the report. Without errors warns of what makes a picture black; with errors empties
-// the scene.
+// For the readers: closes the report. Warns of what makes an image black; frees the scene if there are
+// errors.
 bool scene_finish(Scene *scene, Report *report);

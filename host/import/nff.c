@@ -1,5 +1,5 @@
-// `.nff`, Eric Haines' Neutral File Format: elements of words separated by blanks and line ends.
-// What is read and how its lights and materials are understood: docs/scene-format.md.
+// `.nff`, Eric Haines' Neutral File Format: elements made of words separated by whitespace.
+// docs/scene-format.md says what is read and how lights and materials map to glint's.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
@@ -16,7 +16,7 @@ typedef struct {
     struct {
         size_t *items;
         size_t count, capacity;
-    } white_lights; // those without a color: indices
+    } white_lights; // indices of the lights without a color
     struct {
         Vector3 *items;
         size_t count, capacity;
@@ -26,7 +26,7 @@ typedef struct {
 
 static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
-// Goes on to the next line with a word on it, unless this one has one left. False at the end of the source.
+// Moves to the next line with a word on it unless words are left on this one. False at the end of the source.
 static bool reach_word(NffReader *reader)
 {
     while (!line_peek(&reader->line).length) {
@@ -75,7 +75,7 @@ static bool read_angle(NffReader *reader)
     return true;
 }
 
-// Nothing is too near to be seen.
+// glint has no near clipping plane.
 static bool read_hither(NffReader *reader)
 {
     double unused;
@@ -225,7 +225,7 @@ static bool read_sphere(NffReader *reader)
     return true;
 }
 
-// A cone, or, where both radii are the same, a cylinder.
+// A cone, or a cylinder where both radii are equal.
 static bool read_cone(NffReader *reader)
 {
     Vector3 base, apex;
@@ -325,7 +325,7 @@ static bool read_patch(NffReader *reader)
     return read_any_polygon(reader, true);
 }
 
-// Each reads what follows its name, to the end of a line; reports and returns false at the first fault.
+// Each reads what follows its name up to the end of a line. Reports the first error and returns false.
 static const struct {
     const char *name;
     bool (*read)(NffReader *reader);
@@ -334,7 +334,7 @@ static const struct {
     {"c", read_cone}, {"s", read_sphere},     {"p", read_polygon}, {"pp", read_patch},
 };
 
-// After a fault the rest of its line is skipped, and lines that may have belonged to it.
+// After an error the rest of its line is skipped, and lines that may have belonged to it.
 static void element_read(NffReader *reader)
 {
     Word name = line_word(&reader->line);
@@ -355,8 +355,8 @@ static void element_read(NffReader *reader)
         report_error(&reader->report, name.offset, "unknown element '%.*s'", word_shown(name), name.text);
 }
 
-// The format leaves intensities open; this is the formula its author proposes (Haines, Standard Procedural
-// Databases, README, File structure), for each of n lights without a color and for ambient light.
+// The format leaves intensities unspecified. Its author proposes this formula for each of n lights without a
+// color, and for ambient light (Haines, Standard Procedural Databases, README, File structure).
 static void lights_finish(NffReader *reader)
 {
     Scene *scene = reader->scene;

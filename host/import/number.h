@@ -1,11 +1,11 @@
-// Decimal numbers as scene files write them, independent of the locale, and the ranges they must keep to.
+// Decimal numbers of scene files, independent of the locale, and their valid ranges.
 #pragma once
 
 #include "host/import/report.h"
 #include <stddef.h>
 
-// Larger magnitudes are refused and smaller ones read as 0, so that no later product of a few numbers
-// overflows a double or vanishes in it.
+// Larger magnitudes are rejected and smaller ones read as 0, so that no product of a few numbers overflows or
+// underflows a double.
 #define NUMBER_LARGEST  1e30
 #define NUMBER_SMALLEST 1e-30
 
@@ -17,13 +17,13 @@ NumberStatus number_read(const char *text, size_t length, double *value);
 
 typedef struct {
     double low, high;
-    bool open;        // the limits themselves are outside
-    const char *must; // what a number outside is told
+    bool open;        // excludes the limits
+    const char *must; // what a message says the number must be
 } Range;
 
 extern const Range range_positive, range_not_negative, range_unit, range_byte, range_field_of_view,
     range_pixels;
 
-// Reads the number called `name`, or reports what is wrong with it. `range` NULL: any.
+// Reads the number called `name`; reports an error and returns false if it is invalid. `range` NULL: any.
 bool number_read_field(Report *report, size_t offset, const char *name, const char *text, size_t length,
                        const Range *range, double *value);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MESSAGES_TOLD = 20 }; // of each severity
+enum { MESSAGES_LARGEST = 20 }; // of each severity
 
 Report report_open(const Source *source, MessageList *messages)
 {
@@ -23,7 +23,7 @@ static void report_add(Report *report, MessageSeverity severity, size_t offset, 
 
 void report_error(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->error_count++ >= MESSAGES_TOLD) return;
+    if (report->error_count++ >= MESSAGES_LARGEST) return;
     va_list arguments;
     va_start(arguments, format);
     report_add(report, MESSAGE_ERROR, offset, format, arguments);
@@ -32,7 +32,7 @@ void report_error(Report *report, size_t offset, const char *format, ...)
 
 void report_warning(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->warning_count++ >= MESSAGES_TOLD) return;
+    if (report->warning_count++ >= MESSAGES_LARGEST) return;
     va_list arguments;
     va_start(arguments, format);
     report_add(report, MESSAGE_WARNING, offset, format, arguments);
@@ -41,7 +41,7 @@ void report_warning(Report *report, size_t offset, const char *format, ...)
 
 bool report_is_full(const Report *report)
 {
-    return report->error_count >= MESSAGES_TOLD;
+    return report->error_count >= MESSAGES_LARGEST;
 }
 
 static bool message_is_before(const Message *a, const Message *b)
@@ -49,8 +49,8 @@ static bool message_is_before(const Message *a, const Message *b)
     return a->line != b->line ? a->line < b->line : a->column < b->column;
 }
 
-// What an alias brings in several times is wrong once: whether it is among the list's messages from `first`
-// up to `end`.
+// Whether the message repeats one from `first` up to `end`: an alias brings in the same mistake several
+// times.
 static bool message_is_among(const Message *message, const MessageList *list, size_t first, size_t end)
 {
     for (size_t i = first; i < end; i++) {
@@ -69,7 +69,7 @@ bool report_close(Report *report)
     for (size_t i = report->first; i < list->count; i++) {
         Message message = list->items[i];
         if (message_is_among(&message, list, report->first, kept)) {
-            // its twin is told
+            // a repeat
             free(message.file);
             free(message.text);
             free(message.source_line);
@@ -83,8 +83,8 @@ bool report_close(Report *report)
     list->count = kept;
     if (report_is_full(report))
         message_add(list, MESSAGE_ERROR, "%s: many errors: reading stopped", report->source->file);
-    if (report->warning_count > MESSAGES_TOLD)
+    if (report->warning_count > MESSAGES_LARGEST)
         message_add(list, MESSAGE_WARNING, "%s: %zu more warnings", report->source->file,
-                    report->warning_count - MESSAGES_TOLD);
+                    report->warning_count - MESSAGES_LARGEST);
     return report->error_count == 0;
 }

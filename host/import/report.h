@@ -1,16 +1,16 @@
-// The messages of one reader about its source: bounded in number, in the source's order, each told once.
+// The messages of one reader about its source: bounded in number, in source order, without repeats.
 #pragma once
 
 #include "host/base/message.h"
 
-// How much of a word of the source a message shows, in bytes.
+// A message shows at most this many bytes of a word of the source.
 enum { WORD_SHOWN = 40 };
 
 typedef struct {
     const Source *source;
     MessageList *messages;
     size_t first;                      // of this report in `messages`
-    size_t error_count, warning_count; // also those that are not told
+    size_t error_count, warning_count; // including those beyond the limit
 } Report;
 
 Report report_open(const Source *source, MessageList *messages);
@@ -20,8 +20,9 @@ void report_error(Report *report, size_t offset, const char *format, ...)
 void report_warning(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-// So many errors that a reader may as well stop; it keeps the time for a hostile file in bounds.
+// Whether the error limit is reached: a reader stops there, which bounds the time for a hostile file.
 bool report_is_full(const Report *report);
 
-// Puts the messages in the source's order, drops repeated ones, says how many were not told. True: no error.
+// Sorts the messages into source order, drops repeats and adds a count of those beyond the limit. True if
+// there was no error.
 bool report_close(Report *report);

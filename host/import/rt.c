@@ -1,5 +1,5 @@
-// `.rt`, the scenes of miniRT: one element a line, fields separated by blanks, vectors by commas.
-// What is read and what is tolerated: docs/scene-format.md.
+// `.rt`, the scenes of miniRT: one element per line, fields separated by blanks, vectors by commas.
+// docs/scene-format.md says what is read and tolerated.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
@@ -21,7 +21,7 @@ static bool read_color(Line *line, Color *color)
     return true;
 }
 
-// A unit vector; other lengths are common, and made so. Zero stays, for the caller to judge.
+// A unit vector; other lengths are common and are normalized. Zero is returned as it is.
 static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
 {
     const double tolerated = 0.01; // files round to two or three digits
@@ -41,7 +41,7 @@ static bool read_axis(Line *line, const char *name, Vector3 *axis)
     return !vector_is_zero(*axis);
 }
 
-// The line must end here; with --lenient, what is left (textures and the like) is skipped.
+// The line must end here; with --lenient the rest (such as textures) is skipped.
 static bool element_end(RtReader *reader)
 {
     if (!reader->lenient) return line_end(&reader->line);
@@ -50,14 +50,14 @@ static bool element_end(RtReader *reader)
     return true;
 }
 
-// Whether specular and shininess follow. With --lenient a number alone is a field of some other meaning.
+// Whether specular and shininess follow. With --lenient a single number is an unknown field.
 static bool finish_follows(const RtReader *reader)
 {
     Line ahead = reader->line;
     return word_is_number(line_word(&ahead)) && (!reader->lenient || word_is_number(line_peek(&ahead)));
 }
 
-// What ends an object's line: perhaps specular and shininess, nothing else.
+// Reads the end of an object's line: optional specular and shininess.
 static bool read_finish(RtReader *reader, Material *material)
 {
     Line *line = &reader->line;
@@ -103,7 +103,7 @@ static bool read_camera(RtReader *reader, Camera *camera)
         report_warning(&reader->report, offset, "'direction' is zero: looks along +z");
         direction = (Vector3){0, 0, 1};
     }
-    // Far from the origin a step of one could be lost in rounding.
+    // Far from the origin a step of 1 may be lost in rounding.
     double step = fmax(1, vector_length(camera->position));
     camera->look_at = vector_add(camera->position, vector_scale(direction, step));
     camera->up = (Vector3){0, 1, 0};
@@ -122,7 +122,7 @@ static bool read_only_camera(RtReader *reader)
     return read_camera(reader, &reader->scene->camera);
 }
 
-// The older subject's `c`, of which a file may have several.
+// The older subject's `c`, which a file may repeat.
 static bool read_one_camera(RtReader *reader)
 {
     if (!reader->has_camera) return read_only_camera(reader);
@@ -215,7 +215,7 @@ static bool read_cylinder(RtReader *reader)
     return true;
 }
 
-// The bonus cone: its base at the point, its tip a height along the axis.
+// The bonus cone: base center, axis towards the tip, height.
 static bool read_cone(RtReader *reader)
 {
     Line *line = &reader->line;
@@ -233,8 +233,7 @@ static bool read_cone(RtReader *reader)
     return true;
 }
 
-// A square's sides run level and upward: along the horizontal of its plane, and across it. The subject leaves
-// the turn about the normal open.
+// A square has one pair of horizontal sides; the subject leaves the rotation about the normal unspecified.
 static bool read_square(RtReader *reader)
 {
     Vector3 center, normal;
@@ -273,7 +272,7 @@ static bool read_triangle(RtReader *reader)
     return true;
 }
 
-// Each reads the rest of its line; reports and returns false at the first fault.
+// Each reads the rest of its line. Reports the first error and returns false.
 static const struct {
     const char *name;
     bool (*read)(RtReader *reader);

@@ -1,6 +1,5 @@
-// What assimp would not survive in a glTF file: it goes down into lists, and from node to node, by recursion,
-// and copies a node for each of those that name it. The format itself allows a node one parent
-// (glTF 2.0, 3.5.2).
+// What assimp does not survive in a glTF file: it descends into lists and nodes by recursion and copies a
+// node for each reference to it. The format allows a node one parent (glTF 2.0, 3.5.2).
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
@@ -27,12 +26,12 @@ typedef struct {
 
 typedef enum { KEY_OTHER, KEY_ESCAPED, KEY_NODES, KEY_SCENES, KEY_CHILDREN } Key;
 
-// The JSON is read as far as it goes: what is none stays for assimp to refuse.
+// The JSON is read up to its first error, which assimp rejects.
 typedef struct {
     const char *at, *end;
-    size_t depth;                    // of lists and objects that are open
-    size_t index[LISTS_DEEPEST + 1]; // of the item at each depth
-    Key key[LISTS_DEEPEST + 1];      // the last at each depth
+    size_t depth;                    // of nested lists and objects
+    size_t index[LISTS_DEEPEST + 1]; // current item at each depth
+    Key key[LISTS_DEEPEST + 1];      // last key at each depth
     size_t node_count;
     Links children, scene_nodes;
     char *fault;
@@ -58,7 +57,7 @@ static char next_character(const Search *search)
     return at < search->end ? *at : '\0';
 }
 
-// Of the keys that count here none needs an escape.
+// None of the relevant keys needs an escape.
 static bool string_is_faulty(Search *search)
 {
     const char *text = search->at;
@@ -117,7 +116,7 @@ static bool json_is_faulty(Search *search)
     return false;
 }
 
-// How often the scenes place each node is how often they name it or one above it.
+// A scene instantiates each node once per reference to it or to one of its ancestors.
 static bool tree_is_faulty(Search *search, const size_t *parents, const size_t *named)
 {
     size_t placed_count = 0;
@@ -136,7 +135,7 @@ static bool tree_is_faulty(Search *search, const size_t *parents, const size_t *
     return false;
 }
 
-// Nodes that are not there stay for assimp to refuse.
+// assimp rejects references to missing nodes.
 static bool nodes_are_faulty(Search *search)
 {
     size_t *parents = memory_allocate(search->node_count + 1, sizeof *parents);
@@ -158,7 +157,7 @@ static bool nodes_are_faulty(Search *search)
     return faulty;
 }
 
-// The whole file, or of a binary one its JSON: the length of that stands at byte 12, it itself at 20.
+// The whole file, or the JSON chunk of a binary one: its length is at byte 12, its text at byte 20.
 static bool json_read(Text *json, const char *path, bool binary)
 {
     FILE *file = fopen(path, "rb");

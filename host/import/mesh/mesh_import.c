@@ -1,6 +1,6 @@
-// Mesh files through assimp, as it reads them: what it would make of them stays unused. Its joining of
-// vertices and its making of normals go by absolute distances and would bend small meshes; its cutting of
-// polygons goes to vertices that are not there, and leaves out parts of concave ones.
+// Mesh files through assimp, without its post-processing: joining vertices and generating normals there use
+// absolute distances, which distorts small meshes; its triangulation reads missing vertices and drops parts
+// of concave polygons.
 #include "host/import/mesh/mesh_import.h"
 #include "host/base/array.h"
 #include "host/base/memory.h"
@@ -25,7 +25,7 @@ typedef struct {
     double rows[3][4];
 } Affine;
 
-// A mesh of the file where one of its nodes puts it.
+// An instance: a mesh of the file under the transform of one of its nodes.
 typedef struct {
     const struct aiMesh *mesh;
     Affine affine;
@@ -41,11 +41,11 @@ typedef struct {
         Placed *items;
         size_t count, capacity;
     } placed;
-    uint32_t *materials; // of the scene, for each of the file's; UINT32_MAX: not there yet
+    uint32_t *materials; // scene index of each of the file's materials; UINT32_MAX: not added yet
     struct {
         Vector3 *items;
         size_t count, capacity;
-    } corners; // of the polygon being cut
+    } corners; // of the current polygon
     PolygonTriangles cut;
     size_t crossed_count;
     Mesh mesh;
@@ -91,7 +91,7 @@ static double affine_determinant(const Affine *affine)
     return vector_dot(affine_row(affine, 0), vector_cross(affine_row(affine, 1), affine_row(affine, 2)));
 }
 
-// Takes normals along: the transposed inverse times |determinant|, whose rows are cross products of rows.
+// Transforms normals: the transposed inverse times |determinant|, whose rows are cross products of rows.
 static Affine affine_for_normals(const Affine *affine)
 {
     double side = affine_determinant(affine) < 0 ? -1 : 1;
@@ -139,7 +139,7 @@ static Affine affine_of_transform(const MeshTransform *transform)
 
 static bool import_fails(Importer *importer, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-// Reports with the mesh file's name; always false. Of a text of several lines only the first is told.
+// Reports with the mesh file's name, the first line of the text only; always false.
 static bool import_fails(Importer *importer, const char *format, ...)
 {
     char text[512];
@@ -152,7 +152,7 @@ static bool import_fails(Importer *importer, const char *format, ...)
     return false;
 }
 
-// For OBJ files, whose vertices assimp renumbers, the place in the file itself.
+// assimp renumbers the vertices of OBJ files; the message gives the place in the file.
 static bool vertex_fails(Importer *importer, const char *otherwise)
 {
     char fault[200];
@@ -217,11 +217,11 @@ static void default_taken(const Importer *importer, const struct aiMaterial *mat
     aiGetMaterialString(material, AI_MATKEY_NAME, &name);
     name.data[strcspn(name.data, "\r\n")] = '\0';
     report_warning(importer->report, importer->offset,
-                   "%s: a %s of material '%.40s' is not finite or too large: the default is taken",
+                   "%s: a %s of material '%.40s' is not finite or too large: using the default",
                    importer->import->path, what, name.data);
 }
 
-// Key, type and index are what assimp's AI_MATKEY_… stand for.
+// Key, type and index: what assimp's AI_MATKEY_… expand to.
 static Color color_of(const Importer *importer, const struct aiMaterial *material, const char *key,
                       unsigned type, unsigned index, Color otherwise)
 {
@@ -244,7 +244,7 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
     return otherwise;
 }
 
-// Highlights have the light's color here, so that of the file's only the strength is kept.
+// glint's highlights have the light's color; only the strength of the file's specular color is kept.
 static Material material_of(const Importer *importer, const struct aiMaterial *file_material)
 {
     Material material = material_default();
@@ -266,7 +266,7 @@ static uint32_t material_index(Importer *importer, unsigned index)
     struct aiString name = {0};
     aiGetMaterialString(file_material, AI_MATKEY_NAME, &name);
     Material material = material_default();
-    // what assimp makes up where the file has none
+    // assimp's default where the file has none
     if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) material = material_of(importer, file_material);
     *known = scene_add_material(importer->scene, &material, name.data);
     return *known;
@@ -291,7 +291,7 @@ static void vertices_add(Importer *importer, const Placed *placed)
     }
 }
 
-// Asked before the transform, which would give what is nothing in the file a rounding's width.
+// Tested before the transform, whose rounding would give an empty mesh a width.
 static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
 {
     Vector3 a = vector_of(&mesh->mVertices[corners[0]]), b = vector_of(&mesh->mVertices[corners[1]]),
@@ -299,7 +299,7 @@ static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
     return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
 }
 
-// A mirrored mesh is turned inside out again, so that its triangles keep their outer side.
+// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
 static void triangle_add(Importer *importer, const Placed *placed, bool mirrored, const unsigned corners[3])
 {
     Mesh *mesh = &importer->mesh;
@@ -313,8 +313,8 @@ static void triangle_add(Importer *importer, const Placed *placed, bool mirrored
     mesh->triangle_count++;
 }
 
-// Cut from the second corner on, so that of a convex quadrilateral the diagonal starts at the first. One
-// without area, all in all, becomes a fan.
+// Triangulated from the second corner, so that the diagonal of a convex quadrilateral starts at the first. A
+// polygon without area becomes a fan.
 static void polygon_add(Importer *importer, const Placed *placed, bool mirrored, const struct aiFace *face)
 {
     const unsigned count = face->mNumIndices, *indices = face->mIndices;
@@ -335,7 +335,7 @@ static void polygon_add(Importer *importer, const Placed *placed, bool mirrored,
     }
 }
 
-// What no face uses may be anything.
+// Vertices that no face uses are not checked.
 static bool corner_is_sound(Importer *importer, const struct aiMesh *from, unsigned vertex)
 {
     const Mesh *mesh = &importer->mesh;
@@ -389,7 +389,7 @@ static bool faces_add(Importer *importer, const Placed *placed)
     return true;
 }
 
-// Of a mesh's faces, once they are cut, at the most.
+// Upper bound on a mesh's triangles after triangulation.
 static size_t triangles_count(const struct aiMesh *mesh)
 {
     size_t count = 0;
@@ -398,7 +398,7 @@ static size_t triangles_count(const struct aiMesh *mesh)
     return count;
 }
 
-// Room for all placed meshes. `normals` and `uvs` are there where any of them has some.
+// Allocates for all instances; `normals` and `uvs` only if any of them has some.
 static bool mesh_reserve(Importer *importer)
 {
     size_t vertex_count = 0, triangle_count = 0;

@@ -1,5 +1,4 @@
-// Where the fault in an OBJ file lies that assimp refused or brought in: assimp names no line, and its
-// vertices are not the file's.
+// Locates an error in an OBJ file: assimp names no line, and it renumbers the vertices.
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/import/line.h"
@@ -12,8 +11,8 @@
 typedef struct {
     Line line;
     size_t line_number, vertex_count, all_vertex_count;
-    const bool *used; // by faces: each vertex from 1
-    bool unused_too;  // whether the others count
+    const bool *used; // by a face; each vertex, from 1
+    bool unused_too;  // check the other vertices too
     char *fault;
     size_t size;
 } Search;
@@ -35,7 +34,7 @@ static bool vertex_is_faulty(Search *search)
     return false;
 }
 
-// From 1, 0 where there is no such vertex. A negative index counts back from the last vertex before the face.
+// 1-based; 0 if there is no such vertex. A negative index counts back from the last vertex before the face.
 static size_t vertex_of(Word word, size_t vertex_count, size_t all_vertex_count)
 {
     long long index = strtoll(word.text, NULL, 10);
@@ -90,7 +89,7 @@ static bool lines_search(Search search)
     return false;
 }
 
-// A vertex that no face uses may be what assimp stumbles over, but is so only where nothing else is wrong.
+// A vertex that no face uses is reported only if nothing else is wrong.
 static bool fault_search(Search *search)
 {
     search->all_vertex_count = vertices_count(search->line);

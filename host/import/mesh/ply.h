@@ -1,4 +1,4 @@
-// A PLY file's text while it is read: its header, and where the reading stands.
+// A PLY file being read: its header and the read position.
 #pragma once
 
 #include "host/base/text.h"
@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-// Text of the file, not ended by a NUL.
+// Text of the file, without a terminating NUL.
 typedef struct {
     const char *at, *end;
 } PlySpan;
@@ -21,7 +21,7 @@ typedef struct {
 
 typedef struct {
     PlySpan name;
-    const PlyType *type, *count_type; // `count_type` of a list's length; NULL: no list
+    const PlyType *type, *count_type; // `count_type`: of a list's length; NULL: not a list
 } PlyProperty;
 
 typedef struct {
@@ -45,9 +45,9 @@ typedef struct {
 
 typedef struct {
     const char *start;
-    PlySpan left; // what is not read yet
+    PlySpan left; // unread
     size_t line_number;
-    bool by_bytes; // places are told as bytes from 0, not as lines
+    bool by_bytes; // errors give a byte offset instead of a line
     char *fault;
     size_t fault_size;
 } PlyReading;
@@ -57,7 +57,7 @@ static inline bool ply_is_blank(char character)
     return character == ' ' || character == '\t';
 }
 
-// Goes to the next word of a line, or to its end.
+// Skips blanks up to the next word of a line or its end.
 static inline const char *ply_word_start(PlySpan *line)
 {
     while (line->at < line->end && ply_is_blank(*line->at))
@@ -65,17 +65,17 @@ static inline const char *ply_word_start(PlySpan *line)
     return line->at;
 }
 
-// The next line without its end, which is a newline, a carriage return or both. False at the end of the file,
-// counted as the line that is missing there.
+// The next line without its end, which is a newline, a carriage return or both. False at the end of the file;
+// the line number is then that of the missing line.
 bool ply_line(PlyReading *reading, PlySpan *line);
 // The next word of a line, empty at its end. Words are separated by spaces and tabs.
 PlySpan ply_word(PlySpan *line);
 bool ply_span_is(PlySpan span, const char *text);
-int ply_shown(PlySpan span); // how many bytes of it a message shows
+int ply_shown(PlySpan span); // bytes of it that a message shows
 
-// Notes the fault as `line N: what` or `byte N: what`; always false.
+// Writes the error as `line N: what` or `byte N: what`; always false.
 bool ply_fails(PlyReading *reading, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-// Up to the first byte of the body. False, with the fault, where there is no such header.
+// Reads up to the first byte of the body. False with an error if there is no valid header.
 bool ply_header_read(PlyHeader *header, PlyReading *reading);
 void ply_header_free(PlyHeader *header);

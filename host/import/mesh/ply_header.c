@@ -71,7 +71,7 @@ static bool format_read(PlyHeader *header, PlyReading *reading, PlySpan line)
            ply_fails(reading, "'%.*s' is no format of PLY", ply_shown(word), word.at);
 }
 
-// Of more digits no file holds that many.
+// No file holds as many rows as a longer number says.
 static bool count_read(PlySpan word, size_t *count)
 {
     enum { DIGITS_MOST = 18 };
@@ -132,7 +132,7 @@ static bool property_read(PlyHeader *header, PlyReading *reading, PlySpan line)
     return true;
 }
 
-// Lines that are none of PLY's are let go, as comments are.
+// Lines with unknown keywords are ignored, like comments.
 static bool header_line_read(PlyHeader *header, PlyReading *reading, PlySpan line)
 {
     PlySpan keyword = ply_word(&line);

@@ -1,7 +1,6 @@
-// PLY files for assimp. Its reader makes whatever a list promises before it looks, repeats the last line of a
-// file that is too short, takes a last line without its end together with what stood in the line before, and
-// loses its place at elements it does not know, at second blanks and at empty lines. So it is given the file
-// written anew, without any of these, and only once the file holds all that it promises.
+// PLY files for assimp, whose reader allocates whatever length a list claims, repeats the last line of a file
+// that is too short, misreads a last line without a newline, and misparses unknown elements, repeated blanks
+// and empty lines. It gets the file rewritten without any of these, once the file is known to be complete.
 #include "host/base/array.h"
 #include "host/import/mesh/mesh_import.h"
 #include "host/import/mesh/ply.h"
@@ -18,12 +17,12 @@ typedef struct {
     PlyReading reading;
     Text *clean;
     size_t header_size;        // of `clean`
-    const PlyElement *element; // whose rows are being read, and the row
-    bool wanted;               // by assimp: the element
-    PlySpan kept;              // lines, one after the other, that are not written yet
+    const PlyElement *element; // of the current row, and the row's index
+    bool wanted;               // assimp uses the element
+    PlySpan kept;              // consecutive lines not written yet
     size_t row;
-    const PlyProperty *corners, *coordinates; // the element's lists of them; NULL: none
-    double corner_count, coordinate_count;    // of the row
+    const PlyProperty *corners, *coordinates; // the element's lists; NULL: none
+    double corner_count, coordinate_count;    // of the current row
 } Body;
 
 static const PlyProperty *properties_of(const Body *body, const PlyElement *element)
@@ -47,7 +46,7 @@ static bool is_wanted(const PlyElement *element)
     return element->property_count > 0 && IS_ONE_OF(element->name, "vertex", "face", "material");
 }
 
-// Of the numbers a row can do without assimp takes the first, which an empty list lacks.
+// assimp reads the first item of an optional list even if the list is empty.
 static bool name_is_wanted(const PlyElement *element, const PlyProperty *property)
 {
     if (property->count_type)
@@ -89,7 +88,7 @@ static void header_write(Body *body)
     body->header_size = body->clean->count;
 }
 
-// A newline right after the header's assimp takes for a part of that, unless a carriage return stands before.
+// assimp takes a newline right after the header for part of it unless a carriage return precedes.
 static void rows_write(Body *body, PlySpan rows)
 {
     if (body->clean->count == body->header_size && rows.at < rows.end && *rows.at == '\n') {
@@ -105,8 +104,8 @@ static bool names_agree(PlySpan a, PlySpan b)
     return length == (size_t)(b.end - b.at) && !memcmp(a.at, b.at, length);
 }
 
-// Of an element told of twice assimp would write the second's rows beyond the first's, and of a strip it
-// keeps one triangle alone.
+// If an element is declared twice, assimp writes the second's rows beyond the first's; of a triangle strip it
+// keeps one triangle.
 static bool elements_are_sound(Body *body)
 {
     const PlyElement *elements = body->header.elements.items;
@@ -116,7 +115,7 @@ static bool elements_are_sound(Body *body)
             return ply_fails(&body->reading, "strips of triangles (tristrips) are not read, only faces");
         for (size_t k = 0; k < i && is_wanted(&elements[i]); k++)
             if (names_agree(name, elements[k].name))
-                return ply_fails(&body->reading, "the header tells of '%.*s' twice", ply_shown(name),
+                return ply_fails(&body->reading, "the header declares '%.*s' twice", ply_shown(name),
                                  name.at);
     }
     return true;
@@ -127,7 +126,7 @@ static bool is_digit(char character)
     return character >= '0' && character <= '9';
 }
 
-// More digits before the point, or in an exponent, overflow in assimp.
+// More digits before the point or in an exponent overflow in assimp.
 static const char *digits_skip(const char *at, const char *end)
 {
     enum { DIGITS_MOST = 19 };
@@ -142,7 +141,7 @@ static const char *sign_skip(const char *at, const char *end)
     return at < end && (*at == '-' || *at == '+') ? at + 1 : at;
 }
 
-// Behind the number that starts at `at`; NULL: none does that assimp takes for what it is.
+// The end of the number that starts at `at`; NULL if assimp would not read it as that number.
 static const char *whole_skip(const char *at, const char *end, PlyNumberKind kind)
 {
     const char *first = kind == PLY_SIGNED ? sign_skip(at, end) : at;
@@ -185,7 +184,7 @@ static bool row_fails(Body *body, const PlyProperty *property, const char *what)
                      what, ply_shown(property->name), property->name.at);
 }
 
-// Reads the line's next word, where there is one.
+// Reads the line's next word, if any.
 static bool word_read(Body *body, const PlyType *type, PlySpan *line, PlySpan *word)
 {
     const char *start = ply_word_start(line), *end = line->end;
@@ -212,7 +211,7 @@ static bool list_fails(Body *body, const PlyProperty *property, double promised,
                        const char *holder)
 {
     PlySpan element = body->element->name;
-    return ply_fails(&body->reading, "%.*s %zu (from 0) promises %.15g numbers of '%.*s', %s holds %zu more",
+    return ply_fails(&body->reading, "%.*s %zu (from 0) declares %.15g numbers of '%.*s', %s has %zu more",
                      ply_shown(element), element.at, body->row, promised, ply_shown(property->name),
                      property->name.at, holder, held);
 }
@@ -228,7 +227,7 @@ static void list_note(Body *body, const PlyProperty *property, double count)
     if (property == body->coordinates) body->coordinate_count = count;
 }
 
-// Assimp takes coordinates for corners that are not there, too.
+// assimp also reads texture coordinates for corners that do not exist.
 static bool row_is_sound(Body *body)
 {
     if (body->coordinate_count <= 2 * body->corner_count) return true;
@@ -262,7 +261,7 @@ static bool line_list_read(Body *body, const PlyProperty *property, PlySpan *lin
     return true;
 }
 
-// The next line that is not empty.
+// The next nonempty line.
 static bool line_row_start(Body *body, PlySpan *line)
 {
     PlySpan name = body->element->name;
@@ -282,7 +281,7 @@ static void kept_write(Body *body)
     body->kept = (PlySpan){0};
 }
 
-// What stands as it should is written in one piece.
+// Well-formed input is copied in one piece.
 static void line_keep(Body *body, PlySpan line)
 {
     PlySpan *kept = &body->kept;
@@ -294,7 +293,7 @@ static void line_keep(Body *body, PlySpan line)
     *kept = line;
 }
 
-// A row is a line, in which what follows the last property is let go.
+// A row is a line; what follows the last property is ignored.
 static bool line_row_read(Body *body)
 {
     PlySpan line, word;

@@ -49,7 +49,7 @@ bool key_is_word(YamlReader *reader, const YamlNode *key)
     return false;
 }
 
-// Index of the field that a key names, or field_count.
+// Index of the field named by the key, or field_count.
 static size_t field_find(const YamlReader *reader, const YamlNode *key, const Field *fields,
                          size_t field_count)
 {
@@ -59,7 +59,7 @@ static size_t field_find(const YamlReader *reader, const YamlNode *key, const Fi
     return index;
 }
 
-// Leaves in `forms` those that the key allows. `seen`: the fields before it.
+// Keeps in `forms` those that the key allows. `seen`: the fields before it.
 static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *field, const Field *fields,
                         const bool *seen, unsigned *forms)
 {

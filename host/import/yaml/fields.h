@@ -1,4 +1,4 @@
-// Typed access to the mappings of a YAML scene, by tables of fields, with a message for every mistake.
+// Typed access to the mappings of a YAML scene by tables of fields, with a message for every mistake.
 #pragma once
 
 #include "host/import/number.h"
@@ -26,10 +26,10 @@ typedef struct {
 
 typedef struct Field Field;
 
-// Reads the value of `field` at `node` to `target`; reports and returns false where it does not fit.
+// Reads the value of `field` at `node` into `target`; reports an error and returns false if it is invalid.
 typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode *node, void *target);
 
-// The ways a mapping can be written; keys of different forms exclude each other.
+// Alternative forms of a mapping; keys of different forms exclude each other.
 typedef enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_ANY = 7 } Form;
 
 enum { OPTIONAL = false, REQUIRED = true };
@@ -37,37 +37,37 @@ enum { OPTIONAL = false, REQUIRED = true };
 struct Field {
     const char *name;
     FieldReader *read;
-    size_t offset; // in the struct that the mapping fills
+    size_t offset; // in the target struct
     unsigned forms;
-    bool required;      // in its forms
-    const Range *range; // of its numbers; NULL: any
+    bool required;      // within its forms
+    const Range *range; // of its values; NULL: any
 };
 
-// Fills `target` from a mapping, called `what` in messages. `form`: which way it is written; may be NULL.
-// Fields that are not there are left as they were. True: nothing was reported.
+// Fills `target` from a mapping, called `what` in messages. `form` receives the mapping's form; may be NULL.
+// Missing fields leave their members unchanged. True if nothing was reported.
 bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target, Form *form);
 
-// The value of a key that fields_read has seen; the mapping itself if it has not.
+// The value of a key, or the mapping itself if the key is missing.
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name);
 
-// Reports and returns false where a key is a list or a mapping.
+// Reports an error and returns false if a key is a list or a mapping.
 bool key_is_word(YamlReader *reader, const YamlNode *key);
 
-// The mapping's only key and its value, such as `sphere: {…}`; reports and returns false for anything else.
+// The only key of a mapping and its value, as in `sphere: {…}`; reports an error and returns false otherwise.
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value);
 
-// Values: to a `const YamlNode *`, double, Vector3, Vector3 that is not zero, Color, Color from one or three
-// numbers, bool. Numbers keep to the field's range.
+// Target types: `const YamlNode *`, double, Vector3, nonzero Vector3, Color, Color from one or three numbers,
+// bool. Numbers must lie in the field's range.
 FieldReader read_node, read_number, read_vector, read_direction, read_color, read_factors, read_boolean;
 
-// A list of exactly `count` values of `size` bytes, each read by `read`; `what` as in "three numbers".
+// Reads a list of exactly `count` values of `size` bytes, each by `read`; `what` as in "three numbers".
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target);
 
-// `must be …, not 'text'` at the node.
+// Reports `must be …, not 'text'` at the node.
 void expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
-// `unknown kind 'word'`, with the nearest known word where one is near.
+// Reports `unknown kind 'word'`, with a suggestion if a known word is similar.
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
                     size_t known_count);

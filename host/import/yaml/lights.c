@@ -26,7 +26,7 @@ static const Field directional_fields[] = {
     COLOR,
 };
 
-// `look_at` and `direction` share a place: the former becomes a direction in the end.
+// `look_at` and `direction` share a member: a target becomes a direction at the end.
 static const Field spot_fields[] = {
     {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
     {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED, NULL},

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// So that wrong names and many pictures in a hostile file cost little.
+// Bounds the cost of wrong names and many textures in a hostile file.
 enum { NAMES_COMPARED = 1000, IMAGES_LARGEST = 1000 };
 
 typedef struct {
@@ -46,7 +46,7 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     return path.items;
 }
 
-// Materials with the same picture share it.
+// Materials with the same texture share it.
 static bool read_image(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Scene *scene = reader->scene;
@@ -56,7 +56,7 @@ static bool read_image(YamlReader *reader, const Field *field, const YamlNode *n
     while (index < scene->images.count && strcmp(scene->images.items[index].path, path) != 0)
         index++;
     if (index == IMAGES_LARGEST) {
-        report_error(&reader->report, node->offset, "more than %d pictures", IMAGES_LARGEST);
+        report_error(&reader->report, node->offset, "more than %d textures", IMAGES_LARGEST);
         free(path);
         return false;
     }

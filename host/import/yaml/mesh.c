@@ -1,4 +1,4 @@
-// `mesh:` of the native format.
+// `mesh:` of YAML scenes.
 #include "host/base/array.h"
 #include "host/import/mesh/mesh_import.h"
 #include "host/import/yaml/yaml.h"
@@ -12,7 +12,7 @@ typedef struct {
     bool smooth;
 } MeshFields;
 
-// One number for all axes, or three; none is 0.
+// One number for all axes or three; none may be 0.
 static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Vector3 *scale = target;

@@ -45,7 +45,7 @@ static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, O
     return false;
 }
 
-// `from` and `to` share places with `point` and `axis`: the finite form's `to` becomes the axis in the end.
+// `from` and `to` share members with `point` and `axis`: the finite form's `to` becomes the axis at the end.
 static const Field cylinder_fields[] = {
     {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FIRST, REQUIRED, NULL},
     {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FIRST, REQUIRED, NULL},
@@ -140,17 +140,17 @@ static const Field torus_fields[] = {
 };
 
 typedef struct {
-    Object start; // what the fields leave as it is
+    Object start; // defaults
     const Field *fields;
     size_t field_count;
-    // What the fields cannot say one by one; reports and returns false where they do not fit together. May be
-    // NULL.
+    // Checks fields against each other and derives members. Reports an error and returns false if they do not
+    // fit. May be NULL.
     bool (*finish)(YamlReader *reader, const YamlNode *mapping, Form form, Object *object);
 } Shape;
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
 
-// In the order of ShapeKind; a mesh has its own reader.
+// Indexed by ShapeKind; a mesh has its own reader.
 static const Shape shapes[SHAPE_MESH] = {
     {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL},
     {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL},

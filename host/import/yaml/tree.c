@@ -22,7 +22,7 @@ typedef struct {
     Report *report;
     OpenNode open[DEPTH_LIMIT];
     size_t depth;
-    size_t end; // of the last event, where an empty value stands
+    size_t end; // of the last event: the position of an empty value
     struct {
         Anchor *items;
         size_t count, capacity;
@@ -44,8 +44,8 @@ static void node_append(TreeBuilder *builder, YamlNode node)
     parent->last_child = index;
 }
 
-// Chunk by chunk: libfyaml 0.7's fy_token_get_text loses memory on some quoted texts of several lines, and
-// its fy_token_iter_read mixes up the chunks.
+// Chunk by chunk: libfyaml 0.7's fy_token_get_text leaks on some quoted texts of several lines, and its
+// fy_token_iter_read returns chunks in the wrong order.
 static bool token_append_text(Text *text, struct fy_token *token)
 {
     struct fy_token_iter *iterator = fy_token_iter_create(token);
@@ -190,7 +190,7 @@ static size_t place_offset(const Source *source, int line, int column)
     return at;
 }
 
-// `end`: how far the parser came, for the few faults it says nothing about.
+// `end`: how far the parser came, for the few errors it does not describe.
 static void syntax_report(struct fy_diag *diagnostics, Report *report, size_t end)
 {
     void *iterator = NULL;
@@ -228,7 +228,7 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
     return true;
 }
 
-// Checked first: libfyaml 0.7 takes other bytes for the end of the text, or never ends.
+// Checked first: libfyaml 0.7 stops at other bytes or never returns.
 static bool source_is_text(const Source *source, Report *report)
 {
     for (size_t at = 0, size; at < source->length; at += size) {

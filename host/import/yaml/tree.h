@@ -1,5 +1,5 @@
-// A YAML document as a tree of nodes that know their place. Parsing is libfyaml's; the tree is ours, because
-// it keeps byte offsets, and aliases that share what they name, so that no document grows when it is read.
+// A YAML document as a tree of nodes with byte offsets. libfyaml parses; this tree keeps offsets, and aliases
+// share their target, so that no document expands while it is read.
 #pragma once
 
 #include "host/base/text.h"
@@ -10,9 +10,9 @@ typedef enum { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING } YamlKind;
 
 typedef struct {
     YamlKind kind;
-    size_t offset;        // of its first byte in the source
-    size_t text;          // scalar: where its text starts in the tree's texts
-    uint32_t first, next; // first child, next sibling; 0: none (the root is nobody's child)
+    size_t offset;        // of the first byte, in the source
+    size_t text;          // scalar: start of its text in the tree's texts
+    uint32_t first, next; // first child, next sibling; 0: none
     uint32_t child_count; // mapping: keys and values
 } YamlNode;
 
@@ -20,12 +20,12 @@ typedef struct {
     struct {
         YamlNode *items;
         size_t count, capacity;
-    } nodes;    // the first is the root
+    } nodes;    // root first
     Text texts; // of all scalars, each ended by a NUL
 } YamlTree;
 
-// False, with the errors reported: not well-formed, empty, several documents, tags, deeper than any scene
-// needs.
+// Reports errors and returns false if the text is malformed, empty, nested too deeply, or has several
+// documents or tags.
 bool yaml_tree_read(YamlTree *tree, Report *report);
 void yaml_tree_free(YamlTree *tree);
 

@@ -1,4 +1,4 @@
-// The native format: the whole document and its camera. Reference: docs/scene-format.md.
+// YAML scenes: the document and its camera. Reference: docs/scene-format.md.
 #include "host/import/yaml/yaml.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
