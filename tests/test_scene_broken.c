@@ -94,7 +94,7 @@ static void test_nff(void **state)
     check_folder("tests/broken/nff", ".nff");
 }
 
-// The longest part of a format that is told as it stands, to find the message by.
+// The longest literal part of a format, which identifies the message.
 static char *format_core(const char *format, size_t length)
 {
     const char *longest = format;
@@ -130,21 +130,27 @@ static size_t check_source(const char *path)
     return count;
 }
 
-// Runs after the folders were read.
-static void test_every_message_has_a_scene(void **state)
+static size_t check_sources(const char *folder)
 {
-    (void)state;
-    DIR *entries = opendir("host/scene");
+    DIR *entries = opendir(folder);
     assert_non_null(entries);
     size_t count = 0;
     for (const struct dirent *entry; (entry = readdir(entries));) {
         if (!name_ends_with(entry->d_name, ".c")) continue;
         Text path = {0};
-        text_appendf(&path, "host/scene/%s", entry->d_name);
+        text_appendf(&path, "%s/%s", folder, entry->d_name);
         count += check_source(text_c(&path));
         text_free(&path);
     }
     closedir(entries);
+    return count;
+}
+
+// Runs after all broken scenes are read.
+static void test_every_message_has_a_scene(void **state)
+{
+    (void)state;
+    size_t count = check_sources("host/import") + check_sources("host/import/yaml");
     assert_in_range(count, 40, SIZE_MAX);
     text_free(&all_expected);
 }
