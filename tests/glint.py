@@ -1,7 +1,7 @@
 """Shared by the Python tests: runs the program in a folder of its own and reads the files that it writes.
 
-Tests are the executable tests/test_*.py; other Python files are helpers. A test finds the program in GLINT and its build folder
-in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG_CACHE_HOME, shared by the tests of a run.
+Tests are the executable tests/test_*.py; other Python files are helpers. A test finds the program in GLINT and its build
+folder in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG_CACHE_HOME, shared by the tests of a run.
 """
 import ast
 import csv
@@ -42,8 +42,8 @@ def run(command, wrapper=(), env=None, **options):
     """The finished process of `glint COMMAND`; a wrapper is the command that starts the program."""
     options = {"stdin": subprocess.DEVNULL} | options if "input" not in options else options
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
-    environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"}
-    return subprocess.run([*wrapper, PROGRAM, *shlex.split(command)], env=environment | {"LC_ALL": "C"} | (env or {}), **options)
+    environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"} | {"LC_ALL": "C"}
+    return subprocess.run([*wrapper, PROGRAM, *shlex.split(command)], env=environment | (env or {}), **options)
 
 
 def need_device():
@@ -58,7 +58,8 @@ def need_modules(*modules):
     """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip; skips it where there is none."""
     script = '. tests/support.bash; python_with "$@" && echo "$python"'
     cache = {"XDG_CACHE_HOME": os.path.expanduser("~/.cache")} | os.environ
-    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, env=cache, stdout=subprocess.PIPE, text=True)
+    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, env=cache, stdout=subprocess.PIPE,
+                             text=True)
     if process.returncode != 0:
         print(process.stdout, end="")
         sys.exit(process.returncode)
@@ -109,15 +110,21 @@ def write(path, text):
     return path
 
 
+def read(path):
+    return Path(path).read_text(encoding="utf-8")
+
+
 def npy_read(path):
-    """Shape, type and values of an array of float, double or unsigned."""
+    """Shape, type and pixels of an image of float, double or unsigned: numbers, or tuples where it has channels."""
     data = Path(path).read_bytes()
     assert data[:8] == b"\x93NUMPY\x01\x00", path
     (length,) = struct.unpack("<H", data[8:10])
     head = ast.literal_eval(data[10 : 10 + length].decode())
     assert not head["fortran_order"]
     letter = {"<f4": "f", "<f8": "d", "<u4": "I"}[head["descr"]]
-    return head["shape"], head["descr"], struct.unpack(f"<{math.prod(head['shape'])}{letter}", data[10 + length :])
+    channels = math.prod(head["shape"][2:])
+    pixels = list(struct.iter_unpack(f"<{channels}{letter}", data[10 + length :]))
+    return head["shape"], head["descr"], pixels if head["shape"][2:] else [value for (value,) in pixels]
 
 
 def png_read(path):
@@ -138,7 +145,9 @@ def png_read(path):
 
 
 def csv_rows(text):
-    return list(csv.reader(text.splitlines()))
+    """Lists of numbers below the head, None where a cell is empty."""
+    head, *rows = csv.reader(text.splitlines())
+    return head, [[float(cell) if cell else None for cell in row] for row in rows]
 
 
 def main():

@@ -1,0 +1,370 @@
+#!/usr/bin/env -S python3 -B
+"""The command line as a user meets it: every option, every message about a wrong one, the exit status, what is printed
+where, and that a failure leaves an earlier image as it was."""
+import glob
+import itertools
+import math
+import os
+import re
+import resource
+import signal
+import subprocess
+import time
+import unittest
+from pathlib import Path
+
+from glint import (
+    PROGRAM, ROOT, SPHERE, TestCase, csv_rows, find_icd, main, need_device, npy_read, png_read, read, run, write,
+)
+
+SMALL = "--size 8x6 --quiet"
+SCENES = ROOT / "tests/scenes"
+
+# Key words of the message, and the command lines that get it: {A|B} stands for A and for B.
+WRONG_COMMAND_LINES = [
+    ("usage: glint COMMAND", ""),
+    ('"rendr".*did you mean render', "rendr sphere.yaml"),
+    ('no command "zzzzzz"$', "zzzzzz"),
+    ("scene.*--help", "{render|trace|check}"),
+    ("one scene", "{render|trace|check} sphere.yaml other.yaml"),
+    ("'--nonsense'", "{render sphere.yaml|trace sphere.yaml|check sphere.yaml|devices} --nonsense"),
+    ("rays", "trace sphere.yaml"),
+    ("requires an argument", "render sphere.yaml --size"),
+    ("--size: expected", "render sphere.yaml --size {0x5|5x0|5|5x|5x5x5|-5x5|1048577x4|99999999999x4|wide}"),
+    ("--samples: expected", "render sphere.yaml --samples {0|-1|1.5|many|1048577|99999999999999999999}"),
+    ("--region: expected",
+     "render sphere.yaml --region {1,2,3|1,2,3,4,5|1,2,0,4|1,2,3,0|-1,0,2,2|a,b,c,d|1,2,3,4x|9999999999,0,1,1}"),
+    ("--region: .*8x6", "render sphere.yaml --size 8x6 --region {0,0,9,1|0,0,1,7|8,0,1,1|0,6,1,1|99999,0,1,1}"),
+    ('--bits: .*"12"', "render sphere.yaml --bits 12"),
+    ('--transfer: .*"srbg".*did you mean srgb', "render sphere.yaml --transfer srbg"),
+    ('--timing: .*"jsn".*did you mean json', "render sphere.yaml --timing=jsn"),
+    ('--aov: .*"nromal".*did you mean normal', "render sphere.yaml --aov t,nromal"),
+    ("--aov: expected", "render sphere.yaml --aov {t,|''}"),
+    ('--precision: .*"sinlge".*did you mean single', "{render|trace --rays rays} sphere.yaml --precision sinlge"),
+    ('--lanes: expected 1, 4, 8 or 16, not "[30]"', "{render|trace --rays rays} sphere.yaml --lanes {3|0}"),
+    (r'device.* "(toaster|99)".*: 0 \(', "{render|trace --rays rays} sphere.yaml --device {toaster|99}"),
+    (r"missing\.yaml.*No such file", "{render|trace --rays rays|check} missing.yaml"),
+    (r"sphere\.txt", "{render|trace --rays rays|check} sphere.txt"),
+    ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
+    (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o image.{jpg|PNGX|}"),
+    (r"nowhere/image\.png", f"render sphere.yaml {SMALL} -o nowhere/image.png"),
+]
+
+# Key words of the message, and the lines of rays that get it.
+WRONG_RAYS = [
+    ("^rays:2:10: error: expected", "0 0 -4 0 0 1\n0 0 -4 0 x 1"),
+    ("^rays:1:1: error: expected .*7", "0 0 -4 0 0 1 0"),
+    ("^rays:1:18: error: expected .*more", "0 0 -4 0 0 1 0 1 2"),
+    ("precision", "0 0 -4 0 0 inf"),
+    ("direction", "0 0 -4 0 0 1e-50"),
+    ("direction", "0 0 -4 0 -0 0"),
+]
+
+
+def alternatives(command):
+    parts = re.split(r"\{(.*?)\}", command)
+    choices = [part.split("|") if index % 2 else [part] for index, part in enumerate(parts)]
+    return ["".join(words) for words in itertools.product(*choices)]
+
+
+class CliTestCase(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("sphere.yaml", SPHERE)
+        write("rays", "0 0 -4  0 0 1\n")
+
+    def nothing_left(self, pattern):
+        self.assertEqual(glob.glob(pattern) + glob.glob(f".{pattern}"), [])
+
+
+class Commands(CliTestCase):
+    def test_help_and_version(self):
+        self.assertRegex(self.glint("--help").stdout, "(?m)^usage: glint")
+        self.glint("help")
+        self.assertRegex(self.glint("--version").stdout, r"^glint \d+\.\d+")
+        for command in "render", "trace", "check", "devices":
+            self.assertRegex(self.glint(f"{command} --help").stdout, f"(?m)^usage: glint {command}")
+
+    def test_wrong_command_lines(self):
+        for pattern, commands in WRONG_COMMAND_LINES:
+            for command in alternatives(commands):
+                with self.subTest(command):
+                    self.refuses(command, pattern)
+
+    def test_no_device(self):
+        self.refuses("render sphere.yaml", 'device.*"toaster"', env={"GLINT_DEVICE": "toaster"})
+        self.refuses("render sphere.yaml", "no OpenCL device.*pocl", env={"OCL_ICD_VENDORS": os.path.abspath("none.icd")})
+
+    @unittest.skipUnless(find_icd("pocl"), "PoCL is not installed")
+    def test_pocl_without_a_cache(self):
+        """Debian's PoCL has no device where it cannot write its cache."""
+        process = run("devices", env={"XDG_CACHE_HOME": "/dev/null", "OCL_ICD_VENDORS": find_icd("pocl")})
+        if process.returncode != 0:
+            self.assertIn("POCL_CACHE_DIR", process.stderr)
+
+
+class WrongInput(CliTestCase):
+    def test_rays(self):
+        for pattern, rays in WRONG_RAYS:
+            with self.subTest(rays):
+                write("rays", rays + "\n")
+                self.refuses("trace sphere.yaml --rays rays", pattern)
+
+    def test_at_most_20_errors(self):
+        write("rays", "\n".join(map(str, range(1, 100001))))
+        errors = self.refuses("trace sphere.yaml --rays rays", "^rays:1:1: error: expected .*1$").stderr
+        self.assertEqual(sum(line.startswith("rays:") and line[5].isdigit() for line in errors.splitlines()), 20)
+        self.assertRegex(errors, "rays: many errors")
+
+    def test_scenes(self):
+        write("bad.yaml", "camera: 5\n")
+        self.refuses("check bad.yaml", "^bad.yaml:1:")
+        write("bad.rt", "bogus 1\n")
+        self.refuses("check bad.rt", "^Error$")
+        write("far.yaml", SPHERE.replace("[3, 4, -5]", "[3e20, 4, -5]"))
+        self.refuses(f"render far.yaml {SMALL}", r"light .*3e.20")
+        write("bright.yaml", SPHERE.replace("[3, 4, -5]", "[3, 4, -5], color: [1e20, 1, 1], intensity: 1e20"))
+        self.refuses(f"render bright.yaml {SMALL}", "precision single")
+        self.nothing_left("*.png")
+
+
+class Failures(CliTestCase):
+    """What fails leaves an earlier image as it was, and nothing beside it."""
+
+    def fails(self, arguments, status=1):
+        write("old.png", "an earlier image")
+        self.refuses(f"render {arguments} -o old.png", "glint: |error: ", status)
+        self.assertEqual(read("old.png"), "an earlier image")
+        self.nothing_left("*.??????")
+
+    def test_mistakes(self):
+        write("bad.yaml", "camera: 5\n")
+        self.fails("bad.yaml")
+        self.fails("sphere.yaml --bits 9")
+        self.fails("sphere.yaml --size 8x6 --region 0,0,9,9")
+        self.fails("sphere.yaml --device toaster")
+        if os.getuid() != 0:
+            os.chmod("old.png", 0o444)
+            self.refuses(f"render sphere.yaml {SMALL} -o old.png", "old.png")
+
+    @unittest.skipUnless(os.path.exists("/dev/full"), "there is no /dev/full")
+    def test_full_disk(self):
+        os.symlink("/dev/full", "full.png")
+        self.refuses(f"render sphere.yaml {SMALL} -o full.png", "cannot write")
+        os.symlink("/dev/full", "old.t.npy")
+        self.fails(f"sphere.yaml {SMALL} --aov t")
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            errors = self.glint("trace sphere.yaml --rays rays", status=2, stdout=full).stderr
+        self.assertEqual(errors.count("\n"), 1)
+
+    def test_limit_on_the_size_of_files(self):
+        self.glint("render sphere.yaml --size 1000x1000 --quiet -o warm.png")  # the kernel is in the cache then
+        limit = 1024 * 1024, 1024 * 1024
+        self.refuses("render sphere.yaml --size 1000x1000 --quiet -o limit.ppm", r"limit\.ppm.*File too large",
+                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+        self.nothing_left("*limit*")
+
+    def test_reader_goes_away(self):
+        """A message and a status, not a signal, end the program."""
+        closed, writer = os.pipe()
+        os.close(closed)
+        self.glint("check sphere.yaml", status=2, stdout=writer)
+        os.close(writer)
+
+        write("rays", "".join(f"{i} 0 -4 0 0 1\n" for i in range(100000)))
+        with subprocess.Popen(["head", "-n", "1"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as head:
+            errors = self.glint("trace sphere.yaml --rays rays", status=2, stdout=head.stdin).stderr
+        self.assertRegex(errors, r"^glint: .*standard output: Broken pipe\n\Z")
+
+        os.mkfifo("pipe.ppm")
+        with subprocess.Popen(["head", "-c", "10", "pipe.ppm"], stdout=subprocess.DEVNULL):
+            self.refuses("render sphere.yaml --size 400x300 --quiet --aov t -o pipe.ppm", r"pipe\.ppm.*Broken pipe")
+        self.nothing_left("*pipe.t*")
+
+    def test_signals(self):
+        """A signal ends a long render, and a second one right after it changes nothing."""
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
+        self.glint(f"render sphere.yaml {SMALL} -o warm.png")
+        command = [PROGRAM, *"render sphere.yaml --size 20000x20000 --samples 64 -o long.png".split()]
+        for signals in (signal.SIGINT,), (signal.SIGINT, signal.SIGINT), (signal.SIGTERM,), (signal.SIGHUP,):
+            with self.subTest(signals):
+                write("long.png", "an earlier image")
+                render = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+                deadline = time.monotonic() + 120
+                while not glob.glob(".long.png.*") and render.poll() is None and time.monotonic() < deadline:
+                    time.sleep(0.05)
+                self.assertTrue(glob.glob(".long.png.*"), "it never began to write")
+                for number in signals:
+                    render.send_signal(number)
+                    time.sleep(0.01)
+                errors = render.communicate(timeout=120)[1]
+                self.assertEqual(render.returncode, 130, errors)
+                self.assertRegex(errors, "interrupted")
+                self.assertIn("long.png", errors)
+                self.assertEqual(read("long.png"), "an earlier image")
+                self.nothing_left("long.png.*")
+
+    def test_scene_files_are_not_overwritten(self):
+        write("globe.png", "P3 1 1 255 9 9 9\n")
+        write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        objects = "radius: 1, material: {image: globe.png}}\n  - mesh: {file: mesh.obj}"
+        write("globe.yaml", SPHERE.replace("radius: 1}", objects))
+        files = {name: read(name) for name in ("globe.png", "mesh.obj", "globe.yaml")}
+        os.symlink("globe.yaml", "link.png")
+        os.link("globe.png", "hard.t.npy")
+        os.mkdir("globe")
+        for arguments, path in (
+            ("", "globe.png.*-o"),
+            ("-o globe/../globe.png", "globe/../globe.png"),
+            ("-o link.png", "link.png"),
+            ("--aov normal,t -o hard.png", "hard.t.npy"),
+        ):
+            self.refuses(f"render globe.yaml {SMALL} {arguments}", f"would overwrite '{path}")
+        self.refuses("trace globe.yaml --rays rays -o mesh.obj", "would overwrite 'mesh.obj'")
+        self.assertEqual({name: read(name) for name in files}, files)
+        self.glint(f"render globe.yaml {SMALL} -o globe/other.png")
+        os.remove("globe.png")
+        self.refuses("check globe.yaml", r"^globe\.yaml:\d+:\d+: error: .*'globe\.png': No such file")
+
+
+class Images(CliTestCase):
+    def test_png(self):
+        self.glint(f"render sphere.yaml {SMALL}")
+        head, rows, texts, chunks = png_read("sphere.png")
+        self.assertEqual((head, len(rows)), ((8, 6, 8, 2), 6 * 25))
+        self.assertIn("sRGB", chunks)
+        expected = {"Scene": "sphere.yaml", "Precision": "single", "Size": "8x6"}
+        self.assertEqual(texts | expected, texts)
+        for key in "Software Device Driver Lanes Samples Bounces Region Transfer Kernel".split():
+            self.assertTrue(texts[key], key)
+
+    def test_png_of_16_bits(self):
+        self.glint(f"render sphere.yaml {SMALL} --bits 16 --transfer none --samples 3 --region 2,1,4,3 -o deep.png")
+        head, _, texts, chunks = png_read("deep.png")
+        self.assertEqual(head, (4, 3, 16, 2))
+        self.assertNotIn("sRGB", chunks)
+        self.assertEqual(texts | {"Samples": "3", "Region": "2,1,4,3", "Transfer": "none"}, texts)
+
+    def test_ppm_and_exr(self):
+        for arguments, head, size in (
+            ("-o a.ppm", b"P6\n8 6\n255\n", 11 + 8 * 6 * 3),
+            ("-o a16.ppm --bits 16", b"P6\n8 6\n65535\n", 13 + 8 * 6 * 6),
+            ("-o a.EXR", b"\x76\x2f\x31\x01", None),
+        ):
+            self.glint(f"render sphere.yaml {SMALL} {arguments}")
+            data = Path(arguments.split()[1]).read_bytes()
+            self.assertEqual((data[: len(head)], len(data)), (head, size or len(data)))
+
+    def test_precisions_and_lanes(self):
+        images = {}
+        for precision in "fast", "single", "strict", "double":
+            for lanes in (1, 4, 8, 16) if precision == "single" else (4,):
+                self.glint(f"render sphere.yaml {SMALL} --precision {precision} --lanes {lanes} -o {precision}.npy")
+            shape, kind, images[precision] = npy_read(f"{precision}.npy")
+            self.assertEqual((shape, kind), ((6, 8, 3), "<f8" if precision == "double" else "<f4"))
+        self.assertAlmostEqual(images["single"][0][0], 0.1, delta=1e-7)
+        self.assertGreater(max(map(max, images["single"])), 0.9)
+        for precision, tolerance in ("single", 1e-5), ("fast", 1e-3):
+            self.assertLess(max(map(math.dist, images[precision], images["double"])), tolerance)
+        self.glint(f"render sphere.yaml {SMALL} --no-cache --device 0 -o uncached.npy")
+        self.assertSameBytes("uncached.npy", "single.npy")
+
+    def test_rt_and_cfg(self):
+        """Colors of these formats are display values, so the PNG states no sRGB curve."""
+        for name in "complete.rt", "complete.cfg":
+            self.glint(f"render {SCENES}/{name} {SMALL} -o other.png")
+            self.assertNotIn("sRGB", png_read("other.png")[3])
+        write("a.rt", read(SCENES / "complete.rt") + "bogus 1 2 3\n")
+        self.refuses("check a.rt", "bogus")
+        self.assertRegex(self.glint(f"render a.rt --lenient {SMALL}").stderr, "warning.*bogus")
+
+    def test_smaller_work_groups_give_the_same_bits(self):
+        """A device may accept fewer work-items in a group than glint prefers; PoCL has a variable for it."""
+        for limit in None, 32, 16, 1:
+            env = {"POCL_MAX_WORK_GROUP_SIZE": str(limit)} if limit else {}
+            self.glint(f"render sphere.yaml --size 33x21 --quiet --lanes 1 --aov object,path -o {limit}.npy", env=env)
+            self.glint(f"trace sphere.yaml --rays rays -o {limit}.csv", env=env)
+            for ending in ".npy", ".object.npy", ".path.npy", ".csv":
+                self.assertSameBytes(f"{limit}{ending}", f"None{ending}")
+
+
+class Aovs(CliTestCase):
+    def test_aovs(self):
+        layouts = {"t": ((6, 8), "<f4"), "normal": ((6, 8, 3), "<f4"), "position": ((6, 8, 3), "<f8"),
+                   "object": ((6, 8), "<u4"), "shadow": ((6, 8, 2), "<u4"), "ray": ((6, 8, 3), "<f4"),
+                   "path": ((6, 8), "<u4"), "color": ((6, 8, 3), "<f4")}
+        self.glint(f"render sphere.yaml {SMALL} --aov {','.join(layouts)} -o v.png")
+        self.glint(f"render sphere.yaml {SMALL} -o v.npy")
+        self.assertSameBytes("v.color.npy", "v.npy")
+        pixels = {}
+        for name, layout in layouts.items():
+            *found, pixels[name] = npy_read(f"v.{name}.npy")
+            self.assertEqual(tuple(found), layout, name)
+        self.assertEqual(set(pixels["object"]), {0, 2**32 - 1})
+        names = "object", "t", "path", "normal", "position", "ray", "shadow"
+        for identity, t, path, normal, position, ray, shadow in zip(*(pixels[name] for name in names)):
+            # FNV-1a of the word 8 (0 + 1) for the one object, of 0 for none
+            self.assertEqual(path, (0x811C9DC5 ^ (8 if identity == 0 else 0)) * 0x01000193 % 2**32)
+            self.assertAlmostEqual(math.hypot(*ray), 1, delta=1e-4)
+            if identity != 0:
+                self.assertEqual((t, normal, shadow), (math.inf, (0, 0, 0), (0, 0)))
+                continue
+            from_eye = [a - b for a, b in zip(position, (0, 0, -4))]
+            self.assertAlmostEqual(math.hypot(*from_eye), t, delta=1e-4)
+            self.assertLess(math.dist([t * a for a in ray], from_eye), 1e-4)
+            self.assertLess(math.dist(normal, position), 1e-4)
+            self.assertLess(normal[2], 0)
+            cosine = sum(n * (light - p) for n, light, p in zip(normal, (3, 4, -5), position))
+            self.assertTrue(abs(cosine) < 1e-3 or shadow[0] == (cosine < 0), cosine)
+
+    def test_no_shadows_without_lights(self):
+        write("unlit.yaml", re.sub("lights:.*(?=objects)", "ambient: [1, 1, 1]\n", SPHERE, flags=re.DOTALL))
+        self.assertRegex(self.glint(f"render unlit.yaml {SMALL} --aov shadow -o u.png").stderr, "shadow.*no lights")
+        self.nothing_left("u.shadow.npy")
+
+
+class Trace(CliTestCase):
+    def test_csv(self):
+        rays = "# a comment\n\n0 0 -4  0 0 1\n0,5,-4, 0 0 1\n0x0p0 0 -0x1p+2 0 0 0x1p1 0 10 # hexadecimal\n"
+        rays += "0 0 -4 0 0 1 0 2\n"
+        expected = ["object", "t", "nx", "ny", "nz"], [[0, 3, 0, 0, -1], [None] * 5, [0, 1.5, 0, 0, -1], [None] * 5]
+        self.assertEqual(csv_rows(self.glint(f"trace sphere.yaml --rays {write('rays', rays)}").stdout), expected)
+        process = self.glint("trace sphere.yaml --rays - -o hits.csv --precision double --lanes 4", input=rays)
+        self.assertEqual(process.stdout, "")
+        self.assertEqual(csv_rows(read("hits.csv")), expected)
+
+    def test_directions_of_any_length(self):
+        write("rays", "0 0 -4 0 0 1e20\n0 0 -4 0 0 1e-20\n0 0 -4 0 0 3e38 0 3e-38\n0 0 -4 0 0 1\n")
+        _, rows = csv_rows(self.glint("trace sphere.yaml --rays rays").stdout)
+        self.assertEqual([(row[0], row[4]) for row in rows], [(0, -1)] * 4)
+
+
+class Reports(CliTestCase):
+    """JSON comes alone on standard output; text about times goes to standard error."""
+
+    def test_timing(self):
+        report = self.json(f"render sphere.yaml {SMALL} --timing=json")
+        self.assertEqual((report["schema"], len(report["kernel_hash"]), report["size"]), (2, 16, [8, 6]))
+        for key in "parse_ms flatten_ms build_ms build_from_cache upload_ms read_backs encode_ms".split():
+            self.assertIn(key, report)
+        self.assertEqual([launch["name"] for launch in report["launches"]], ["render"])
+        process = self.glint(f"render sphere.yaml {SMALL} --timing")
+        self.assertRegex(process.stderr, r"(?m)^ +launches +[0-9.]+ ms")
+        self.assertEqual(process.stdout, "")
+
+    def test_check(self):
+        scene = SCENES / "every_shape.yaml"
+        self.assertRegex(self.glint(f"check {scene}").stdout, "objects +17: 4 sphere, 1 plane, 1 disc, 1 box")
+        report = self.json(f"check {scene} --json")
+        self.assertEqual(report["schema"], 1)
+        self.assertGreaterEqual(len(report["features"]), 14)
+
+    def test_devices(self):
+        self.assertRegex(self.glint("devices").stdout, r"(?m)^0\*? ")
+        self.assertTrue(self.json("devices --json")["devices"])
+
+
+if __name__ == "__main__":
+    need_device()
+    main()
