@@ -71,8 +71,165 @@ typedef struct {
 } Torus;
 
 typedef struct {
-    scalar4 a, b, c;         // w: x, y and z of the normal; the largest is 1/2 to 1, or all are 0
-    uint4 bounded_counts[2]; // of these the ones in the BVH, which come first
+    scalar4 a, b, c; // w: x, y and z of the normal; the largest is 1/2 to 1, or all are 0
+    uint4 id;        // y: 1 + index of its TriangleNormals, 0: flat; z: 1 + index of its TriangleUvs, 0: none
+} Triangle;
+
+// Apart from Triangle: every intersection test reads that, only the closest hit reads these.
+typedef struct {
+    scalar4 a, b, c; // unit
+} TriangleNormals;
+
+// Texture coordinates.
+typedef struct {
+    scalar4 a_b;       // u and v of a, u and v of b
+    scalar4 c_density; // u and v of c; z: texels of the full texture per unit of length
+} TriangleUvs;
+
+// Every shape: feature, struct, name, name of its array. Adding a shape begins here: docs/adding-a-shape.md.
+// clang-format off
+#define SHAPE_LIST(SHAPE)                           \
+    SHAPE(SPHERES,   Sphere,   sphere,   spheres)   \
+    SHAPE(PLANES,    Plane,    plane,    planes)    \
+    SHAPE(DISCS,     Disc,     disc,     discs)     \
+    SHAPE(BOXES,     Box,      box,      boxes)     \
+    SHAPE(CYLINDERS, Cylinder, cylinder, cylinders) \
+    SHAPE(CONES,     Cone,     cone,     cones)     \
+    SHAPE(TRIANGLES, Triangle, triangle, triangles) \
+    SHAPE(TORI,      Torus,    torus,    tori)
+// clang-format on
+
+#define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
+enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
+
+// A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
+// high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. The
+// box of an empty slot is inverted, low above high.
+//
+// The host makes nodes as wide as the kernel's packets, and at least 4 wide.
+enum { BVH_WIDTH_LEAST = 4, BVH_WIDTH_LARGEST = 16 };
+enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
+#ifdef __OPENCL_VERSION__
+#define BVH_WIDTH   (LANES < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : LANES)
+#define BVH_QUARTER (BVH_WIDTH >> 2)
+typedef struct {
+    scalar4 planes[BVH_PLANES * BVH_QUARTER];
+    uint4 first[BVH_QUARTER]; // the child's node or first primitive
+    uint4 what[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits
+} BvhNode;
+#endif
+
+enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
+
+// A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
+// a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
+// whole BVH, then one of each primitive outside it, kind by kind; planes have none.
+//
+// xyz: from the common origin to the center; w: the origin's power |xyz|^2 - radius^2, lowered by
+// CULL_SPHERE_SLACK u |xyz|^2, or -CULL_SPHERE_LARGEST around the unbounded.
+typedef struct {
+    scalar4 center_power;
+} CullSphere;
+
+#define CULL_SPHERE_LARGEST 1e37f
+
+// The enlargement of cull spheres, in units of roundoff: of |xyz|^2, and of the ray's direction squared.
+enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
+
+enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
+
+// What an object's id refers to.
+typedef struct {
+    uint4 kind_index_material; // x: KIND_…, y: index in that shape's array, z: index of the material
+} ObjectEntry;
+
+typedef struct {
+    scalar4 color;       // rgb, w: ka
+    scalar4 diffuse;     // kd rgb, w: ks
+    scalar4 other_color; // the checker's second color, w: shininess
+    scalar4 grid;        // xyz: the eye's position in checker cells, w: cells per unit; 0: no checker
+    scalar4 reflection_transmission_ior; // w: texels of the texture per unit of length, on planes and discs
+    // What a shadow ray loses here: -log2(transmission) in integer steps, whose sum does not depend on the
+    // order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of 2^-48, for
+    // double.
+    uint4 optical_depth;
+    uint4 image; // x: 1 + the index of its texture's first level, 0: none; y: number of levels
+} Material;
+
+// One level of a texture's mipmap, each half the size of the one before, down to one texel.
+typedef struct {
+    uint4 place; // x: index of its first texel, top left; y: width, z: height
+} TextureLevel;
+
+typedef struct {
+    uint4 color; // xyz: the bits of red, green and blue as floats
+} Texel;
+
+enum { OPAQUE = 0x7fffffff }; // in optical_depth.x: no light passes
+
+// The largest bounce depth. While one of a ray's two bounces is traced the other is pending, one per depth.
+enum { BOUNCES_LARGEST = 16 };
+
+// The signature of a ray tree: PATH_START, then per ray, depth first and reflected before refracted,
+// 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is that of the object hit,
+// -1 for the background; events are the bounces there, 0 for none. (Fowler, Noll, Vo: FNV-1a, by words
+// instead of bytes.)
+enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_EVENTS = 8 };
+#define PATH_START  0x811c9dc5u
+#define PATH_FACTOR 0x01000193u
+
+// The tile of pixels that a packet of 1, 4, 8 or 16 lanes covers.
+#define TILE_WIDTH_OF(lanes)  ((lanes) >= 8 ? 4 : (lanes) == 4 ? 2 : 1)
+#define TILE_HEIGHT_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
+
+// Neighboring tiles along a row that a work-item of several lanes renders in turn. On a CPU each work-item is
+// a work-group of its own, which costs PoCL some hundred cycles to start.
+enum { ITEM_TILES_LARGEST = 8 };
+
+// The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
+enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_NEAR = 6, RAY_FAR, RAY_SCALARS };
+enum {
+    RESULT_T,
+    RESULT_NORMAL,
+    RESULT_POSITION = 4,
+    RESULT_MIRRORED_ORIGIN = 7,
+    RESULT_MIRRORED_DIRECTION = 10,
+    RESULT_PASSED_ORIGIN = 13,
+    RESULT_PASSED_DIRECTION = 16,
+    RESULT_PASSED = 19,
+    RESULT_LIGHT,
+    RESULT_SCALARS
+};
+
+// The ray counters of a counting build.
+enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
+
+enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
+
+typedef struct {
+    scalar4 color;
+    scalar4 position;  // from the eye; point and spot
+    scalar4 direction; // unit, away from the light; directional and spot
+    // spot: x: 1 - cos(half-angle), y: 1 - cos(angle - penumbra), z: 1 / (x - y), 0 for a hard edge
+    scalar4 cone;
+    uint4 kind; // x: LIGHT_KIND_…
+} Light;
+
+typedef struct {
+    scalar4 background, ambient;
+    // A camera ray: forward + x right + y up, x and y in half pixels from the image's center.
+    scalar4 forward, right, up;
+    scalar4 bounds;                  // of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
+    scalar4 bounds_low, bounds_high; // its corners
+    // corners of a box around all points where a transparent object may touch an opaque one; low above high
+    // where none does
+    scalar4 contact_low, contact_high;
+    scalar4 sample;          // x: width of a sample's share of a pixel, at distance 1
+    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;           // x: largest depth
+    uint4 cull_spheres;      // x: number per common origin, 0: none
+    uint4 counts[2];         // of each KIND_…, in that order
+    uint4 bounded_counts[2]; // of these those in the BVH, which come first
 } SceneHeader;
 
 #endif
