@@ -69,7 +69,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
 
 ladder: $(BUILD)/tools/numerics/ladder
 
-$(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/reference.o tests/specimen.o) $(library)
+$(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/specimen.o) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 # What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.

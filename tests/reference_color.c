@@ -1,5 +1,4 @@
-#include "tests/reference.h"
-#include "tests/reference_quad.h"
+#include "tests/reference_color.h"
 #include "tests/specimen.h"
 
 // A shadow ray leaves out this part of its way at either end: far over the rounding of quadruple precision,
@@ -52,7 +51,7 @@ static Color checker_color(const Object *object, const Material *material, const
     if (flat) {
         Vector3 given = object->kind == SHAPE_PLANE ? object->as.plane.normal : object->as.disc.normal;
         Quad3 normal = quad3_unit(quad3(given));
-        Quad3 along = quad3_beside(normal), across = quad3_cross(normal, along);
+        Quad3 along = quad3_perpendicular(normal), across = quad3_cross(normal, along);
         squares = square_of(quad3_dot(point, along), size, margin) +
                   square_of(quad3_dot(point, across), size, margin);
     } else {
@@ -99,12 +98,10 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
         if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
         if (blocker.found) strength *= scene->materials.items[object->material].transmission;
     }
-    Quad3 mirrored = quad3_subtract(quad3_scale(surface->normal, 2 * facing), to_light);
-    Quad alignment = quad3_dot(mirrored, surface->to_eye);
     double diffuse = (double)(strength * facing);
-    double highlight =
-        (double)(strength * powl(alignment > 0 ? (long double)alignment : 0, material->shininess));
-    highlight *= material->specular;
+    Quad highlight_part =
+        reference_highlight(surface->normal, to_light, surface->to_eye, material->shininess);
+    double highlight = (double)(strength * highlight_part) * material->specular;
     sum->color.x += light->color.x * (material->diffuse.x * base.x * diffuse + highlight);
     sum->color.y += light->color.y * (material->diffuse.y * base.y * diffuse + highlight);
     sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight);

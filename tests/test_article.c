@@ -2,7 +2,7 @@
 // shows that the answer is wrong by the reference, and holds glint to the right one on the same `.cfg` scene.
 #include "host/import/load.h"
 #include "tests/probe.h"
-#include "tests/reference.h"
+#include "tests/reference_color.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

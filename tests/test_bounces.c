@@ -1,7 +1,7 @@
 // Reflection, refraction, total reflection and light through glass: small pictures against the reference.
 #include "tests/frame.h"
 #include "tests/probe.h"
-#include "tests/reference.h"
+#include "tests/reference_color.h"
 #include "tests/scene_reading.h"
 #include <math.h>
 #include <setjmp.h>

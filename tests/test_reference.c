@@ -1,5 +1,5 @@
 // The reference itself, against roots known by hand or from certified interval arithmetic.
-#include "tests/reference.h"
+#include "tests/reference_color.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,7 +1,7 @@
 // Shadows on which a faster search, or a surface much larger than what lies on it, once went wrong.
 #include "tests/frame.h"
 #include "tests/probe.h"
-#include "tests/reference.h"
+#include "tests/reference_color.h"
 #include "tests/scene_reading.h"
 #include <math.h>
 #include <setjmp.h>

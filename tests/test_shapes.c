@@ -1,6 +1,6 @@
 // Every shape at every precision against the reference: hit or miss, distance and normal.
 #include "tests/probe.h"
-#include "tests/reference.h"
+#include "host/verify/reference.h"
 #include "tests/specimen.h"
 #include <math.h>
 #include <setjmp.h>

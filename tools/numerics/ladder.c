@@ -1,12 +1,12 @@
 // How far t is off, by shape, precision and distance: random rays through the kernels that this program was
-// built with, each beside the quadruple-precision reference of tests/reference.c on the very bits that the
+// built with, each beside the quadruple-precision reference of host/verify/reference.c on the very bits that the
 // kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --hold it prints what
 // breaks the hard cases' bounds instead.
 #include "host/base/clock.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/render/renderer.h"
-#include "tests/reference.h"
+#include "host/verify/reference.h"
 #include "tests/specimen.h"
 #include <getopt.h>
 #include <stdlib.h>

@@ -1,12 +1,30 @@
-// Quadruple precision without a library: vectors and the square root.
+// Quadruple precision without a library: numbers, vectors and the square root.
 #pragma once
 
-#include "tests/reference.h"
-#include <math.h>
+#include "host/scene/vector.h"
+#include <float.h>
+
+// Of 113 bits wherever the compiler has them, else a long double.
+#if LDBL_MANT_DIG >= 113 || !defined(__SIZEOF_FLOAT128__)
+typedef long double Quad;
+enum { QUAD_BITS = LDBL_MANT_DIG };
+#else
+__extension__ typedef __float128 Quad;
+enum { QUAD_BITS = 113 };
+#endif
+
+typedef struct {
+    Quad x, y, z;
+} Quad3;
 
 static inline Quad3 quad3(Vector3 a)
 {
     return (Quad3){a.x, a.y, a.z};
+}
+
+static inline Vector3 quad3_rounded(Quad3 a)
+{
+    return (Vector3){(double)a.x, (double)a.y, (double)a.z};
 }
 
 static inline Quad3 quad3_add(Quad3 a, Quad3 b)
@@ -44,13 +62,19 @@ static inline Quad quad_minimum(Quad a, Quad b)
     return a < b ? a : b;
 }
 
-// The x87 or IEEE root, then two of Newton's steps, each of which doubles the bits.
+static inline Quad quad_maximum(Quad a, Quad b)
+{
+    return a > b ? a : b;
+}
+
+// The root in long double, then one of Newton's steps, which doubles its bits; as long double has the same
+// range, one more where its bits are not enough.
 static inline Quad quad_root(Quad a)
 {
     if (!(a > 0)) return 0;
     Quad root = sqrtl((long double)a);
     root = (root + a / root) / 2;
-    return (root + a / root) / 2;
+    return LDBL_MANT_DIG > QUAD_BITS / 2 ? root : (root + a / root) / 2;
 }
 
 static inline Quad quad3_length(Quad3 a)
@@ -73,8 +97,8 @@ static inline Quad3 quad3_least_axis(Quad3 a)
     return y <= z ? (Quad3){0, 1, 0} : (Quad3){0, 0, 1};
 }
 
-// A unit vector square to the unit vector `a`.
-static inline Quad3 quad3_beside(Quad3 a)
+// A unit vector perpendicular to the unit vector `a`.
+static inline Quad3 quad3_perpendicular(Quad3 a)
 {
     Quad3 axis = quad3_least_axis(a);
     return quad3_unit(quad3_subtract(axis, quad3_scale(a, quad3_dot(axis, a))));

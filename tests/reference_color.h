@@ -1,0 +1,30 @@
+// What an image should show along a ray, in quadruple precision: shading, shadows, reflections and
+// refractions over the closest hits of host/verify/reference.h.
+#pragma once
+
+#include "host/verify/reference.h"
+
+// The ray through the center of a pixel, row 0 at the top, as DESIGN.md has the camera.
+ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
+                                  unsigned row);
+
+typedef struct {
+    Color color;
+    double margin; // as of a hit, over the eye's ray, the shadow rays and the edges of a checker
+} ReferenceColor;
+
+// What the eye sees along a ray: background, or ambient and Phong with shadows. Transparent objects pass
+// their part of the light unbent, once for each object. Neither reflection nor refraction.
+ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
+
+// With reflections and refractions, `bounce_count` of them in a row.
+//
+// Where `blur` is not 0, the start and direction of each ray are changed at random by up to this part of the
+// size of the numbers there. How far colors differ from those without blur shows what errors of that size
+// come to on their way.
+typedef struct {
+    unsigned bounce_count;
+    double blur;
+    uint64_t seed;
+} ReferencePath;
+Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);
