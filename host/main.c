@@ -13,13 +13,13 @@ static const struct {
     int (*run)(int argument_count, char **arguments);
     const char *purpose;
 } commands[] = {
-    {"render", command_render, "turn a scene into a picture"},
-    {"trace", command_trace, "shoot explicit rays at a scene"},
-    {"check", command_check, "read a scene and say what is in it"},
-    {"devices", command_devices, "list the OpenCL devices"},
-    {"diff", command_diff, "tell how far apart two pictures are"},
-    {"bench", command_bench, "tell how fast this device renders scenes"},
-    {"accuracy", command_accuracy, "tell how fast and how exact each way of rendering is"},
+    {"render", command_render, "render a scene file to an image"},
+    {"trace", command_trace, "trace explicit rays"},
+    {"check", command_check, "read a scene and report its contents"},
+    {"devices", command_devices, "list OpenCL devices"},
+    {"diff", command_diff, "compare two images"},
+    {"bench", command_bench, "measure speed on a device"},
+    {"accuracy", command_accuracy, "measure speed against error"},
     {"verify", command_verify, "run the hard cases on a device"},
 };
 
@@ -27,12 +27,12 @@ enum { COMMAND_COUNT = sizeof commands / sizeof *commands };
 
 static void help(FILE *stream)
 {
-    fputs("glint: an OpenCL ray tracer that says how long it took\n\n"
+    fputs("glint: an OpenCL ray tracer that reports its speed and its error\n\n"
           "usage: glint COMMAND [OPTIONS]\n\n",
           stream);
     for (size_t i = 0; i < COMMAND_COUNT; i++)
         fprintf(stream, "  %-9s %s\n", commands[i].name, commands[i].purpose);
-    fputs("\nglint COMMAND --help tells a command's options; glint --version the version.\n", stream);
+    fputs("\nglint COMMAND --help lists a command's options, glint --version prints the version.\n", stream);
 }
 
 static int command_run(int argument_count, char **arguments)
@@ -62,7 +62,7 @@ static int command_run(int argument_count, char **arguments)
         names[i] = commands[i].name;
     }
     const char *near = text_nearest(name, names, COMMAND_COUNT);
-    fprintf(stderr, "glint: there is no command \"%s\"", name);
+    fprintf(stderr, "glint: unknown command \"%s\"", name);
     if (near) fprintf(stderr, "; did you mean %s?", near);
     fputc('\n', stderr);
     return EXIT_USER;

@@ -86,7 +86,7 @@ PYTHON
 }
 
 compare 0 "against itself" "$scratch/report" --tolerance 1000000
-check "the ratio is told" grep -q 'to the baseline: frame [0-9.]*, kernel [0-9.]*$' "$scratch/out"
+check "the ratio is told" grep -q 'ratio to baseline: frame [0-9.]*, kernel [0-9.]*$' "$scratch/out"
 # a machine that is busy may take many times as long, but not a millionth
 doctor 0.000001 "$scratch/faster"
 compare 3 "against a faster one" "$scratch/faster" --tolerance 10 --json

@@ -24,7 +24,7 @@ SCENES = ROOT / "tests/scenes"
 WRONG_COMMAND_LINES = [
     ("usage: glint COMMAND", ""),
     ('"rendr".*did you mean render', "rendr sphere.yaml"),
-    ('no command "zzzzzz"$', "zzzzzz"),
+    ('unknown command "zzzzzz"$', "zzzzzz"),
     ("scene.*--help", "{render|trace|check}"),
     ("one scene", "{render|trace|check} sphere.yaml other.yaml"),
     ("'--nonsense'", "{render sphere.yaml|trace sphere.yaml|check sphere.yaml|devices} --nonsense"),

@@ -87,7 +87,7 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
         if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
-    if (optind == argument_count) return option_usage_fault("accuracy", "which scenes?");
+    if (optind == argument_count) return option_usage_fault("accuracy", "no scene given");
     if (options->page_path && strcmp(options->page_path, "-") == 0)
         return option_usage_fault("accuracy", "--html takes a file's name");
     if (options->reference_path && optind + 1 != argument_count)
@@ -308,7 +308,7 @@ static void accuracy_close(Accuracy *accuracy)
     layers_free(&accuracy->reference);
     output_abandon(&accuracy->page);
     variant_set_close(&accuracy->set);
-    messages_tell(&accuracy->messages, NULL);
+    messages_print(&accuracy->messages, NULL);
 }
 
 int command_accuracy(int argument_count, char **arguments)

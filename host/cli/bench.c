@@ -1,4 +1,4 @@
-// glint bench: how fast this device renders scenes, in each way of computing them.
+// glint bench: interleaved timings of scenes in every requested configuration.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/bench_report.h"
@@ -23,11 +23,11 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint bench SCENE... [OPTIONS]\n\n"
-    "Renders each scene in each way asked for, all in turn, and tells the times.\n\n"
-    "      --compare FILE    hold the times against those of an earlier report (--json); exit status 3 where "
+    "Benchmarks scenes in every requested configuration, interleaved.\n\n"
+    "      --compare FILE    compare with an earlier report (--json); exit status 3 where "
     "one is slower\n"
-    "      --tolerance R     new over old that still passes (default: 1.1)\n"
-    "      --launches        list the launches of each row's last run\n"
+    "      --tolerance R     largest accepted ratio of new to old time (default: 1.1)\n"
+    "      --launches        list the kernel launches of each row's last run\n"
     "      --precision LIST  of fast, single, strict, double (default: single)\n" //
     HELP_VARIANTS HELP_JSON HELP_HELP;
 
@@ -91,7 +91,7 @@ static int bench_tell(const Bench *bench, const Baseline *baseline)
     }
     if (!baseline) return EXIT_DONE;
     if (strcmp(baseline_device(baseline), report.device->name) != 0)
-        fprintf(stderr, "glint bench: the baseline is of another device, \"%s\"\n",
+        fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
                 baseline_device(baseline));
     bool any_common;
     size_t slower = bench_slower_count(&report, &any_common);
@@ -131,13 +131,13 @@ int command_bench(int argument_count, char **arguments)
         if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(&bench.options, option, optarg)) return EXIT_USER;
     }
-    if (optind == argument_count) return option_usage_fault("bench", "which scenes?");
+    if (optind == argument_count) return option_usage_fault("bench", "no scene given");
 
     size_t scene_count = (size_t)(argument_count - optind);
     MessageList messages = {0};
     Baseline *baseline = NULL;
     if (bench.options.baseline) baseline = baseline_open(bench.options.baseline, &messages);
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     int status = EXIT_USER;
     if (!bench.options.baseline || baseline) {
         const VariantOptions *options = &bench.options.variants;

@@ -67,7 +67,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     const BenchRow *row = &report->rows[i];
     fprintf(stream, "  %-6s %5u  %-4s", row->key.precision, row->key.lanes, row->key.bvh);
     if (row->failure) {
-        fprintf(stream, "  cannot be had: %s\n", row->failure);
+        fprintf(stream, "  not available: %s\n", row->failure);
         return;
     }
     const char *doubt = bench_doubt(&row->times);
@@ -80,17 +80,17 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     figure_print(stream, 6, 1, 100, bench_peak_fraction(row, report->peak));
     fprintf(stream, " %6.1f  %016" PRIx64 "\n", 100 * bench_bandwidth_fraction(row, report->peak),
             row->kernel_hash);
-    if (doubt) fprintf(stream, "    the host's clock is used: %s\n", doubt);
+    if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     Ratio ratio = row_ratio(report, row);
     if (ratio.found)
-        fprintf(stream, "    to the baseline: frame %.3f, kernel %.3f%s\n", ratio.frame, ratio.kernel,
+        fprintf(stream, "    ratio to baseline: frame %.3f, kernel %.3f%s\n", ratio.frame, ratio.kernel,
                 ratio_is_slower(ratio, report->tolerance) ? "  SLOWER" : "");
     else if (report->baseline)
         fprintf(stream, "    not in the baseline\n");
     if (report->reports && report->reports[i]) launches_print(stream, report->reports[i]);
 }
 
-// Figures that some row lacks, each reason once.
+// Reasons for missing figures, each once.
 static void reasons_print(const BenchReport *report, FILE *stream)
 {
     const char *told[3] = {NULL};

@@ -1,4 +1,4 @@
-// What glint bench reports: a table for people, or JSON.
+// The report of glint bench: a table or JSON.
 #pragma once
 
 #include "host/measure/baseline.h"
@@ -10,7 +10,7 @@ typedef struct {
     const Device *device;
     const Peak *peak;
     const BenchRow *rows;
-    const RenderReport *const *reports; // of each row's last run, to list its launches; or NULL
+    const RenderReport *const *reports; // of each row's last run, for --launches; or NULL
     size_t count;
     const Baseline *baseline; // or NULL
     double tolerance;
@@ -18,5 +18,5 @@ typedef struct {
 
 void bench_print_text(const BenchReport *report, FILE *stream);
 void bench_print_json(const BenchReport *report);
-// Rows that are slower than the baseline by more than the tolerance, and whether it has any of the rows.
+// Number of rows slower than the baseline by more than the tolerance, and whether any row is in the baseline.
 size_t bench_slower_count(const BenchReport *report, bool *any_common);

@@ -14,7 +14,7 @@ static bool picture_stop(void *context, const Band *band, double fraction_done)
     return !progress_interrupted();
 }
 
-// From a program's first command to its kernel's first run: drivers may finish the build at the first launch.
+// From the start of the build to the end of the first launch: drivers may finish the build there.
 static double build_length(const RenderReport *report)
 {
     double seconds = report->build_seconds;
@@ -25,8 +25,8 @@ static double build_length(const RenderReport *report)
     return seconds;
 }
 
-// Renders a corner of the picture with a program of its own; *from_cache tells where that came from. False
-// where the settings do not fit.
+// Renders a corner of the image with a newly built program; *from_cache receives whether the program came
+// from the cache. False if the settings do not fit the device.
 static bool build_try(Compute *compute, const Variant *variant, bool no_cache, double *seconds,
                       bool *from_cache, MessageList *messages)
 {
@@ -47,7 +47,7 @@ static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *r
 {
     bool from_cache = false;
     if (!build_try(compute, variant, true, &row->build_cold.value, &from_cache, messages)) return false;
-    // the first time may fill the cache
+    // the first build may fill the cache
     for (int attempt = 0; attempt < 2 && !from_cache; attempt++)
         if (!build_try(compute, variant, false, &row->build_cached.value, &from_cache, messages))
             return false;
@@ -64,7 +64,7 @@ static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, 
     Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
     if (!renderer) return false;
     renderer_render(renderer, 0, picture_stop, NULL);
-    // both in the order of the RAYS_… of kernels/types.h
+    // both in the order of RAYS_… (kernels/types.h)
     memcpy(row->rays, renderer_report(renderer)->rays, sizeof row->rays);
     renderer_close(renderer);
     return true;
@@ -100,7 +100,8 @@ typedef struct {
     double end_seconds;
 } RunContext;
 
-// Reads of each line of memory, as an encoder would: a driver may have left the pixels on the device.
+// Reads one value per cache line, as an encoder would: a driver may leave the pixels on the device until
+// then.
 static bool band_read(void *context, const Band *band, double fraction_done)
 {
     (void)fraction_done;

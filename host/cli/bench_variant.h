@@ -1,4 +1,4 @@
-// One way of rendering one scene, opened to be run again and again.
+// One configuration of one scene, opened once and run repeatedly.
 #pragma once
 
 #include "host/measure/bench.h"
@@ -7,12 +7,12 @@
 typedef struct {
     const Scene *scene;
     RenderSettings settings;
-    Renderer *renderer; // NULL: not opened, or it does not fit the device
+    Renderer *renderer; // NULL: not open, or not available on the device
 } Variant;
 
-// All that comes before the runs: counts the rays and, where asked for, measures the builds. What does not
-// fit the device becomes the row's failure.
+// Prepares the runs: counts the rays and, if asked, times the builds. What the device cannot do becomes the
+// row's failure.
 void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing_builds);
-// One run; `times` NULL: to warm up. False if the user stopped it.
+// One run; `times` NULL: warm-up. False if the user interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
 void variant_close(Variant *variant); // and zeroes; accepts a zeroed one

@@ -1,4 +1,4 @@
-// glint check: reads a scene and says what is in it; no device is needed.
+// glint check: reads a scene and reports its contents; needs no device.
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/cli/commands.h"
@@ -22,11 +22,9 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] =
-    "usage: glint check SCENE [OPTIONS]\n\n"
-    "Says how many objects, lights and materials a scene has, where it lies, which parts of the kernel it "
-    "needs,\n"
-    "and what was tolerated in it.\n\n" //
+static const char help_text[] = "usage: glint check SCENE [OPTIONS]\n\n"
+                                "Reports a scene's objects, lights, materials, bounds and kernel features, "
+                                "and warns of what is ignored.\n\n" //
     HELP_JSON HELP_LENIENT HELP_HELP;
 
 typedef struct {
@@ -146,7 +144,7 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
     json_print(json, stdout);
 }
 
-// Who renders the scene reads its images; here they need only be there.
+// Only rendering reads the textures; here they must exist.
 static bool images_are_there(const Scene *scene, MessageList *messages)
 {
     const Source source = scene_source(scene);
@@ -179,7 +177,7 @@ int command_check(int argument_count, char **arguments)
         }
     }
     if (optind + 1 != argument_count)
-        return option_usage_fault("check", optind == argument_count ? "which scene?" : "one scene at a time");
+        return option_usage_fault("check", optind == argument_count ? "no scene given" : "takes one scene");
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};
@@ -188,7 +186,7 @@ int command_check(int argument_count, char **arguments)
         json_report(path, &scene, loaded, &messages);
         message_list_free(&messages);
     } else {
-        messages_tell(&messages, path);
+        messages_print(&messages, path);
         if (loaded) {
             SceneFacts facts = facts_of(&scene);
             text_print(path, &scene, &facts);

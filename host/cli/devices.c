@@ -1,4 +1,4 @@
-// glint devices: every device of every platform, with what matters for tracing.
+// glint devices: every device of every platform, with the properties that matter for tracing.
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
@@ -19,8 +19,8 @@ static const struct option long_options[] = {
 };
 
 static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
-                                "Lists every OpenCL device of every platform; * marks the one that is used "
-                                "unless --device says otherwise.\n\n" //
+                                "Lists every OpenCL device of every platform; * marks the default."
+                                "\n\n" //
     HELP_JSON HELP_HELP;
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
@@ -153,7 +153,7 @@ int command_devices(int argument_count, char **arguments)
         if (option != OPTION_JSON) return EXIT_USER;
         as_json = true;
     }
-    if (optind < argument_count) return option_usage_fault("devices", "it takes no arguments");
+    if (optind < argument_count) return option_usage_fault("devices", "takes no arguments");
 
     DeviceList list;
     device_list_open(&list);

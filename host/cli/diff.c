@@ -1,4 +1,4 @@
-// glint diff: how far apart two pictures are.
+// glint diff: compares two images.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
@@ -22,9 +22,11 @@ static const struct option long_options[] = {
 };
 
 static const char help_text[] =
-    "usage: glint diff REFERENCE PICTURE [OPTIONS]\n\n"
-    "Compares two pictures (PNG, PPM, EXR or NPY) of one size and kind. Exit status 0: equal; 3: not.\n\n"
-    "      --heatmap FILE    a picture of the differences: .png, .ppm, .exr or .npy\n" HELP_JSON HELP_HELP;
+    "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
+    "Compares two images (PNG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal; 3: "
+    "different.\n\n"
+    "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_JSON
+        HELP_HELP;
 
 typedef struct {
     const char *reference_path, *test_path, *heatmap_path;
@@ -124,7 +126,7 @@ static void text_print(const DiffOptions *options, const Comparison *comparison)
     else
         printf("  %zu of %zu values differ\n", metrics->differing_count, value_count);
     if (metrics->nonfinite_reference + metrics->nonfinite_test > 0)
-        printf("  pixels not finite: %zu and %zu; they are left out of the light's numbers\n",
+        printf("  nonfinite pixels: %zu and %zu; excluded from the figures of light\n",
                metrics->nonfinite_reference, metrics->nonfinite_test);
     if (metrics->differing_count == 0) return;
     printf("  light      max %.4g, RMSE %.4g, bias %+.4g, 99.9 %% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
@@ -142,7 +144,7 @@ static void text_print(const DiffOptions *options, const Comparison *comparison)
     values_print(worst_values(comparison, &comparison->test), reference->channels);
     printf("\n");
     if (options->heatmap_path)
-        printf("  heat map   %s: logarithmic, white %.3g, black %.3g or less, red not finite\n",
+        printf("  heat map   %s: logarithmic, white %.3g, black %.3g or less, red nonfinite\n",
                options->heatmap_path, linear->largest, linear->largest * pow(10, -HEATMAP_DECADES));
 }
 
@@ -184,7 +186,7 @@ int command_diff(int argument_count, char **arguments)
             return EXIT_USER;
         }
     }
-    if (optind + 2 != argument_count) return option_usage_fault("diff", "it takes two pictures");
+    if (optind + 2 != argument_count) return option_usage_fault("diff", "takes two images");
     options.reference_path = arguments[optind];
     options.test_path = arguments[optind + 1];
     if (options.heatmap_path && image_format_of(options.heatmap_path) == IMAGE_UNKNOWN)
@@ -193,7 +195,7 @@ int command_diff(int argument_count, char **arguments)
     Comparison comparison = {0};
     MessageList messages = {0};
     bool compared = pictures_compare(&options, &comparison, &messages);
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     if (compared && options.as_json)
         json_report(&options, &comparison);
     else if (compared)

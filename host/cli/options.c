@@ -12,7 +12,7 @@
 const char *const lanes_choice_names[LANES_CHOICE_COUNT] = {"1", "4", "8", "16"};
 const uint32_t lanes_choice_values[LANES_CHOICE_COUNT] = {1, 4, 8, 16};
 
-// Decimal digits only; *end is left behind them.
+// Decimal digits only; *end receives the position after them.
 static bool digits_read(const char *value, const char **end, uint64_t *result)
 {
     *result = 0;
@@ -29,7 +29,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
     const char *end;
     uint64_t number;
     if (!digits_read(value, &end, &number) || *end != '\0' || number < smallest || number > largest) {
-        fprintf(stderr, "glint: --%s: expected a whole number from %u to %u, not \"%s\"\n", option, smallest,
+        fprintf(stderr, "glint: --%s: expected an integer from %u to %u, not \"%s\"\n", option, smallest,
                 largest, value);
         return false;
     }
@@ -160,11 +160,11 @@ int option_help(const char *text)
 
 int option_usage_fault(const char *command, const char *what)
 {
-    fprintf(stderr, "glint %s: %s; glint %s --help tells more\n", command, what, command);
+    fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
     return EXIT_USER;
 }
 
-void messages_tell(MessageList *messages, const char *path)
+void messages_print(MessageList *messages, const char *path)
 {
     const char *ending = path ? strrchr(path, '.') : NULL;
     if (ending && strcasecmp(ending, ".rt") == 0 && message_count(messages, MESSAGE_ERROR) > 0)
@@ -177,14 +177,14 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
 {
     MessageList messages = {0};
     bool loaded = scene_load(scene, path, &(SceneOptions){.lenient = common->lenient}, &messages);
-    messages_tell(&messages, path);
+    messages_print(&messages, path);
     return loaded;
 }
 
 bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path)
 {
     if (!scene_was_read_from(scene, scene_path, path)) return true;
-    fprintf(stderr, "glint: would overwrite '%s', which the scene is read from; name another with -o\n",
+    fprintf(stderr, "glint: would overwrite '%s', which the scene is read from; choose another with -o\n",
             path);
     return false;
 }
@@ -221,7 +221,7 @@ bool device_open(OpenDevice *open, const char *wish)
     device_list_open(&open->devices);
     MessageList messages = {0};
     const Device *device = device_choose(&open->devices, device_wish(wish), &messages);
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     if (!device) {
         device_list_close(&open->devices);
         return false;

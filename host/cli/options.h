@@ -1,4 +1,4 @@
-// What the subcommands' options have in common: reading their values, opening the device, loading the scene.
+// Shared by the commands: reading option values, opening the device, loading the scene.
 #pragma once
 
 #include "host/opencl/compute.h"
@@ -8,17 +8,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// The options of every subcommand that uses a device.
+// Options of every command that uses a device.
 typedef struct {
     const char *device;
     Precision precision;
-    uint32_t lanes; // 0: the device's own
+    uint32_t lanes; // 0: the device's default
     BvhChoice bvh;
     bool no_cache, lenient;
     uint32_t perturb_seed, perturb_scale; // 0: not given
 } CommonOptions;
 
-// Values of getopt_long beyond the letters; each subcommand's own start at OPTION_OWN.
+// getopt_long values of long options; a command's own start at OPTION_OWN.
 enum {
     OPTION_DEVICE = 256,
     OPTION_PRECISION,
@@ -39,34 +39,34 @@ enum {
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
 
-// Of the subcommands that draw or trace.
+// For commands that render or trace.
 #define PERTURB_LONG_OPTION                                                                                  \
     {                                                                                                        \
         "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
     }
 
-// A line of help for each option that several subcommands have; a subcommand's text ends with HELP_HELP.
+// Help for options that several commands share; a command's help ends with HELP_HELP.
 #define HELP_DEVICE                                                                                          \
-    "      --device D        an index, a part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "  \
+    "      --device D        index, part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "       \
     "else a CPU)\n"
 #define HELP_LANES                                                                                           \
-    "      --lanes N         rays a work-item carries at once: 1, 4, 8 or 16 (default: the device's own)\n"
-#define HELP_BOUNCES  "      --bounces N       reflections and refractions of a ray, at most (default: 5)\n"
-#define HELP_NO_CACHE "      --no-cache        build the kernels anew and keep nothing\n"
-#define HELP_LENIENT  "      --lenient         skip what .rt files hold beyond the format, with a warning\n"
+    "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
+#define HELP_BOUNCES                                                                                         \
+    "      --bounces N       maximum number of reflections and refractions of a ray (default: 5)\n"
+#define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
+#define HELP_LENIENT  "      --lenient         skip unknown elements of .rt files with a warning\n"
 #define HELP_PERTURB                                                                                         \
     "      --perturb SEED[:SCALE]\n"                                                                         \
-    "                        err in divisions, roots and powers as other devices may, SCALE times as much "  \
-    "(default: 1)\n"
-#define HELP_JSON "      --json            for programs\n"
-#define HELP_HELP "  -h, --help            this text\n"
+    "                        inject the rounding error that OpenCL permits, times SCALE (default: 1)\n"
+#define HELP_JSON "      --json            print JSON\n"
+#define HELP_HELP "  -h, --help            print this help\n"
 
-// Of COMMON_LONG_OPTIONS.
+// For COMMON_LONG_OPTIONS.
 #define HELP_COMMON                                                                                          \
     HELP_DEVICE                                                                                              \
     "      --precision P     fast, single, strict or double (default: single)\n" HELP_LANES                  \
-    "      --bvh B           auto, on or off: rays through a hierarchy; the picture is the same "            \
-    "(default: auto)\n" HELP_NO_CACHE HELP_LENIENT
+    "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
+        HELP_LENIENT
 
 enum { PICTURE_SIDE_LARGEST = 1 << 20, SAMPLES_LARGEST = 1 << 20, BOUNCES_LARGEST = 16, BOUNCES_DEFAULT = 5 };
 
@@ -74,40 +74,39 @@ enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
 extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 
-// Whether writing `path` would overwrite what the scene was read from; says so then.
+// False, with a message, if writing `path` would overwrite a file that the scene was read from.
 bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path);
 
-// What reading a command line gives where the subcommand is to go on; else it gives the exit status.
+// Result of reading a command line if the command is to run; otherwise it is the exit status.
 enum { OPTIONS_READ = -1 };
 
-// Each reads one value; on a fault it prints what is wrong with `option` and returns false.
+// Each reads one value; on a mistake prints what `option` expects and returns false.
 bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
                   uint32_t *result);
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // WxH
 bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
                    unsigned *result);
-// Comma-separated names; the result has a bit for each.
+// Comma-separated names; the result has one bit per name.
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,
                 unsigned *result);
-// Takes a common option; *valid says whether its value was one. False if `option` is none of the common
-// ones.
+// Handles a common option; *valid receives whether its value is valid. False if `option` is not a common one.
 bool option_common(CommonOptions *common, int option, const char *value, bool *valid);
 
-// Prints what --help asks for; returns EXIT_DONE.
+// Prints the help text; returns EXIT_DONE.
 int option_help(const char *text);
-// Says that the command line of a subcommand is wrong in general, pointing to its help; returns EXIT_USER.
+// Prints a usage error that points to --help; returns EXIT_USER.
 int option_usage_fault(const char *command, const char *what);
 
-// Loads the scene and prints its messages. False: it cannot be read; nothing to free.
+// Loads the scene and prints its messages. False if it cannot be read; nothing to free then.
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
-// Prints and frees messages; a fault in an .rt file is headed by the line that miniRT's testers look for.
-void messages_tell(MessageList *messages, const char *path);
+// Prints and frees messages; errors in an .rt file follow the line `Error` that miniRT's testers expect.
+void messages_print(MessageList *messages, const char *path);
 
-// A whole picture as the common options have it: one sample, no bounces, the scene as it is.
+// Settings for a full image with the common options: one sample, no bounces, the scene not shifted.
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height);
 
-// A picture's size where the user gave none (width 0): the scene's own, else 1280 wide at the frame's shape
-// or 16:9.
+// The default image size if none is given (width 0): the scene's own, else 1280 wide with the camera frame's
+// aspect ratio, or 16:9.
 void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height);
 
 typedef struct {
@@ -115,7 +114,7 @@ typedef struct {
     Compute compute;
 } OpenDevice;
 
-// Chooses and opens a device. False: there is none, which was printed; nothing to close.
+// Chooses and opens a device. False, with a message, if there is none; nothing to close then.
 bool device_open(OpenDevice *open, const char *wish);
-// At a command's end. The context ends with the process: PoCL takes 80 ms to free what its compiler has read.
+// At the end of a command. Leaves the context to the process's end: PoCL takes 80 ms to free its compiler.
 void device_close(OpenDevice *open);

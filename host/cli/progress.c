@@ -8,7 +8,7 @@
 
 static volatile sig_atomic_t interrupted;
 
-// Often two come at once, to the process and to its group; who sends a third has waited.
+// Two often arrive together, for the process and its group; a third means the user insists.
 static void interrupt_note(int signal_number)
 {
     if (interrupted) signal(signal_number, SIG_DFL);
@@ -24,7 +24,7 @@ void progress_open(Progress *progress, bool quiet)
     struct sigaction before;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    // nohup has it ignored
+    // nohup ignores it
     if (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
         sigaction(SIGHUP, &action, NULL);
 }
@@ -32,7 +32,7 @@ void progress_open(Progress *progress, bool quiet)
 void progress_show(Progress *progress, double fraction_done)
 {
     double now = clock_seconds();
-    // short renders show nothing, long ones a few times a second
+    // no progress for short renders, a few updates per second for long ones
     if (!progress->visible || now - progress->shown_seconds < 0.25) return;
     progress->shown_seconds = now;
     double spent = now - progress->start_seconds;

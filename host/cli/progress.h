@@ -1,4 +1,4 @@
-// How far a long render is, on a terminal only, and whether the user wants it to end.
+// Progress of a long render, on a terminal only, and the user's interrupts.
 #pragma once
 
 #include <stdbool.h>
@@ -8,10 +8,9 @@ typedef struct {
     double start_seconds, shown_seconds;
 } Progress;
 
-// From here on an interrupt, a request to end or the terminal's end is noted, not obeyed at once; a third
-// ends the process.
+// From here on SIGINT, SIGTERM and SIGHUP set a flag; the third ends the process.
 void progress_open(Progress *progress, bool quiet);
-// `fraction_done` is above 0 and at most 1, which is all; from it and the time spent follows the time left.
+// `fraction_done`: above 0, at most 1; the remaining time is extrapolated from it.
 void progress_show(Progress *progress, double fraction_done);
-void progress_close(Progress *progress); // wipes the line; signals are noted as before
+void progress_close(Progress *progress); // erases the line; signals still only set the flag
 bool progress_interrupted(void);

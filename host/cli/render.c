@@ -138,8 +138,7 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
     if (optind + 1 != argument_count)
-        return option_usage_fault("render",
-                                  optind == argument_count ? "which scene?" : "one scene at a time");
+        return option_usage_fault("render", optind == argument_count ? "no scene given" : "takes one scene");
     options->scene = arguments[optind];
     return OPTIONS_READ;
 }
@@ -194,7 +193,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     if (!renderer) {
-        messages_tell(&messages, NULL);
+        messages_print(&messages, NULL);
         return EXIT_USER;
     }
     Progress progress;
@@ -210,7 +209,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
         picture_abandon(picture);
     progress_close(&progress);
     bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
     if (status == EXIT_INTERRUPTED)
         fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",

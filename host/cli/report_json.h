@@ -1,4 +1,4 @@
-// Parts of the JSON that several reports share.
+// JSON members shared by several reports.
 #pragma once
 
 #include "host/base/json.h"
@@ -6,10 +6,10 @@
 #include "host/opencl/device.h"
 
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
-// In place of what is not available, in the object that is open.
+// The reason in place of a missing figure, in the open object.
 void unavailable_json(Json *json, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
-void device_json(Json *json, const Device *device); // what it is, into the object that is open
+void device_json(Json *json, const Device *device); // the device's members, in the open object
 void size_json(Json *json, uint32_t width, uint32_t height);
 void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0

@@ -15,7 +15,7 @@ bool timing_style_read(const char *value, TimingStyle *style)
     return true;
 }
 
-// Sums over launches: events where they can be trusted, and the host's clock.
+// Sums over launches: by events where they are trusted, and by the host's clock.
 typedef struct {
     double event_seconds, host_seconds;
     size_t count, untrusted_count;
@@ -34,7 +34,7 @@ static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
     return sum;
 }
 
-// A command that waited this long before it ran: the driver was doing something else, such as compiling.
+// A longer wait before a command runs means that the driver did something else, such as compiling.
 static double launch_delay(const LaunchTime *time)
 {
     double delay = time->trusted ? time->host_seconds - time->event_seconds : 0;

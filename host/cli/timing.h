@@ -1,4 +1,4 @@
-// The time of every stage and launch of a render, for people or as JSON.
+// The time of every stage and launch of a render, as text or JSON.
 #pragma once
 
 #include "host/opencl/device.h"

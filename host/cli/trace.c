@@ -1,4 +1,4 @@
-// glint trace: explicit rays, their hits as CSV.
+// glint trace: explicit rays in, hits as CSV out.
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -25,15 +25,14 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] =
-    "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
-    "Writes object,t,nx,ny,nz for each ray; an empty object is a miss. Scene and rays are taken as they "
-    "are,\n"
-    "each number rounded once to the precision.\n\n"
-    "      --rays FILE       one ray a line: ox oy oz dx dy dz [tmin tmax], decimal or C's hexadecimal; - is "
-    "the\n"
-    "                        standard input; # begins a comment\n"
-    "  -o, --output FILE     the CSV (default: the standard output)\n" //
+static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+                                "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays "
+                                "are not shifted to the eye;\n"
+                                "each number is rounded once to the precision.\n\n"
+                                "      --rays FILE       one ray per line: ox oy oz dx dy dz [tmin tmax], "
+                                "decimal or C hexadecimal; - is\n"
+                                "                        standard input; # starts a comment\n"
+                                "  -o, --output FILE     CSV file (default: standard output)\n" //
     HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
@@ -46,7 +45,7 @@ typedef struct {
     size_t count, capacity;
 } RayList;
 
-// The numbers of one line, at most eight; the count, or -1 where something is no number.
+// Reads up to eight numbers of a line; returns their count, or -1 if a word is not a number.
 static int line_numbers(Report *report, size_t start, size_t end, double numbers[8])
 {
     const Source *source = report->source;
@@ -126,7 +125,7 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
         Source source = {options->rays, text_c(&text), text.count};
         read = rays_read(rays, &source, &options->common, &messages);
     }
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     text_free(&text);
     return read;
 }
@@ -149,12 +148,12 @@ static bool hits_write(const char *path, const TraceHit *hits, size_t count, boo
         }
         written = output_commit(&output, &messages);
     }
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     return written;
 }
 
-// A ray in lengths of 2^exponent of its own: its direction's largest component lies within 0.5 and 1, so that
-// the square of its length neither vanishes nor overflows. Exact, and so are the answers.
+// A ray scaled by a power of two so that its direction's largest component lies in 0.5 to 1 and its squared
+// length neither underflows nor overflows. The scaling is exact.
 static TraceRay ray_scaled(TraceRay ray, double farthest, int *exponent)
 {
     double *d = ray.direction;
@@ -171,7 +170,7 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     const RenderSettings settings = settings_whole(&options->common, 1, 1);
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     if (!renderer) return EXIT_USER;
     TraceRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
     TraceHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
@@ -206,8 +205,8 @@ static int options_read(TraceOptions *options, int argument_count, char **argume
             return EXIT_USER;
     }
     if (optind + 1 != argument_count)
-        return option_usage_fault("trace", optind == argument_count ? "which scene?" : "one scene at a time");
-    if (!options->rays) return option_usage_fault("trace", "which rays? name a file with --rays");
+        return option_usage_fault("trace", optind == argument_count ? "no scene given" : "takes one scene");
+    if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
     options->scene = arguments[optind];
     return OPTIONS_READ;
 }

@@ -24,7 +24,7 @@ bool option_positive(const char *option, const char *value, double *result)
     return true;
 }
 
-// Numbers separated by commas.
+// Comma-separated numbers.
 static bool option_samples(VariantOptions *options, const char *value)
 {
     options->sample_choices = 0;
@@ -98,7 +98,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
             for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
                 for (size_t i = 0; i < sample_choices; i++) {
                     if (!(options->precisions >> precision & 1) || !(options->bvhs >> bvh & 1)) continue;
-                    // where no lanes are asked for, once with the device's own
+                    // without --lanes: once with the device's default
                     if (options->lanes ? !(options->lanes >> lanes & 1) : lanes > 0) continue;
                     settings.precision = (Precision)precision;
                     settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
@@ -133,7 +133,7 @@ static bool all_settled(const VariantSet *set)
     return true;
 }
 
-// Every variant once. False if the user stopped it.
+// Runs every variant once. False if the user interrupted.
 static bool round_run(VariantSet *set, bool warm_up)
 {
     for (size_t i = 0; i < set->count; i++)

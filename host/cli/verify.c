@@ -72,7 +72,7 @@ static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hi
     settings.extra_features = prober->options->lean ? lean_features : FEATURE_ALL;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
-    messages_tell(&messages, NULL);
+    messages_print(&messages, NULL);
     if (!renderer) fault("a hard case does not fit the device");
     prober->lanes = renderer_report(renderer)->lanes;
     return renderer;

@@ -41,7 +41,7 @@ _glint_trace() {
 
 _glint_check() {
     _arguments \
-        '--json[for programs]' \
+        '--json[print JSON]' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
@@ -49,7 +49,7 @@ _glint_check() {
 
 _glint_devices() {
     _arguments \
-        '--json[for programs]' \
+        '--json[print JSON]' \
         '(- *)'{-h,--help}'[list the options]'
 }
 
@@ -61,14 +61,14 @@ _glint_verify() {
         '--no-cache[build the kernels anew]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--lean[build small kernels, for a slow compiler]' \
-        '--json[for programs]' \
+        '--json[print JSON]' \
         '(- *)'{-h,--help}'[list the options]'
 }
 
 _glint_diff() {
     _arguments \
         '--heatmap[picture of the differences]:picture:_files -g "*.(png|ppm|exr|npy)"' \
-        '--json[for programs]' \
+        '--json[print JSON]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:reference:_files -g "*.(png|ppm|exr|npy)"' \
         '2:picture:_files -g "*.(png|ppm|exr|npy)"'
@@ -82,7 +82,7 @@ _glint_bench() {
         '--size[width and height in pixels]:WxH:' \
         '--seconds[end the runs after so long]:seconds:' \
         '--launches[list the launches of the last runs]' \
-        '--json[for programs]' \
+        '--json[print JSON]' \
         '--compare[hold against an earlier report]:report:_files -g "*.json"' \
         '--tolerance[new time over old that passes]:ratio:' \
         '--device[device to render on]:device:(cpu gpu)' \
@@ -103,7 +103,7 @@ _glint_accuracy() {
         '--seconds[end the runs after so long]:seconds:' \
         '--save[where all that is compared goes]:folder:_files -/' \
         '--html[a page with plots and pictures]:file:_files -g "*.html"' \
-        '--json[for programs]' \
+        '--json[print JSON]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--lenient[skip unknown elements of a .rt scene]' \
