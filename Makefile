@@ -1,6 +1,7 @@
 # make [BUILD=folder] [CFLAGS=…]: the user owns CFLAGS, and a variant is another BUILD folder. One whose name ends in
 # -sanitize is built with ASan and UBSan. A newer compiler's warnings: CFLAGS='-O2 -Wno-error'.
 VERSION := 0.1.0
+MAKEFLAGS += --no-builtin-rules
 
 CFLAGS ?= -O2 -g
 BUILD  ?= build

@@ -1,5 +1,6 @@
 // Messages with their place, growing text, words near to one another, hashes, and output beside its target.
 #include "host/base/array.h"
+#include "host/base/base64.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
@@ -408,6 +409,28 @@ static void test_hash(void **state)
     assert_true(hash_bytes(hash_bytes(HASH_START, "foo", 3), "bar", 3) == UINT64_C(0x85944171f73967e8));
 }
 
+// RFC 4648, section 10.
+static void test_base64(void **state)
+{
+    (void)state;
+    static const char *const cases[][2] = {
+        {"", ""},
+        {"f", "Zg=="},
+        {"fo", "Zm8="},
+        {"foo", "Zm9v"},
+        {"foob", "Zm9vYg=="},
+        {"fooba", "Zm9vYmE="},
+        {"foobar", "Zm9vYmFy"},
+        {"\xFB\xFF", "+/8="},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Text text = {0};
+        base64_append(&text, (const uint8_t *)cases[i][0], strlen(cases[i][0]));
+        assert_string_equal(text_c(&text), cases[i][1]);
+        text_free(&text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -429,6 +452,7 @@ int main(void)
         cmocka_unit_test(test_output_settle),
         cmocka_unit_test(test_output_failures),
         cmocka_unit_test(test_output_abandon),
+        cmocka_unit_test(test_base64),
         cmocka_unit_test(test_fault_removes_the_temporary),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);

@@ -1,4 +1,4 @@
-// glint accuracy: speed against error, for each way of rendering.
+// glint accuracy: speed against error, per precision, lanes, BVH choice and samples.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
@@ -6,6 +6,7 @@
 #include "host/cli/accuracy_report.h"
 #include "host/cli/commands.h"
 #include "host/cli/layers.h"
+#include "host/cli/page.h"
 #include "host/cli/variants.h"
 #include "host/image/image.h"
 #include <errno.h>
@@ -32,13 +33,13 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint accuracy SCENE... [OPTIONS]\n\n"
-    "Renders each scene in each way asked for, and tells the times beside the errors against a reference.\n\n"
-    "      --reference FILE  linear colors to compare with, .exr or .npy (default: the device's own picture "
+    "Measure speed and error of scenes in every requested configuration.\n\n"
+    "      --reference FILE  linear colors to compare with, .exr or .npy (default: the device's own image "
     "at double)\n"
-    "      --samples LIST    per pixel, each on its own; the reference takes the most of them (default: 1)\n"
-    "      --save FOLDER     write all that is compared there, as .npy\n"
-    "      --html FILE       a page with plots and pictures, that needs nothing but itself\n"
-    "      --precision LIST  of fast, single, strict, double (default: all of them)\n" //
+    "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
+    "      --save FOLDER     write all compared arrays there, as .npy\n"
+    "      --html FILE       self-contained HTML report\n"
+    "      --precision LIST  of fast, single, strict, double (default: all)\n" //
     HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
@@ -51,9 +52,9 @@ typedef struct {
     AccuracyOptions options;
     OpenDevice open;
     VariantSet set;
-    PictureLayers reference; // of the scene at work; read from a file: of the only one
+    PictureLayers reference; // of the current scene; of the only one if it is from a file
     AccuracyScene *scenes;
-    OutputFile page; // opened before anything is measured
+    OutputFile page; // opened before measuring, so that it fails early
     MessageList messages;
 } Accuracy;
 
@@ -95,7 +96,7 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
     return OPTIONS_READ;
 }
 
-// Before anything is measured. False, with a message, where it cannot be used.
+// Reads --reference. On failure adds a message and returns false.
 static bool reference_read(Accuracy *accuracy)
 {
     const char *path = accuracy->options.reference_path;
@@ -110,7 +111,7 @@ static bool reference_read(Accuracy *accuracy)
     bool fits = image.width == settings->width && image.height == settings->height;
     if (!fault && !fits)
         message_add(&accuracy->messages, MESSAGE_ERROR,
-                    "the reference '%s' has %ux%u pixels, the pictures have %ux%u", path, image.width,
+                    "the reference '%s' has %ux%u pixels, the images have %ux%u", path, image.width,
                     image.height, settings->width, settings->height);
     accuracy->reference =
         (PictureLayers){.width = image.width, .height = image.height, .wide = true, .color = colors};
@@ -118,7 +119,7 @@ static bool reference_read(Accuracy *accuracy)
     return !fault && fits;
 }
 
-// The scene's picture in double with the most samples of any variant, unperturbed. EXIT_DONE, or why not.
+// Renders the scene in double with the most samples of any variant, unperturbed. EXIT_DONE, or why not.
 static int reference_render(Accuracy *accuracy, AccuracyScene *scene, const Variant *variants)
 {
     RenderSettings settings = variants[0].settings;
@@ -195,7 +196,7 @@ static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVaria
     return saved ? EXIT_DONE : EXIT_USER;
 }
 
-// Compares the variants of one scene, `first` and on, with its reference.
+// Compares the variants of one scene, from `first` on, with its reference.
 static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
 {
     AccuracyScene *scene = &accuracy->scenes[scene_index];
@@ -214,7 +215,7 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
     return status;
 }
 
-// The scenes' variants, before any is compared.
+// Sorts the measured variants into scenes.
 static void scenes_prepare(Accuracy *accuracy)
 {
     const VariantSet *set = &accuracy->set;
@@ -252,7 +253,7 @@ static bool has_reference(Accuracy *accuracy)
     const Device *device = accuracy->open.compute.device;
     if (accuracy->options.reference_path || device->fp64) return true;
     message_add(&accuracy->messages, MESSAGE_ERROR,
-                "the device \"%s\" has no 64-bit floating point to make a reference with: name one with "
+                "the device \"%s\" has no 64-bit floating point for a reference: name one with "
                 "--reference",
                 device->name);
     return false;
@@ -262,7 +263,7 @@ static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)
 {
     if (!accuracy->options.page_path) return true;
     Text page = {0};
-    accuracy_page(&page, report);
+    page_append(&page, accuracy_json(report), accuracy_page_extras(report));
     bool written = output_write(&accuracy->page, page.items, page.count, &accuracy->messages) &&
                    output_commit(&accuracy->page, &accuracy->messages);
     text_free(&page);

@@ -1,9 +1,18 @@
-// What glint accuracy reports, as one page of HTML that needs nothing beside it: no network, no other file.
+// What the HTML report of glint accuracy needs besides its JSON: the variants' names, the images and their
+// differences.
 #pragma once
 
-#include "host/base/text.h"
+#include "host/base/json.h"
 #include "host/cli/accuracy_report.h"
 
-// Appends the page: the text of page/page.html with its places filled, the figures as accuracy_json has them,
-// and the pictures with 8 bits.
-void accuracy_page(Text *page, const AccuracyReport *report);
+// An object with
+//   difference_decades, difference_colors  the scale of differences: the first color up to 10^-decades, then
+//   two
+//                                          colors per decade up to 1, which also shows larger ones; last, not
+//                                          finite
+//   scenes[].names                         of its variants
+//   scenes[].images[]                      one for each set of images that are equal as 32-bit floats, the
+//                                          reference's first:
+//       .variants                          whose image it is
+//       .image, .difference                8-bit PNG as data: URI; the reference has no difference
+Json *accuracy_page_extras(const AccuracyReport *report);

@@ -7,7 +7,7 @@
 #include <string.h>
 
 static const char is_reference[] =
-    "it is the reference: the others are held to it, and it has no errors of its own here";
+    "it is the reference that the others are compared with, and has no errors of its own";
 
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
                            const AccuracyVariant *variant)
@@ -37,7 +37,7 @@ void accuracy_variant_name(Text *text, const AccuracyScene *scene, const Accurac
     }
     text_appendf(text, "%s", key->precision);
     if (lanes) text_appendf(text, " with %u %s", key->lanes, key->lanes == 1 ? "lane" : "lanes");
-    if (bvh) text_appendf(text, " with hierarchy %s", key->bvh);
+    if (bvh) text_appendf(text, " with BVH %s", key->bvh);
     if (samples)
         text_appendf(text, " with %u %s", variant->samples, variant->samples == 1 ? "sample" : "samples");
 }
@@ -88,7 +88,7 @@ void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
 
 static const char table_head[] =
     "                              frame   wrong object   wrong shadow     wrong path          shading"
-    "             t     normal  picture   8-bit values         FLIP\n"
+    "             t     normal    image   8-bit values         FLIP\n"
     "  precision lanes bvh  samp.     ms   edge    away   edge    away   edge    away     RMSE      max"
     "   99.9% ulp   99.9%       dB  off 1   more     mean    max\n";
 
@@ -132,12 +132,12 @@ static void variant_print(const AccuracyVariant *variant, FILE *stream)
     fprintf(stream, "%c %-9s %5u %-4s %5u", variant->crossed_out ? 'x' : ' ', key->precision, key->lanes,
             key->bvh, variant->samples);
     if (variant->status == ACCURACY_UNAVAILABLE) {
-        fprintf(stream, "  cannot be had: %s\n", variant->row->failure);
+        fprintf(stream, "  unavailable: %s\n", variant->row->failure);
         return;
     }
     fprintf(stream, " %6.4g", frame_ms(variant));
     if (variant->status == ACCURACY_REFERENCE)
-        fputs("  the reference, which the others are held to\n", stream);
+        fputs("  the reference\n", stream);
     else
         errors_print(&variant->errors, stream);
     crossed_print(variant, stream);
@@ -160,12 +160,13 @@ static void reference_print(const AccuracyScene *scene, FILE *stream)
 static void kernels_print(const AccuracyScene *scene, FILE *stream)
 {
     fputs("  kernels:", stream);
-    for (size_t i = 0, told = 0; i < scene->variant_count; i++) {
+    for (size_t i = 0, printed = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *variant = &scene->variants[i];
         if (variant->status == ACCURACY_UNAVAILABLE) continue;
         Text name = {0};
         accuracy_variant_name(&name, scene, variant);
-        fprintf(stream, "%s %s %016" PRIx64, told++ > 0 ? "," : "", text_c(&name), variant->row->kernel_hash);
+        fprintf(stream, "%s %s %016" PRIx64, printed++ > 0 ? "," : "", text_c(&name),
+                variant->row->kernel_hash);
         text_free(&name);
     }
     fputc('\n', stream);
@@ -176,8 +177,8 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
     const Device *device = report->device;
     fprintf(stream, "%s, %s %s\n", device->name, device->platform_name, device->driver);
     if (report->perturb_seed > 0)
-        fprintf(stream, "every variant errs as devices may: --perturb %u:%u\n", report->perturb_seed,
-                report->perturb_scale);
+        fprintf(stream, "every variant with injected rounding errors: --perturb %u:%u\n",
+                report->perturb_seed, report->perturb_scale);
     for (size_t i = 0; i < report->scene_count; i++) {
         const AccuracyScene *scene = &report->scenes[i];
         fprintf(stream, "\n%s, %ux%u\n", scene->path, scene->width, scene->height);

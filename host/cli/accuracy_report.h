@@ -1,4 +1,4 @@
-// What glint accuracy reports: tables and plain words for people, or JSON.
+// What glint accuracy reports: text or JSON.
 #pragma once
 
 #include "host/base/json.h"
@@ -8,22 +8,23 @@
 
 typedef struct {
     const Device *device;
-    uint32_t perturb_seed, perturb_scale; // 0: nothing was made to err
+    uint32_t perturb_seed, perturb_scale; // 0: no injected errors
     const AccuracyScene *scenes;
     size_t scene_count;
-    const char *folder; // where the arrays were saved; NULL: they were not
+    const char *folder; // where the arrays were saved, or NULL
 } AccuracyReport;
 
 void accuracy_print_text(const AccuracyReport *report, FILE *stream);
-Json *accuracy_json(const AccuracyReport *report); // as docs/json.md has it; to be printed
+Json *accuracy_json(const AccuracyReport *report); // docs/json.md; to be printed
 
-// Where the arrays of a scene's variant are, NULL: of its reference: FOLDER/0-scene-single-16-auto-1, say.
+// Path prefix of the saved arrays of a scene's variant, or of its reference if `variant` is NULL:
+// FOLDER/0-scene-single-16-auto-1, for example.
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
                            const AccuracyVariant *variant);
-// The variant's precision, and of lanes, hierarchy and samples what distinguishes it from others of its
+// The variant's precision, and those of lanes, BVH choice and samples that distinguish it from others of its
 // scene.
 void accuracy_variant_name(Text *text, const AccuracyScene *scene, const AccuracyVariant *variant);
-// Why it is crossed out, in words; `index` counts from 0, NULL after the last.
+// A reason why it is crossed out: `index` counts from 0; NULL after the last.
 const char *accuracy_crossed_words(const AccuracyVariant *variant, size_t index);
 // "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06".
 void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick);

@@ -28,7 +28,7 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind)
 {
     const AccuracyErrors *errors = &variant->errors;
     if (variant->status == ACCURACY_REFERENCE)
-        return (Figure){.why_not = "it is the reference, which the others are held to"};
+        return (Figure){.why_not = "it is the reference that the others are compared with"};
     if (variant->status == ACCURACY_UNAVAILABLE) return (Figure){.why_not = variant->row->failure};
     if (errors->why_colors_only && kind != ACCURACY_IMAGE && kind != ACCURACY_FLIP)
         return (Figure){.why_not = errors->why_colors_only};

@@ -45,4 +45,4 @@ complete -c glint -n '__fish_seen_subcommand_from bench' -l tolerance -x -d 'New
 complete -c glint -n '__fish_seen_subcommand_from accuracy' -l reference -r -F -d 'Linear colors to compare with'
 complete -c glint -n '__fish_seen_subcommand_from accuracy' -l samples -x -d 'Numbers of samples, separated by commas'
 complete -c glint -n '__fish_seen_subcommand_from accuracy' -l save -r -F -d 'Folder for all that is compared'
-complete -c glint -n '__fish_seen_subcommand_from accuracy' -l html -r -F -d 'A page with plots and pictures'
+complete -c glint -n '__fish_seen_subcommand_from accuracy' -l html -r -F -d 'Self-contained HTML report'

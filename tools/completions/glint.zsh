@@ -102,7 +102,7 @@ _glint_accuracy() {
         '--size[width and height in pixels]:WxH:' \
         '--seconds[end the runs after so long]:seconds:' \
         '--save[where all that is compared goes]:folder:_files -/' \
-        '--html[a page with plots and pictures]:file:_files -g "*.html"' \
+        '--html[self-contained HTML report]:file:_files -g "*.html"' \
         '--json[print JSON]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--device[device to render on]:device:(cpu gpu)' \

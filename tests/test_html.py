@@ -1,0 +1,203 @@
+#!/usr/bin/env -S python3 -B
+"""The HTML report of glint accuracy: the JSON in it, and what chromium draws from that, as html_probe.js reads it back."""
+import html
+import json
+import math
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+from glint import IS_SANITIZED, ROOT, TestCase, main, need_device, skip_all, write
+
+CHROMIUM = shutil.which("chromium")
+SMALL = "--size 120x80 --seconds 0.2"
+
+# The figure of each kind that docs/accuracy.md says is plotted.
+PLOTTED = {
+    "object": lambda errors: errors["object"]["edge"] + errors["object"]["away"],
+    "shadow": lambda errors: errors["shadow"]["edge"] + errors["shadow"]["away"],
+    "path": lambda errors: errors["path"]["edge"] + errors["path"]["away"],
+    "shading": lambda errors: errors["shading"]["rmse"],
+    "t": lambda errors: errors["t"]["relative"]["p99_9"],
+    "normal": lambda errors: errors["normal"]["p99_9"],
+    "image": lambda errors: errors["image"]["rmse"],
+    "flip": lambda errors: errors["image"]["flip_mean"],
+}
+# Members of the variants by heading; those of the last three tables are below `errors`.
+COLUMNS = [
+    {"Frame, ms": "frame_ms.median", "Shortest": "frame_ms.min", "Longest": "frame_ms.max", "Runs": "frame_ms.runs",
+     "Kernels, ms": "kernel_ms.median", "Million rays per second": "mrays_per_s"},
+    {"Not finite": "nonfinite", "Negative": "negative", "Object, at silhouettes": "object.edge", "Object, away": "object.away",
+     "Shadow, at edges": "shadow.edge", "Shadow, away": "shadow.away", "Path, at edges": "path.edge", "Path, away": "path.away"},
+    {"Shading, RMSE": "shading.rmse", "Shading, largest": "shading.max", "Shading, 99.9 %": "shading.p99_9",
+     "Shading, bias": "shading.bias", "Distance, 99.9 %": "t.relative.p99_9", "Distance, largest": "t.relative.max",
+     "Distance, 99.9 %, ulp": "t.ulps.p99_9", "Distance, largest, ulp": "t.ulps.max", "Normal, 99.9 %": "normal.p99_9",
+     "Normal, largest": "normal.max"},
+    {"RMSE": "image.rmse", "PSNR, dB": "image.psnr", "relMSE": "image.rel_mse", "8-bit PSNR, dB": "image.srgb_psnr",
+     "8-bit values off by 1": "image.off_by_1", "off by more": "image.off_by_more", "FLIP, mean": "image.flip_mean",
+     "FLIP, largest": "image.flip_max"},
+]  # fmt: skip
+
+
+def member(value, path):
+    for name in path.split("."):
+        value = value.get(name) if isinstance(value, dict) else None
+    return value
+
+
+def printed_number(text):
+    """3.1·10⁻⁶ is 3.1e-6, 921 600 with narrow spaces 921600, ∞ infinity."""
+    text = text.replace("−", "-").replace("\u202f", "").replace("∞", "inf")
+    power = re.fullmatch("(?:(.*)·)?10([⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)", text)
+    digits = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+    return float(f"{power[1] or 1}e{power[2].translate(digits)}" if power else text)
+
+
+def srgb_8_bits(value):
+    """IEC 61966-2-1:1999."""
+    value = min(max(value, 0.0), 1.0)
+    return math.floor(255 * (12.92 * value if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055) + 0.5)
+
+
+def dump(page, *options):
+    """The document, as chromium has it once it is loaded."""
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={Path('browser').resolve()}"]
+    process = subprocess.run([*command, *options, "--dump-dom", Path(page).resolve().as_uri()], stdout=subprocess.PIPE,
+                             stderr=subprocess.DEVNULL, encoding="utf-8", timeout=120, check=True)  # fmt: skip
+    return process.stdout
+
+
+class Html(TestCase):
+    def setUp(self):
+        super().setUp()
+        shutil.copy(ROOT / "scenes/spheres16.yaml", "spheres16.yaml")
+
+    def page(self, arguments):
+        """Runs glint accuracy; checks the JSON in the page against that on standard output, returns both."""
+        process = self.glint(f"accuracy {SMALL} {arguments} --html page.html --json")
+        page = Path("page.html").read_text(encoding="utf-8")
+        embedded = re.search(r'<script type="application/json" id="report">\n(.*?)\n*</script>', page, re.DOTALL)[1]
+        self.assertNotIn("<", embedded)
+        self.assertEqual(embedded.replace("\\u003c", "<").strip(), process.stdout.strip())
+        self.assertEqual(re.findall(r"(?:src|href)=\"(?!data:|#)[^\"]*\"|url\(|@import", page), [])
+        return page, json.loads(process.stdout)
+
+    def check_axis(self, ticks):
+        """From a position to a value, by the first and the last tick; 0 has a tick of its own."""
+        zero = [tick["position"] for tick in ticks if tick["value"] == 0]
+        ticks = sorted((tick for tick in ticks if tick["value"] > 0), key=lambda tick: tick["value"])
+        if not ticks:
+            return lambda position: 0.0 if math.isclose(position, zero[0]) else math.nan
+        first, last = ticks[0], ticks[-1]
+        slope = math.log(last["value"] / first["value"]) / (last["position"] - first["position"])
+
+        def value(position):
+            is_zero = zero and abs(position - zero[0]) < 0.01
+            return 0.0 if is_zero else first["value"] * math.exp(slope * (position - first["position"]))
+
+        for tick in ticks:
+            self.assertAlmostEqual(value(tick["position"]) / tick["value"], 1, delta=1e-3)
+            if "label" in tick:
+                self.assertAlmostEqual(printed_number(tick["label"]) / tick["value"], 1, delta=1e-9)
+        return value
+
+    def check_panel(self, panel, scene):
+        kind, variants = panel["kind"], scene["variants"]
+        expected = [i for i, variant in enumerate(variants) if kind in variant.get("pareto", {})]
+        self.assertEqual([point["variant"] for point in panel["points"]], expected)
+        time, error = self.check_axis(panel["x"]), self.check_axis(panel["y"])
+        for point in panel["points"]:
+            variant = variants[point["variant"]]
+            for end, position in zip(("min", "median", "max"), point["x"]):
+                self.assertAlmostEqual(time(position) / variant["frame_ms"][end], 1, delta=1e-3)
+            figure = PLOTTED[kind](variant["errors"])
+            self.assertAlmostEqual(error(point["y"]), figure, delta=1e-3 * figure)
+            self.assertEqual((point["hollow"], point["crossed"]), (not variant["pareto"][kind], variant["crossed_out"]))
+
+    def check_tables(self, tables, scene):
+        """Each value, in the order of the variants and sorted both ways."""
+        colors_only = scene["reference"]["kind"] == "file"
+        listed = [columns for columns in COLUMNS if not (colors_only and "Normal, largest" in columns)]
+        for columns, table in zip(listed, tables, strict=True):
+            for heading, path in columns.items():
+                path = path if table is tables[0] else f"errors.{path}"
+                expected = {i: member(variant, path) for i, variant in enumerate(scene["variants"])}
+                for index, text in table[heading]["ascending"]:
+                    if "psnr" in path and expected[index] is None:
+                        self.assertEqual(text, "∞")
+                        expected[index] = math.inf
+                    elif expected[index] is None:
+                        self.assertEqual(text, "–", heading)
+                    else:
+                        delta = 0.051 * abs(expected[index])
+                        self.assertAlmostEqual(printed_number(text), expected[index], delta=delta, msg=heading)
+                for order in ("ascending", "descending"):
+                    values = [expected[index] for index, _ in table[heading][order] if expected[index] is not None]
+                    self.assertEqual(values, sorted(values, reverse=order == "descending"), f"{heading}, {order}")
+
+    def check_colors(self, pixels, scene):
+        """The worst pixels have the colors that the figures say, in the reference's image and in their own."""
+        for pixel in pixels:
+            worst = scene["variants"][pixel["variant"]]["worst"][pixel["kind"]]
+            expected = [*map(srgb_8_bits, worst["reference_color"]), *map(srgb_8_bits, worst["variant_color"])]
+            for channel, other in zip(pixel["colors"], expected, strict=True):
+                self.assertAlmostEqual(channel, other, delta=1, msg=pixel)
+
+    def check_drawn(self, page, report):
+        """What html_probe.js finds in the page."""
+        if not CHROMIUM or IS_SANITIZED:  # a sanitized build's page is that of the other build
+            self.skipTest("sanitized" if IS_SANITIZED else "there is no chromium")
+        probe = (ROOT / "tests/html_probe.js").read_text(encoding="utf-8")
+        start = "<script>\"use strict\"; const errors = []; for (const type of ['error', 'securitypolicyviolation'])" \
+                "addEventListener(type, (event) => errors.push(event.message ?? event.blockedURI));</script>"
+        probed = page.replace("<head>", f"<head>{start}", 1).replace("</body>", f"<script>{probe}</script></body>")
+        for width in (1280, 500):
+            drawn = dump(write("probed.html", probed), f"--window-size={width},900")
+            found = json.loads(re.search(r'<script id="found"[^>]*>(.*?)</script>', drawn, re.DOTALL)[1])
+            self.assertEqual((found["errors"], found["loaded"]), ([], []))
+            self.assertEqual(found["overflow"], 0, f"wider than {width} pixels")
+            self.assertEqual([drawn["heading"] for drawn in found["scenes"]], [scene["scene"] for scene in report["scenes"]])
+            for drawn, scene in zip(found["scenes"], report["scenes"], strict=True):
+                kinds = {kind for variant in scene["variants"] for kind in variant.get("pareto", {})}
+                self.assertEqual({panel["kind"] for panel in drawn["panels"]}, kinds)
+                for panel in [*drawn["panels"], *drawn["chosen"]]:
+                    self.check_panel(panel, scene)
+                self.assertEqual([panel["kind"] for panel in drawn["chosen"]], ["image"])
+                self.check_tables(drawn["tables"], scene)
+                self.check_colors(drawn["pixels"], scene)
+                self.assertEqual(drawn["broken"], 0, "images")
+                self.assertEqual(drawn["split"], [50, 25])
+                self.assertTrue(drawn["chosenIsShown"])
+                self.assertEqual(drawn["zoom"], 8)
+                self.assertTrue(drawn["isInSight"], "the worst pixel")
+        sandbox = f'<iframe sandbox="allow-same-origin" srcdoc="{html.escape(page)}"></iframe><script>onload = () =>' \
+                  "document.body.replaceChildren(document.querySelector('iframe').contentDocument.body.innerText)</script>"
+        self.assertIn("JavaScript draws this report", dump(write("sandbox.html", sandbox)))
+
+    def test_two_scenes(self):
+        shutil.copy("spheres16.yaml", "<!--<script>&\"é.yaml")
+        page, report = self.page("spheres16.yaml '<!--<script>&\"é.yaml' --precision fast,double")
+        self.check_drawn(page, report)
+
+    def test_crossed_out(self):
+        """Errors a thousand times those of any device: shadows on whole spheres."""
+        page, report = self.page("spheres16.yaml --precision single --lanes 1,8 --perturb 3:1000")
+        self.assertTrue(report["scenes"][0]["variants"][0]["crossed_out"])
+        self.check_drawn(page, report)
+
+    def test_reference_from_a_file(self):
+        """It has colors only, and no errors of distances and normals."""
+        self.glint("render spheres16.yaml --size 120x80 --precision double -o reference.npy")
+        page, report = self.page("spheres16.yaml --precision fast,double --reference reference.npy")
+        self.check_drawn(page, report)
+
+    def test_refused_before_measuring(self):
+        self.refuses("accuracy spheres16.yaml --html -", "takes a file")
+        self.refuses("accuracy spheres16.yaml --html nowhere/page.html", "nowhere/page.html")
+
+
+if __name__ == "__main__":
+    if not need_device()["fp64"]:
+        skip_all("the device has no 64-bit floating point for a reference")
+    main()
