@@ -1,5 +1,5 @@
 // The errors of pictures made by hand, in which the count of each kind is known, and what follows from errors
-// and times. tests/accuracy.sh holds the same figures of rendered pictures to those of an independent script.
+// and times. tests/test_accuracy.py checks the same figures of rendered images against an independent implementation.
 #include "host/measure/accuracy.h"
 
 #include <float.h>

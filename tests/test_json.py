@@ -5,7 +5,7 @@ import json
 import re
 import unittest
 
-from glint import ROOT, TestCase, main, need_device, read, write
+from glint import PLANET, ROOT, TestCase, main, need_device, read, write
 
 RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
 # Scenes of spheres, one point light and reflection, which share their kernels.
@@ -18,14 +18,6 @@ objects:
 """
 STRONG = PLAIN.replace("[3, 5, -3]", "[3, 5, -3], intensity: 1e30, color: [1e30, 1, 1]")  # beyond float
 WARNED = PLAIN + "  - triangle: {vertices: [[0, 0, 0], [1, 1, 1], [2, 2, 2]]}\n"
-# At single the small sphere sinks into the ground, so the variant is crossed out.
-PLANET = """\
-camera: {position: [0, 6371001.7, 0], look_at: [0, 6371000, 1], fov: 60}
-lights: [{point: {position: [3, 6371006, -1]}}]
-objects:
-  - sphere: {center: [0, 0, 0], radius: 6371000, material: {reflection: 0.1}}
-  - sphere: {center: [0, 6371000.1, 0.8], radius: 0.1}
-"""
 SMALL = "--size 48x32"
 QUICK = "--lanes 1 --seconds 0.1"
 

@@ -1,0 +1,288 @@
+#!/usr/bin/env -S python3 -B
+"""glint accuracy on tiny images: its figures against those computed here by docs/accuracy.md's definitions from the saved
+arrays, a reference from a file, and what is refused. Nothing is asked of the times themselves."""
+import json
+import math
+import tempfile
+from collections import namedtuple
+
+from glint import PLANET, ROOT, TestCase, main, need_device, read, run, skip_all, write
+from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
+
+NOTHING = 0xFFFFFFFF
+SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
+GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
+SPHERES = f"{ROOT}/scenes/spheres16.yaml"
+BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
+Near = namedtuple("Near", "value relative absolute", defaults=(0, 0))
+
+
+def arrays_load(prefix, light_count):
+    arrays = {name: np.load(f"{prefix}.{name}.npy") for name in ("color", "t", "normal", "object", "path")}
+    shape = *arrays["t"].shape, light_count
+    arrays["shadow"] = np.load(f"{prefix}.shadow.npy").reshape(shape) if light_count else np.zeros(shape, np.uint32)
+    assert arrays["color"].dtype == arrays["normal"].dtype == arrays["t"].dtype
+    arrays["bits"] = 53 if arrays["t"].dtype == np.float64 else 24
+    for name in "color", "t", "normal":
+        arrays[name] = arrays[name].astype(np.float64)
+    return arrays
+
+
+def edges_of(values):
+    """Pixels that differ from a 4-neighbor, and the 8 pixels around each of these."""
+    differs = np.zeros(values.shape, bool)
+    across, down = values[:, 1:] != values[:, :-1], values[1:] != values[:-1]
+    differs[:, 1:] |= across
+    differs[:, :-1] |= across
+    differs[1:] |= down
+    differs[:-1] |= down
+    height, width = values.shape
+    padded = np.pad(differs, 1)
+    return np.logical_or.reduce([padded[dy : dy + height, dx : dx + width] for dy in range(3) for dx in range(3)])
+
+
+def wrong_pixels(reference, variant):
+    """Pixels of another object, and, where the object is the same, of another shadow and of another path."""
+    same = variant["object"] == reference["object"]
+    return {"object": ~same, "shadow": (variant["shadow"] != reference["shadow"]) & same[:, :, None],
+            "path": (variant["path"] != reference["path"]) & same}
+
+
+def color_error(reference, variant):
+    with np.errstate(invalid="ignore"):
+        error = np.abs(variant["color"] - reference["color"])
+    finite = [np.isfinite(arrays["color"]) for arrays in (reference, variant)]
+    return np.where(finite[0] & finite[1], error, np.where(finite[0] | finite[1], np.inf, 0)).max(axis=2)
+
+
+def worst_candidates(wrong, edges):
+    """Wrong pixels away from edges if there are any, else at edges."""
+    away = wrong & ~edges
+    candidates = away if away.any() else wrong
+    return candidates.any(axis=2) if candidates.ndim == 3 else candidates
+
+
+def extent(values, relative=1e-12):
+    return {"max": Near(float(values.max()), relative), "p99_9": Near(percentile_99_9(values), 1e-6)}
+
+
+def shading_errors(difference):
+    values = difference[np.isfinite(difference)]
+    magnitude = float(np.mean(np.abs(values)))
+    return {"pixels": difference.shape[0], "rmse": Near(math.sqrt(np.mean(values**2)), 1e-9),
+            "bias": Near(float(np.mean(values)), absolute=1e-9 * magnitude)} | extent(np.abs(values))
+
+
+def image_errors(reference, variant):
+    finite = np.isfinite(reference) & np.isfinite(variant)
+    squares = (variant - reference)[finite] ** 2
+    distance = srgb8_distance(*(srgb_encode(a.astype(np.float32).astype(np.float64)) for a in (reference, variant)))
+    flip_map, flip_mean = flip(srgb_encode(reference), srgb_encode(variant))
+    return {"rmse": Near(math.sqrt(np.mean(squares)), 1e-9), "psnr": Near(psnr(np.mean(squares)), 1e-9),
+            "rel_mse": Near(float(np.mean(squares / (reference[finite] ** 2 + 0.01))), 1e-9),
+            "off_by_1": int((distance == 1).sum()), "off_by_more": int((distance > 1).sum()),
+            "srgb_psnr": Near(psnr(np.mean(distance**2) / 255**2), 1e-9),
+            "flip_mean": Near(float(flip_mean), absolute=2e-5), "flip_max": Near(float(flip_map.max()), absolute=2e-4)}
+
+
+def normal_angles(a, b):
+    """Kahan's angle between unit vectors, not the cross product's; its own errors are of the last place of 1."""
+    a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
+    return 2 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+
+
+def expected_variant(reference, variant, edges):
+    """The members of a measured variant that follow from its arrays and the reference's."""
+    color, wrong = variant["color"], wrong_pixels(reference, variant)
+    errors = {kind: {"edge": int((wrong[kind] & edges[kind]).sum()), "away": int((wrong[kind] & ~edges[kind]).sum())}
+              for kind in wrong}
+    errors["nonfinite"] = int((~np.isfinite(color)).any(axis=2).sum())
+    errors["negative"] = int((color < 0).any(axis=2).sum())
+    surface = ~wrong["object"] & (reference["object"] != NOTHING)
+    errors["shading"] = shading_errors((color - reference["color"])[surface & ~wrong["shadow"].any(axis=2) & ~wrong["path"]])
+    t, expected_t = variant["t"][surface], reference["t"][surface]
+    ulp = 2.0 ** (np.floor(np.log2(expected_t)) + 1 - variant["bits"])
+    errors["t"] = {"pixels": int(surface.sum()), "relative": extent(np.abs(t - expected_t) / expected_t),
+                   "ulps": extent(np.abs(t - expected_t) / ulp)}
+    angle = normal_angles(variant["normal"][surface], reference["normal"][surface])
+    errors["normal"] = {"max": Near(float(angle.max()), 1e-6, 1e-15), "p99_9": Near(percentile_99_9(angle), 1e-6, 1e-15)}
+    errors["image"] = image_errors(reference["color"], color)
+    worst = {}
+    for kind in wrong:
+        candidates = worst_candidates(wrong[kind], edges[kind])
+        error = color_error(reference, variant)[candidates]
+        worst[kind] = {"error": Near(float(error.max()), 1e-12)} if error.size else None
+    faults = errors["nonfinite"] + errors["negative"] + errors["object"]["away"] + errors["shadow"]["away"]
+    return {"errors": errors, "worst": worst, "crossed_out": faults > 0}
+
+
+def plotted(variant, kind):
+    errors = variant["errors"]
+    if kind in ("object", "shadow", "path"):
+        return errors[kind]["edge"] + errors[kind]["away"]
+    if kind in ("shading", "image"):
+        return errors[kind]["rmse"]
+    return {"t": errors["t"]["relative"]["p99_9"], "normal": errors["normal"]["p99_9"],
+            "flip": errors["image"]["flip_mean"]}[kind]
+
+
+def expected_judgement(scene):
+    """Which variants lie on the Pareto front of each kind of error and time, and the fastest within each budget."""
+    variants = scene["variants"]
+    times = [variant["frame_ms"]["median"] if "frame_ms" in variant else math.inf for variant in variants]
+    sound = [i for i, v in enumerate(variants) if v["status"] == "measured" and not v["crossed_out"]]
+    references = [i for i, v in enumerate(variants) if v["status"] == "reference"]
+
+    def on_front(i, kind):
+        mine = plotted(variants[i], kind), times[i]
+        others = [(plotted(variants[k], kind), times[k]) for k in sound if k != i]
+        beaten = any(error <= mine[0] and time <= mine[1] and (error, time) != mine for error, time in others)
+        return i in sound and not beaten and not any(times[k] < times[i] for k in references)
+
+    def pick(budget, measure):
+        within = references + [i for i in sound if plotted(variants[i], measure) <= budget]
+        return min(within, key=lambda i: times[i], default=None)
+
+    return {"variants": [{"pareto": {kind: on_front(i, kind) for kind in variant["pareto"]}} if "pareto" in variant else {}
+                         for i, variant in enumerate(variants)],
+            "picks": [{"variant": pick(each["budget"], each["measure"])} for each in scene["picks"]]}
+
+
+class Accuracy(TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.saved = f"{folder.name}/saved"
+        kept = [line for line in read(ROOT / "scenes/far.yaml").splitlines() if not any(
+            word in line for word in ("box:", "cylinder:", "directional:"))]  # then its kernels are those of SPHERES
+        far = write(f"{folder.name}/far.yaml", "\n".join(kept))
+        cls.process = run(f"accuracy {GLASS} {SPHERES} {far} {BALLS} {SMALL} --precision single,double --json "
+                          f"--save {cls.saved}")
+        cls.report = json.loads(cls.process.stdout or "null")
+        cls.reference = f"{cls.saved}/0-mirror-glass-reference"
+
+    def check(self, where, reported, expected):
+        """Every member of what is expected; JSON has null for what is not finite."""
+        if isinstance(expected, dict):
+            for key, value in expected.items():
+                self.check(f"{where}.{key}", reported[key], value)
+        elif isinstance(expected, list) and expected and isinstance(expected[0], dict):
+            self.assertEqual(len(reported), len(expected), where)
+            for index, value in enumerate(expected):
+                self.check(f"{where}[{index}]", reported[index], value)
+        elif not isinstance(expected, Near):
+            self.assertEqual(reported, expected, where)
+        elif not math.isfinite(expected.value):
+            self.assertIsNone(reported, where)
+        else:
+            tolerance = expected.relative * abs(expected.value) + expected.absolute
+            self.assertLessEqual(abs(reported - expected.value), tolerance, f"{where}: {reported}, not {expected.value}")
+
+    def test_runs_silently(self):
+        self.assertEqual((self.process.returncode, self.process.stderr), (0, ""))
+
+    def test_every_figure(self):
+        for scene in self.report["scenes"]:
+            reference = arrays_load(scene["reference"]["saved"], scene["lights"])
+            edges = {kind: edges_of(reference[kind]) for kind in ("object", "path")}
+            lights = [edges_of(reference["shadow"][:, :, i]) for i in range(scene["lights"])]
+            counts = {"silhouette": int(edges["object"].sum()), "path": int(edges["path"].sum()),
+                      "shadow": [int(light.sum()) for light in lights]}
+            edges["shadow"] = np.stack(lights, axis=2) | edges["object"][:, :, None]
+            self.check(scene["scene"], scene, {"edges": counts} | expected_judgement(scene))
+            for variant in scene["variants"]:
+                if variant["status"] == "measured":
+                    self.check_variant(f"{scene['scene']} at {variant['precision']}", variant, reference,
+                                       arrays_load(variant["saved"], scene["lights"]), edges)
+
+    def check_variant(self, where, reported, reference, variant, edges):
+        self.check(where, reported, expected_variant(reference, variant, edges))
+        self.assertEqual(bool(reported["why"]), reported["crossed_out"], where)
+        for kind, wrong in wrong_pixels(reference, variant).items():
+            worst = reported["worst"][kind]
+            if worst:
+                place = worst["y"], worst["x"]
+                self.assertTrue(worst_candidates(wrong, edges[kind])[place], f"{where}, {kind}")
+                error = float(color_error(reference, variant)[place])
+                self.check(where, worst["error"], Near(error, 1e-12))
+
+    def test_judgement(self):
+        glass, spheres, far, balls = (scene["variants"] for scene in self.report["scenes"])
+        self.assertEqual([variant["status"] for variant in glass], ["measured", "reference"])
+        self.assertNotIn("errors", glass[1])
+        self.assertGreater(glass[1]["frame_ms"]["runs"], 0)
+        edges = self.report["scenes"][0]["edges"]
+        self.assertGreater(edges["path"], edges["silhouette"], "glass bends paths")
+        self.assertGreater(balls[0]["errors"]["path"]["edge"], 0)
+        for single, _ in spheres, far:
+            self.assertFalse(single["crossed_out"])
+            self.assertEqual((single["errors"]["object"]["away"], single["errors"]["shadow"]["away"]), (0, 0))
+            self.assertLess(single["errors"]["shading"]["rmse"], 1e-6)
+
+    def test_reference_from_a_file(self):
+        """Only colors are compared, with the same result; nothing else gets a figure."""
+        options = f"{SMALL} --precision single,double --json --reference {self.reference}.color.npy"
+        scene = self.json(f"accuracy {GLASS} {options}")["scenes"][0]
+        single, double = (variant["errors"] for variant in scene["variants"])
+        for kind in "object", "shadow", "path", "shading", "t", "normal":
+            self.assertEqual(single[kind]["status"], "unavailable")
+        self.assertEqual(scene["edges"]["status"], "unavailable")
+        self.assertEqual(single["image"], self.report["scenes"][0]["variants"][0]["errors"]["image"])
+        self.assertEqual((double["image"]["rmse"], double["image"]["psnr"]), (0, None))
+
+    def test_samples(self):
+        """Fewer samples are an error like any other."""
+        scene = self.json(f"accuracy {SPHERES} {SMALL} --precision double --lanes 1 --samples 1,8 --json")["scenes"][0]
+        self.assertEqual(scene["reference"]["samples"], 8)
+        for variant in scene["variants"]:
+            if variant["status"] == "measured":
+                self.assertEqual(variant["errors"]["image"]["rmse"] > 1e-3, variant["samples"] == 1)
+
+    def test_table(self):
+        table = self.glint(f"accuracy {SPHERES} {SMALL} --precision double").stdout
+        self.assertRegex(table, "double .* the reference")
+        self.assertRegex(table, "(?m)^  .* error of at most 1e-06: double, .* ms, the reference")
+
+    def test_scene_beyond_single(self):
+        write("planet.yaml", PLANET)
+        scene = self.json(f"accuracy planet.yaml {SMALL} --precision single --json")["scenes"][0]
+        (single,) = scene["variants"]
+        self.assertTrue(single["crossed_out"])
+        self.assertGreater(single["errors"]["shadow"]["away"], 0)
+        self.assertFalse(any(single["pareto"].values()))
+        self.assertEqual([pick["variant"] for pick in scene["picks"]], [None, None, None])
+
+    def test_perturbation(self):
+        """Variants err; the reference keeps its bits."""
+        report = self.json(f"accuracy {BALLS} {SMALL} --precision double --perturb 1:1000 --save perturbed --json")
+        (scene,) = report["scenes"]
+        (double,) = scene["variants"]
+        self.assertEqual(report["perturb"], {"seed": 1, "scale": 1000})
+        self.assertEqual(double["status"], "measured")
+        self.assertNotEqual(double["kernel_hash"], scene["reference"]["kernel_hash"])
+        self.assertSameBytes("perturbed/0-mirror-balls-reference.color.npy",
+                             f"{self.saved}/3-mirror-balls-reference.color.npy")
+
+    def test_refused(self):
+        write("file", "")
+        for arguments, pattern in (
+            ("", "scene"),
+            ("none.yaml", "none.yaml"),
+            (f"{GLASS} --samples 1,0", "--samples"),
+            (f"{GLASS} --reference none.npy", "none.npy"),
+            (f"{GLASS} --size 64x48 --reference {self.reference}.color.npy", "96x64"),
+            (f"{GLASS} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
+            (f"{GLASS} --reference {ROOT}/docs/demo.png", r"demo\.png"),
+            (f"{GLASS} {SPHERES} --reference {self.reference}.color.npy", "one scene"),
+            (f"{GLASS} --size 8x8 --save file/folder", "file/folder"),
+        ):
+            with self.subTest(arguments):
+                self.refuses(f"accuracy {arguments}", pattern)
+
+
+if __name__ == "__main__":
+    if not need_device()["fp64"]:
+        assert run(f"accuracy {GLASS}").returncode == 1
+        skip_all("the device has no 64-bit floating point for a reference")
+    main()
