@@ -1,0 +1,102 @@
+// In a sanitized build LeakSanitizer finds what glint forgets to release, OpenCL objects included, which the
+// driver allocates; and blames glint for nothing that the driver keeps.
+#include "host/base/memory.h"
+#include "host/opencl/compute.h"
+#include "tests/child.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/lsan_interface.h>
+enum { SANITIZED = 1 };
+#else
+static int __lsan_do_recoverable_leak_check(void)
+{
+    return 0;
+}
+enum { SANITIZED = 0 };
+#endif
+
+typedef enum { NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM, COMPUTE } Forgotten;
+enum { NO_DEVICE = 77, LEAKED = 23 };
+
+// Launches a kernel, so that the driver has compiled it and started its threads, and releases all but one
+// thing.
+static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
+{
+    DeviceList list;
+    MessageList messages = {0};
+    device_list_open(&list);
+    const Device *device = device_choose(&list, device_wish(NULL), &messages);
+    if (!device) _exit(NO_DEVICE);
+    message_list_free(&messages);
+    Compute compute;
+    compute_open(&compute, device);
+
+    const char *text =
+        "kernel void index(global uint *values) { values[get_global_id(0)] = get_global_id(0); }\n";
+    cl_program program = clCreateProgramWithSource(compute.context, 1, &text, NULL, NULL);
+    cl_must(clBuildProgram(program, 1, &device->id, "", NULL, NULL));
+    cl_kernel kernel = clCreateKernel(program, "index", NULL);
+    cl_mem buffer = clCreateBuffer(compute.context, CL_MEM_READ_WRITE, 64, NULL, NULL);
+    cl_must(clSetKernelArg(kernel, 0, sizeof buffer, &buffer));
+    cl_must(clEnqueueNDRangeKernel(compute.queue, kernel, 1, NULL, &(size_t){16}, NULL, 0, NULL, NULL));
+    cl_must(clFinish(compute.queue));
+    cl_must(clReleaseKernel(kernel)); // PoCL's worker threads keep a pointer to what they ran
+    kernel = clCreateKernel(program, "index", NULL);
+
+    void *memory = memory_allocate(64, 1);
+    if (forgotten != MEMORY) free(memory);
+    if (forgotten != BUFFER) cl_must(clReleaseMemObject(buffer));
+    if (forgotten != KERNEL) cl_must(clReleaseKernel(kernel));
+    if (forgotten != PROGRAM) cl_must(clReleaseProgram(program));
+    if (forgotten != COMPUTE) compute_close(&compute);
+    device_list_close(&list);
+}
+
+// Overwrites the pointers that returned functions leave in the stack, where LeakSanitizer would find them.
+static __attribute__((noinline)) void stack_clear(void)
+{
+    volatile char bytes[1 << 16];
+    for (size_t i = 0; i < sizeof bytes; i++)
+        bytes[i] = 0;
+}
+
+static void launch_and_check(void *forgotten)
+{
+    launch_and_forget(*(Forgotten *)forgotten);
+    stack_clear();
+    if (__lsan_do_recoverable_leak_check() != 0) _exit(LEAKED);
+}
+
+static void test_forgotten(void **state)
+{
+    if (!SANITIZED) skip();
+    Forgotten forgotten = *(Forgotten *)*state;
+    char *folder = scratch_open();
+    ChildEnd end = child_run(launch_and_check, &forgotten, sizeof forgotten);
+    scratch_close(folder);
+    if (end.status == NO_DEVICE) skip();
+    int expected = forgotten == NOTHING ? 0 : LEAKED;
+    if (end.status != expected) print_error("%s\n", end.errors);
+    assert_int_equal(end.status, expected);
+}
+
+int main(void)
+{
+    static Forgotten forgotten[] = {NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM, COMPUTE};
+    const struct CMUnitTest tests[] = {
+        {"nothing", test_forgotten, NULL, NULL, &forgotten[0]},
+        {"memory", test_forgotten, NULL, NULL, &forgotten[1]},
+        {"a buffer", test_forgotten, NULL, NULL, &forgotten[2]},
+        {"a kernel", test_forgotten, NULL, NULL, &forgotten[3]},
+        {"a program", test_forgotten, NULL, NULL, &forgotten[4]},
+        {"context and queue", test_forgotten, NULL, NULL, &forgotten[5]},
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
