@@ -1,5 +1,6 @@
 # What the shell tests share, to be sourced first. GLINT is the program under test, BUILD the folder it was built in.
-# Kernel caches, glint's own and the drivers', start empty; $scratch is removed in the end.
+# Kernel caches, glint's own and the drivers', are those of XDG_CACHE_HOME, shared by the tests of a run; $scratch is
+# removed in the end.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 GLINT=$(realpath "${GLINT:-build/glint}") || exit 1
@@ -9,9 +10,7 @@ unset GLINT_DEVICE
 
 scratch=$(mktemp -d) || exit 1
 trap 'rm -rf "$scratch"' EXIT
-shared_cache=${XDG_CACHE_HOME:-$scratch} # of all tests of a run
-export XDG_CACHE_HOME=$scratch/cache TMPDIR=$scratch
-mkdir "$XDG_CACHE_HOME"
+export XDG_CACHE_HOME=${XDG_CACHE_HOME:-$HOME/.cache} TMPDIR=$scratch
 
 passed=0 failed=0
 
@@ -41,28 +40,34 @@ skip_all() {
     echo "skipped: $*"
     exit 77
 }
-# python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: python3 (or $PYTHON), else a
-# virtual environment that the tests of a run share, in which pip installs what is missing (by the module's own name
-# where no requirement is given). Skips the test where that cannot be done; once pip had no network, no test asks it for
-# ten minutes.
+# python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: $PYTHON or python3, the system's, else
+# a virtual environment above the system's, which the tests of a run share. There pip installs what is missing, by the
+# module's own name where no requirement is given. Skips the test where that fails; once pip had no network, no test
+# asks it for ten minutes.
 python_with() {
-    python=${PYTHON:-python3}
-    local modules=("${@%%=*}") folder=$shared_cache/glint-tests/python log=$scratch/pip.log
-    local import="import $(IFS=,; echo "${modules[*]}")" offline=$shared_cache/glint-tests/offline
-    "$python" -c "$import" 2>/dev/null && return
+    local import module missing=() folder=$XDG_CACHE_HOME/glint-tests
+    local log=$scratch/pip.log offline=$folder/offline lock
+    import="import $(IFS=,; echo "${*%%=*}")"
+    for python in "${PYTHON:-python3}" /usr/bin/python3; do
+        "$python" -c "$import" 2>/dev/null && return
+    done
+    [ -x "$python" ] || python=${PYTHON:-python3}
     command -v "$python" >/dev/null || skip_all "there is no $python"
     # one test after the other: they run beside each other
-    mkdir -p "$shared_cache" && local lock && exec {lock}>"$shared_cache/glint-tests.lock" && flock "$lock"
-    [ -x "$folder/bin/pip" ] || "$python" -m venv --clear "$folder" >"$log" 2>&1 ||
-        skip_all "${modules[*]}: not here, and no virtual environment can be made: $(tail -n 1 "$log")"
-    python=$folder/bin/python
-    "$python" -c "$import" 2>/dev/null && exec {lock}>&- && return
-    [ ! "$(find "$offline" -mmin -10 2>/dev/null)" ] || skip_all "${modules[*]}: not here, and pip had no network"
-    timeout 300 "$python" -m pip install -q --no-input "${@#*=}" >"$log" 2>&1
-    local status=$?
-    if [ $status = 124 ] || grep -qi 'connection broken' "$log"; then touch "$offline"; fi
-    [ $status = 0 ] && "$python" -c "$import" 2>"$log" ||
-        skip_all "${modules[*]}: not here, and pip cannot install them: $(tail -n 1 "$log")"
+    mkdir -p "$folder" && exec {lock}>"$folder/lock" && flock "$lock"
+    [ -x "$folder/python/bin/pip" ] ||
+        "$python" -m venv --clear --system-site-packages "$folder/python" >"$log" 2>&1 ||
+        skip_all "${*%%=*}: not here, and no virtual environment can be made: $(tail -n 1 "$log")"
+    python=$folder/python/bin/python
+    for module; do "$python" -c "import ${module%%=*}" 2>/dev/null || missing+=("${module#*=}"); done
+    if [ ${#missing[@]} -gt 0 ]; then
+        [ ! "$(find "$offline" -mmin -10 2>/dev/null)" ] || skip_all "${missing[*]}: not here, and pip had no network"
+        timeout 300 "$python" -m pip install -q --no-input "${missing[@]}" >"$log" 2>&1
+        local status=$?
+        if [ $status = 124 ] || grep -qi 'connection broken' "$log"; then touch "$offline"; fi
+        [ $status = 0 ] && "$python" -c "$import" 2>"$log" ||
+            skip_all "${missing[*]}: not here, and pip cannot install them: $(tail -n 1 "$log")"
+    fi
     exec {lock}>&-
 }
 is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
