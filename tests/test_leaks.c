@@ -76,7 +76,10 @@ static void launch_and_check(void *forgotten)
 
 static void test_forgotten(void **state)
 {
-    if (!SANITIZED) skip();
+    if (!SANITIZED) {
+        print_message("needs a build with LeakSanitizer (BUILD=build-sanitize)\n");
+        skip();
+    }
     Forgotten forgotten = *(Forgotten *)*state;
     char *folder = scratch_open();
     ChildEnd end = child_run(launch_and_check, &forgotten, sizeof forgotten);
