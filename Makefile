@@ -190,11 +190,14 @@ install: all
 	install -m 644 scenes/*.* $(data)/glint/scenes
 	install -m 644 scenes/meshes/* $(data)/glint/scenes/meshes
 	install -m 644 scenes/images/* $(data)/glint/scenes/images
+	install -d $(data)/doc/glint/docs
+	install -m 644 README.md LICENSE $(data)/doc/glint
+	install -m 644 docs/*.md docs/*.png $(data)/doc/glint/docs
 
 uninstall:
 	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
 	    $(data)/zsh/site-functions/_glint $(data)/fish/vendor_completions.d/glint.fish
-	rm -rf $(data)/glint
+	rm -rf $(data)/glint $(data)/doc/glint
 
 clean:
 	rm -rf $(BUILD)

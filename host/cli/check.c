@@ -71,7 +71,7 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf("none");
     else
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
-    if (facts->unbounded_count > 0) printf(", and %zu without end", facts->unbounded_count);
+    if (facts->unbounded_count > 0) printf(", plus %zu unbounded", facts->unbounded_count);
     printf("\n  features  ");
     for (unsigned i = 0; i < FEATURE_COUNT; i++) {
         if (!(facts->features >> i & 1)) continue;
