@@ -1,5 +1,6 @@
 #!/bin/bash
-# The options of each subcommand are the same in its --help, in the man page and in the completions of three shells.
+# The options of each command are the same in its --help, in the manual page, which tools/man-options writes, and in the
+# completions of three shells.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 GLINT=${GLINT:-build/glint}
@@ -12,10 +13,6 @@ options() {
 
 # Of a help line only what stands before the gap counts: the description may speak of other options.
 in_help() { "$GLINT" "$1" --help 2>&1 | sed -n 's/^ *\(-.*\)/\1/p' | sed 's/  .*//' | options; }
-
-in_man() {
-    sed -n "/^\.SS glint $1\$/,/^\.S[SH]/p" docs/glint.1 | grep '^\\fB\\-' | sed 's/\\f[BIR]//g; s/\\-/-/g' | options
-}
 
 in_bash() { (. tools/completions/glint.bash && _glint_options "$1" | options); }
 
@@ -47,7 +44,7 @@ for subcommand in $subcommands; do
         failed=1
         ;;
     esac
-    for place in man bash zsh fish; do
+    for place in bash zsh fish; do
         if ! difference=$(diff <(echo "$help") <("in_$place" "$subcommand")); then
             echo "glint $subcommand: --help (<) and $place (>) differ:"
             echo "$difference" | grep '^[<>]'
@@ -56,9 +53,16 @@ for subcommand in $subcommands; do
     done
 done
 
+page=$(mktemp)
+trap 'rm -f "$page"' EXIT
+cp docs/glint.1 "$page"
+tools/man-options "$GLINT" "$page"
+for subcommand in $subcommands; do grep -q "options $subcommand\$" "$page" || { echo "docs/glint.1 has no options of $subcommand"; failed=1; }; done
+diff docs/glint.1 "$page" || failed=1
+
 listed=$("$GLINT" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p' | xargs)
 if [ "$listed" != "$subcommands" ]; then
-    echo "glint --help lists the subcommands '$listed'; looked at here, and in the man page: '$subcommands'"
+    echo "glint --help lists the commands '$listed', not '$subcommands'"
     failed=1
 fi
 
