@@ -5,6 +5,7 @@ folder in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG
 """
 import ast
 import csv
+import importlib.util
 import json
 import math
 import os
@@ -64,16 +65,15 @@ def need_device():
 
 def need_modules(*modules):
     """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip; skips it where there is none."""
+    if all(importlib.util.find_spec(module.partition("=")[0]) for module in modules):
+        return
     script = '. tests/support.bash; python_with "$@" && echo "$python"'
-    cache = {"XDG_CACHE_HOME": os.path.expanduser("~/.cache")} | os.environ
-    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, env=cache, stdout=subprocess.PIPE,
-                             text=True)
+    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, stdout=subprocess.PIPE, text=True)
     if process.returncode != 0:
         print(process.stdout, end="")
         sys.exit(process.returncode)
     python = process.stdout.strip()
-    if python not in ("python3", sys.executable):
-        os.execv(python, [python, "-B", *sys.argv])
+    os.execvp(python, [python, "-B", *sys.argv])
 
 
 def find_icd(name):
