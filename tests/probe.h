@@ -12,7 +12,7 @@
 static DeviceList probe_devices;
 static Compute probe_compute;
 
-// For cmocka's group setup and teardown.
+// For cmocka's group setup and teardown, which fails if a call of OpenCL did.
 static inline int probe_open(void **state)
 {
     (void)state;
@@ -22,16 +22,21 @@ static inline int probe_open(void **state)
     message_list_print(&messages, stderr);
     message_list_free(&messages);
     if (device == NULL) return -1;
-    compute_open(&probe_compute, device);
-    return 0;
+    return compute_open(&probe_compute, device) ? 0 : -1;
 }
 
 static inline int probe_close(void **state)
 {
     (void)state;
+    const bool ok = compute_ok(&probe_compute);
+    if (!ok) {
+        char *failure = compute_failure_text(&probe_compute);
+        fprintf(stderr, "%s\n", failure);
+        free(failure);
+    }
     compute_close(&probe_compute);
     device_list_close(&probe_devices);
-    return 0;
+    return ok ? 0 : -1;
 }
 
 static inline bool probe_has(Precision precision)
@@ -62,8 +67,8 @@ static inline cl_program probe_program(const char *text, const char *prelude, co
     const char *source = composed;
     cl_int status;
     cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
-    cl_check(status, "clCreateProgramWithSource");
-    cl_must(clBuildProgram(program, 1, &probe_compute.device->id, options, NULL, NULL));
+    compute_check_object(&probe_compute, program, status, "clCreateProgramWithSource");
+    compute_try(&probe_compute, clBuildProgram(program, 1, &probe_compute.device->id, options, NULL, NULL));
     free(composed);
     free(files);
     return program;
@@ -84,9 +89,9 @@ static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t
                                      .extra_features = FEATURE_ALL};
     Renderer *renderer = probe_renderer(scene, &settings);
     if (renderer == NULL) return false;
-    renderer_trace(renderer, rays, count, hits);
+    bool traced = renderer_trace(renderer, rays, count, hits);
     renderer_close(renderer);
-    return true;
+    return traced;
 }
 
 typedef struct {

@@ -122,23 +122,20 @@ static void trial_run(Trial *trial, cl_program program, uint32_t apex)
     void *row_bytes = memory_allocate(row_size, 1);
     flat_array_write(&row, trial->wide, row_bytes);
 
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program, "misses", &status);
-    cl_check(status, "clCreateKernel");
+    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "misses");
     const size_t count = BALLS_PER_APEX, missed_size = BALLS_PER_APEX * sizeof(int);
     cl_mem buffers[] = {buffer_create(&probe_compute, lines_size, lines, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, row_size, row_bytes, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, missed_size, NULL, CL_MEM_WRITE_ONLY)};
-    kernel_argument(kernel, 0, sizeof(cl_mem), &buffers[0]);
-    kernel_argument(kernel, 1, sizeof(cl_mem), &buffers[1]);
-    kernel_argument(kernel, 2, sizeof apex, &apex);
-    kernel_argument(kernel, 3, sizeof(cl_mem), &buffers[2]);
+    kernel_argument(&probe_compute, kernel, 0, sizeof(cl_mem), &buffers[0]);
+    kernel_argument(&probe_compute, kernel, 1, sizeof(cl_mem), &buffers[1]);
+    kernel_argument(&probe_compute, kernel, 2, sizeof apex, &apex);
+    kernel_argument(&probe_compute, kernel, 3, sizeof(cl_mem), &buffers[2]);
     kernel_launch(&probe_compute, kernel, 1, &count, NULL);
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[2], CL_TRUE, 0, missed_size, trial->missed, 0,
-                                NULL, NULL));
+    buffer_read(&probe_compute, buffers[2], missed_size, trial->missed);
     for (size_t i = 0; i < 3; i++)
-        cl_must(clReleaseMemObject(buffers[i]));
-    cl_must(clReleaseKernel(kernel));
+        buffer_release(buffers[i]);
+    clReleaseKernel(kernel);
     free(row_bytes);
     free(lines);
 }
@@ -206,7 +203,7 @@ static void balls_check(bool wide, bool from_eye)
     assert_true(trial.missed_count > BALL_COUNT / 8);
     free(trial.lines);
     free(trial.missed);
-    cl_must(clReleaseProgram(program));
+    clReleaseProgram(program);
 }
 
 static void from_the_eye(void **state)

@@ -232,7 +232,7 @@ static void trace_lanes(const Scene *scene, Precision precision, BvhChoice bvh, 
                                      .extra_features = FEATURE_ALL};
     Renderer *renderer = probe_renderer(scene, &settings);
     assert_non_null(renderer);
-    renderer_trace(renderer, rays, count, hits);
+    assert_true(renderer_trace(renderer, rays, count, hits));
     renderer_close(renderer);
 }
 

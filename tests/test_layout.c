@@ -188,23 +188,19 @@ static cl_program program_make(bool wide)
 static void kernel_run(cl_program program, const char *name, void *first, size_t first_size, void *second,
                        size_t second_size, uint32_t number)
 {
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program, name, &status);
-    cl_check(status, "clCreateKernel");
+    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, name);
     cl_mem buffers[] = {buffer_create(&probe_compute, first_size, first, CL_MEM_READ_WRITE),
                         buffer_create(&probe_compute, second_size, second, CL_MEM_READ_WRITE)};
-    kernel_argument(kernel, 0, sizeof(cl_mem), &buffers[0]);
-    kernel_argument(kernel, 1, sizeof(cl_mem), &buffers[1]);
-    kernel_argument(kernel, 2, sizeof number, &number);
+    kernel_argument(&probe_compute, kernel, 0, sizeof(cl_mem), &buffers[0]);
+    kernel_argument(&probe_compute, kernel, 1, sizeof(cl_mem), &buffers[1]);
+    kernel_argument(&probe_compute, kernel, 2, sizeof number, &number);
     const size_t one = 1;
     kernel_launch(&probe_compute, kernel, 1, &one, &one);
-    cl_must(
-        clEnqueueReadBuffer(probe_compute.queue, buffers[0], CL_TRUE, 0, first_size, first, 0, NULL, NULL));
-    cl_must(
-        clEnqueueReadBuffer(probe_compute.queue, buffers[1], CL_TRUE, 0, second_size, second, 0, NULL, NULL));
-    cl_must(clReleaseMemObject(buffers[0]));
-    cl_must(clReleaseMemObject(buffers[1]));
-    cl_must(clReleaseKernel(kernel));
+    buffer_read(&probe_compute, buffers[0], first_size, first);
+    buffer_read(&probe_compute, buffers[1], second_size, second);
+    buffer_release(buffers[0]);
+    buffer_release(buffers[1]);
+    clReleaseKernel(kernel);
 }
 
 // Where the rule of types.h puts a member: scalar4 members first, as many bytes as the kernel's four numbers
@@ -233,7 +229,7 @@ static void layout_check(bool wide)
             fail_msg("%s.%s: at %u on the device, at %zu here", members[i].type, members[i].name, offsets[i],
                      offset);
     }
-    cl_must(clReleaseProgram(program));
+    clReleaseProgram(program);
 }
 
 // Numbers that no two places share and that float holds exactly.
@@ -299,7 +295,7 @@ static void values_check(bool wide)
         free(bytes);
         free(array.items);
     }
-    cl_must(clReleaseProgram(program));
+    clReleaseProgram(program);
 }
 
 // The list above misses no member: together they fill their struct.

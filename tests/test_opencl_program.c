@@ -1,5 +1,6 @@
 // Programs on the device of this machine: built, launched, cached. Each step is a process of its own, as
 // users run them: what the first one leaves, the next one finds.
+#include "host/base/fault.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include "tests/child.h"
@@ -48,11 +49,14 @@ static void opened_open(Opened *opened)
     compute_open(&opened->compute, device);
 }
 
+// Ends the process with status 2 where the device failed, as glint does.
 static void opened_close(Opened *opened)
 {
+    char *failure = compute_ok(&opened->compute) ? NULL : compute_failure_text(&opened->compute);
     compute_close(&opened->compute);
     compute_close(&opened->compute);
     device_list_close(&opened->list);
+    if (failure) fault("%s", failure);
 }
 
 // Shared objects in the folder: PoCL's finished machine code. Other runtimes have none.
@@ -95,20 +99,17 @@ static void run_triple(void *result)
     run->is_pocl = strstr(compute->device->platform_name, "Portable Computing Language") != NULL;
     run->compiled_before_launch = count_shared_objects();
 
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program.program, "triple", &status);
-    cl_check(status, "clCreateKernel");
+    cl_kernel kernel = program_kernel(compute, &program, "triple");
     cl_mem buffer = buffer_create(compute, sizeof run->values, NULL, CL_MEM_READ_WRITE);
-    kernel_argument(kernel, 0, sizeof buffer, &buffer);
+    kernel_argument(compute, kernel, 0, sizeof buffer, &buffer);
     LaunchTime time = kernel_launch(compute, kernel, 1, (const size_t[]){16}, (const size_t[]){8});
     run->times_sound = time.host_seconds > 0 && (!time.trusted || time.event_seconds > 0);
     run->compiled_after_launch = count_shared_objects();
-    cl_must(clEnqueueReadBuffer(compute->queue, buffer, CL_TRUE, 0, sizeof run->values, run->values, 0, NULL,
-                                NULL));
+    buffer_read(compute, buffer, sizeof run->values, run->values);
 
     program_store(compute, &run->request, &program);
-    cl_must(clReleaseMemObject(buffer));
-    cl_must(clReleaseKernel(kernel));
+    buffer_release(buffer);
+    if (kernel) clReleaseKernel(kernel);
     program_close(&program);
     program_close(&program);
     opened_close(&opened);
@@ -326,7 +327,7 @@ static void build_broken(void *result)
     cl_int status;
     cl_program program =
         clCreateProgramWithSource(opened.compute.context, 1, (const char *[]){text}, NULL, &status);
-    cl_check(status, "clCreateProgramWithSource");
+    if (status != CL_SUCCESS) _exit(1);
     cl_device_id id = opened.compute.device->id;
     if (clBuildProgram(program, 1, &id, "", NULL, NULL) == CL_SUCCESS) _exit(1);
     char log[4096] = "";
@@ -352,6 +353,7 @@ static void ask_for_too_much(void *result)
     Opened opened;
     opened_open(&opened);
     buffer_create(&opened.compute, SIZE_MAX / 2, NULL, CL_MEM_READ_WRITE);
+    opened_close(&opened);
 }
 
 static void use_an_absent_argument(void *result)
@@ -361,10 +363,11 @@ static void use_an_absent_argument(void *result)
     opened_open(&opened);
     Program program;
     program_build(&opened.compute, &run->request, &program);
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program.program, "triple", &status);
-    cl_check(status, "clCreateKernel");
-    kernel_argument(kernel, 7, sizeof status, &status);
+    cl_kernel kernel = program_kernel(&opened.compute, &program, "triple");
+    kernel_argument(&opened.compute, kernel, 7, sizeof(cl_int), &(cl_int){0});
+    clReleaseKernel(kernel);
+    program_close(&program);
+    opened_close(&opened);
 }
 
 static void make_empty_buffers(void *result)
@@ -372,18 +375,18 @@ static void make_empty_buffers(void *result)
     (void)result;
     Opened opened;
     opened_open(&opened);
-    cl_must(clReleaseMemObject(buffer_create(&opened.compute, 0, NULL, CL_MEM_READ_ONLY)));
-    cl_must(clReleaseMemObject(buffer_create(&opened.compute, 0, "", CL_MEM_READ_ONLY)));
+    buffer_release(buffer_create(&opened.compute, 0, NULL, CL_MEM_READ_ONLY));
+    buffer_release(buffer_create(&opened.compute, 0, "", CL_MEM_READ_ONLY));
     opened_close(&opened);
 }
 
-static void test_faults(void **state)
+static void test_failures(void **state)
 {
     (void)state;
     Run run = {.request = triple_request()};
     ChildEnd end = child_run(ask_for_too_much, &run, sizeof run);
     assert_int_equal(end.status, 2);
-    assert_non_null(strstr(end.errors, "MiB asked for"));
+    assert_non_null(strstr(end.errors, "MiB requested"));
     end = child_run(use_an_absent_argument, &run, sizeof run);
     assert_int_equal(end.status, 2);
     assert_non_null(strstr(end.errors, "argument 7 of triple"));
@@ -404,7 +407,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_text_that_does_not_compile, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_missing_root, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_place_of_a_compile_error, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_faults, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_failures, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -51,22 +51,20 @@ static void repair(uint32_t seed, const float *a, const float *b, float *quotien
         "#define PERTURB_SEED %uu\n",
         seed);
     cl_program program = probe_program(repair_text, prelude, "-cl-std=CL1.2");
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program, "repair", &status);
-    cl_check(status, "clCreateKernel");
+    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "repair");
     cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY),
                         buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY)};
     for (cl_uint i = 0; i < 4; i++)
-        kernel_argument(kernel, i, sizeof(cl_mem), &buffers[i]);
+        kernel_argument(&probe_compute, kernel, i, sizeof(cl_mem), &buffers[i]);
     kernel_launch(&probe_compute, kernel, 1, &count, NULL);
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[2], CL_TRUE, 0, size, quotients, 0, NULL, NULL));
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[3], CL_TRUE, 0, size, roots, 0, NULL, NULL));
+    buffer_read(&probe_compute, buffers[2], size, quotients);
+    buffer_read(&probe_compute, buffers[3], size, roots);
     for (size_t i = 0; i < 4; i++)
-        cl_must(clReleaseMemObject(buffers[i]));
-    cl_must(clReleaseKernel(kernel));
-    cl_must(clReleaseProgram(program));
+        buffer_release(buffers[i]);
+    clReleaseKernel(kernel);
+    clReleaseProgram(program);
 }
 
 // A whole number of so many bits, odd if asked for.
@@ -136,23 +134,21 @@ static void multiply_add(unsigned lanes, bool fast, const float *a, const float 
         lanes, fast, !fast);
     const char *options = fast ? "-cl-std=CL1.2 -cl-fast-relaxed-math" : "-cl-std=CL1.2";
     cl_program program = probe_program(fma_text, prelude, options);
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program, "multiply_add", &status);
-    cl_check(status, "clCreateKernel");
+    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "multiply_add");
     cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, c, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY),
                         buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY)};
     for (cl_uint i = 0; i < 5; i++)
-        kernel_argument(kernel, i, sizeof(cl_mem), &buffers[i]);
+        kernel_argument(&probe_compute, kernel, i, sizeof(cl_mem), &buffers[i]);
     kernel_launch(&probe_compute, kernel, 1, &count, NULL);
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[3], CL_TRUE, 0, size, sums, 0, NULL, NULL));
-    cl_must(clEnqueueReadBuffer(probe_compute.queue, buffers[4], CL_TRUE, 0, size, errors, 0, NULL, NULL));
+    buffer_read(&probe_compute, buffers[3], size, sums);
+    buffer_read(&probe_compute, buffers[4], size, errors);
     for (size_t i = 0; i < 5; i++)
-        cl_must(clReleaseMemObject(buffers[i]));
-    cl_must(clReleaseKernel(kernel));
-    cl_must(clReleaseProgram(program));
+        buffer_release(buffers[i]);
+    clReleaseKernel(kernel);
+    clReleaseProgram(program);
 }
 
 // Of a quarter c is any; of a quarter within a few ulp of the product; of a quarter some 24 bits larger or

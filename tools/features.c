@@ -1,6 +1,7 @@
 // What each part of the kernel costs a scene that has no use for it: a frame's and a build's processor time
 // with the kernel made for the scene's own features, then with one more, then with all. Prints a table in
 // Markdown.
+#include "host/base/fault.h"
 #include "host/import/load.h"
 #include "host/render/renderer.h"
 #include "host/scene/scene.h"
@@ -50,7 +51,7 @@ static bool band_drop(void *context, const Band *band, double fraction_done)
 static double frame_seconds(Renderer *renderer)
 {
     double start = processor_seconds();
-    renderer_render(renderer, 0, band_drop, NULL);
+    if (!renderer_render(renderer, 0, band_drop, NULL)) fault("the device failed");
     return processor_seconds() - start;
 }
 

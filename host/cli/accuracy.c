@@ -288,7 +288,8 @@ static int accuracy_run(Accuracy *accuracy)
         first += accuracy->scenes[i].variant_count;
     }
     progress_close(&progress);
-    if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);
+    if (status == EXIT_INTERRUPTED && compute_ok(&accuracy->open.compute))
+        fputs("glint: interrupted\n", stderr);
     if (status != EXIT_DONE) return status;
     const AccuracyReport report = report_of(accuracy);
     if (accuracy->options.as_json)
@@ -325,6 +326,5 @@ int command_accuracy(int argument_count, char **arguments)
                   device_open(&accuracy.open, options->variants.common.device);
     if (opened) status = accuracy_run(&accuracy);
     accuracy_close(&accuracy);
-    if (opened) device_close(&accuracy.open);
-    return status;
+    return opened ? device_close(&accuracy.open, status) : status;
 }

@@ -116,7 +116,7 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
     if (!whole) {
-        fputs("glint: interrupted\n", stderr);
+        if (compute_ok(compute)) fputs("glint: interrupted\n", stderr);
         return EXIT_INTERRUPTED;
     }
     return bench_tell(bench, baseline);
@@ -145,7 +145,7 @@ int command_bench(int argument_count, char **arguments)
             device_open(&bench.open, options->common.device)) {
             status = bench_run(&bench, baseline);
             variant_set_close(&bench.set);
-            device_close(&bench.open);
+            status = device_close(&bench.open, status);
         } else {
             variant_set_close(&bench.set);
         }

@@ -230,8 +230,20 @@ bool device_open(OpenDevice *open, const char *wish)
     return true;
 }
 
-void device_close(OpenDevice *open)
+int device_close(OpenDevice *open, int status)
 {
-    open->compute = (Compute){0};
+    Compute *compute = &open->compute;
+    if (!compute_ok(compute)) {
+        char *failure = compute_failure_text(compute);
+        fprintf(stderr, "glint: %s\n", failure);
+        free(failure);
+        status = EXIT_MACHINE;
+    }
+    if (status != EXIT_INTERRUPTED) {
+        compute->context = NULL;
+        compute->queue = NULL;
+    }
+    compute_close(compute);
     device_list_close(&open->devices);
+    return status;
 }

@@ -114,7 +114,10 @@ typedef struct {
     Compute compute;
 } OpenDevice;
 
-// Chooses and opens a device. False, with a message, if there is none; nothing to close then.
+// Chooses and opens a device. False, with a message, if there is none; nothing to close then. A device that
+// fails, now or later, is reported by device_close.
 bool device_open(OpenDevice *open, const char *wish);
-// At the end of a command. Leaves the context to the process's end: PoCL takes 80 ms to free its compiler.
-void device_close(OpenDevice *open);
+// At the end of a command. Returns the exit status: EXIT_MACHINE, with a message, if the device failed, else
+// `status`. Leaves the context to the process's end unless interrupted: PoCL takes 80 ms to free its
+// compiler.
+int device_close(OpenDevice *open, int status);

@@ -211,7 +211,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
     messages_print(&messages, NULL);
     int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
-    if (status == EXIT_INTERRUPTED)
+    if (status == EXIT_INTERRUPTED && compute_ok(compute))
         fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
                 options->picture.path);
     if (whole && options->timing != TIMING_NONE)
@@ -238,9 +238,7 @@ int command_render(int argument_count, char **arguments)
         double parse_seconds = clock_seconds() - start;
         if (device_open(&open, options.common.device)) {
             status = scene_render(&options, &scene, &open.compute, parse_seconds);
-            // what was under way is let go in order
-            if (status == EXIT_INTERRUPTED) compute_close(&open.compute);
-            device_close(&open);
+            status = device_close(&open, status);
         }
     }
     scene_free(&scene);

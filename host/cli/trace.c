@@ -178,10 +178,10 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     double farthest = farthest_of(options->common.precision);
     for (size_t i = 0; i < rays->count; i++)
         scaled[i] = ray_scaled(rays->items[i], farthest, &exponents[i]);
-    renderer_trace(renderer, scaled, rays->count, hits);
-    for (size_t i = 0; i < rays->count; i++)
+    bool traced = renderer_trace(renderer, scaled, rays->count, hits);
+    for (size_t i = 0; i < rays->count && traced; i++)
         hits[i].t = ldexp(hits[i].t, -exponents[i]);
-    bool written = hits_write(options->output, hits, rays->count, renderer_report(renderer)->wide);
+    bool written = traced && hits_write(options->output, hits, rays->count, renderer_report(renderer)->wide);
     free(exponents);
     free(hits);
     free(scaled);
@@ -224,7 +224,7 @@ int command_trace(int argument_count, char **arguments)
         output_spares_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, options.common.device)) {
         status = rays_trace(&options, &scene, &rays, &open.compute);
-        device_close(&open);
+        status = device_close(&open, status);
     }
     free(rays.items);
     scene_free(&scene);

@@ -133,7 +133,7 @@ static bool all_settled(const VariantSet *set)
     return true;
 }
 
-// Runs every variant once. False if the user interrupted.
+// Runs every variant once. False if the user interrupted or the device failed.
 static bool round_run(VariantSet *set, bool warm_up)
 {
     for (size_t i = 0; i < set->count; i++)
@@ -149,6 +149,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
     for (size_t i = 0; i < set->count; i++) {
         if (progress_interrupted()) return false;
         variant_open(compute, &set->variants[i], &set->rows[i], timing_builds);
+        if (!compute_ok(compute)) return false;
     }
     double bound = options->seconds > 0 ? options->seconds : 5 * (double)set->count;
     double start = clock_seconds();

@@ -73,8 +73,8 @@ static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hi
     MessageList messages = {0};
     Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
     messages_print(&messages, NULL);
-    if (!renderer) fault("a hard case does not fit the device");
-    prober->lanes = renderer_report(renderer)->lanes;
+    if (!renderer && compute_ok(prober->compute)) fault("a hard case does not fit the device");
+    if (renderer) prober->lanes = renderer_report(renderer)->lanes;
     return renderer;
 }
 
@@ -93,8 +93,10 @@ static void *prober_open(void *context, const Scene *scene, bool hierarchy)
 static void prober_trace(void *opened, const TraceRay *rays, size_t count, TraceHit *hits)
 {
     const OpenScene *scene = opened;
-    renderer_trace(scene->renderer, rays, count, hits);
-    scene->prober->trace_kernel = renderer_report(scene->renderer)->kernel_hash;
+    if (scene->renderer && renderer_trace(scene->renderer, rays, count, hits))
+        scene->prober->trace_kernel = renderer_report(scene->renderer)->kernel_hash;
+    else
+        memset(hits, 0, count * sizeof *hits); // of a device that failed no case is reported
 }
 
 static void prober_close(void *opened)
@@ -108,8 +110,8 @@ static void prober_render(void *context, const Scene *scene, bool hierarchy, Pic
 {
     Prober *prober = context;
     Renderer *renderer = scene_open_renderer(prober, scene, hierarchy, picture->width, picture->height);
-    if (!layers_take(picture, renderer)) fault("a picture ended early");
-    prober->render_kernel = renderer_report(renderer)->kernel_hash;
+    if (renderer && layers_take(picture, renderer))
+        prober->render_kernel = renderer_report(renderer)->kernel_hash;
     renderer_close(renderer);
 }
 
@@ -129,6 +131,7 @@ static const VerifyTier tier_of[PRECISION_COUNT] = {
 };
 
 typedef struct {
+    const Compute *compute;
     Json *json; // or NULL: lines
     char tier;
     size_t held, failed;
@@ -178,9 +181,10 @@ static void result_add_json(Json *json, const VerifyResult *result, double secon
     json_end(json);
 }
 
-static void result_take(void *context, const VerifyResult *result)
+static bool result_take(void *context, const VerifyResult *result)
 {
     Report *report = context;
+    if (!compute_ok(report->compute)) return false;
     if (verify_holds(result))
         report->held++;
     else
@@ -190,6 +194,7 @@ static void result_take(void *context, const VerifyResult *result)
     else
         result_tell(result, report);
     report->start = clock_seconds();
+    return true;
 }
 
 // Runs all cases at one precision; returns how many failed.
@@ -209,7 +214,7 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
                 "like; rays have exact answers\n",
                 verify_oracle_bits());
     double start = clock_seconds();
-    Report report = {.json = json, .tier = (char)('A' + tier), .start = start};
+    Report report = {.compute = compute, .json = json, .tier = (char)('A' + tier), .start = start};
     const char *name = precision_names[precision];
     if (json) {
         json_begin_object(json, NULL);
@@ -271,7 +276,7 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
         printf("%s\n", compute->device->name);
     }
     size_t failed = 0;
-    for (Precision precision = first; precision <= last; precision++)
+    for (Precision precision = first; precision <= last && compute_ok(compute); precision++)
         failed += precision_verify(compute, options, precision, json);
     if (json) {
         json_end(json);
@@ -313,7 +318,5 @@ int command_verify(int argument_count, char **arguments)
     if (status != OPTIONS_READ) return status;
     OpenDevice open;
     if (!device_open(&open, options.common.device)) return EXIT_USER;
-    status = device_verify(&open.compute, &options);
-    device_close(&open);
-    return status;
+    return device_close(&open, device_verify(&open.compute, &options));
 }

@@ -14,14 +14,6 @@ static double launch_length(Peak *peak, const LaunchTime *time)
     return time->trusted ? time->event_seconds : time->host_seconds;
 }
 
-static cl_kernel kernel_open(const Program *program, const char *name)
-{
-    cl_int status;
-    cl_kernel kernel = clCreateKernel(program->program, name, &status);
-    cl_check(status, "clCreateKernel");
-    return kernel;
-}
-
 // The best of some launches, each made long enough for its start not to count.
 static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, uint32_t lanes, bool wide)
 {
@@ -34,13 +26,13 @@ static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, u
     // a fixed point near 1, so that no chain overflows or becomes subnormal
     const double factor = 0.5, addend = 0.5;
     const float factor_single = 0.5F, addend_single = 0.5F;
-    kernel_argument(kernel, 1, scalar_size, wide ? (const void *)&factor : &factor_single);
-    kernel_argument(kernel, 2, scalar_size, wide ? (const void *)&addend : &addend_single);
-    kernel_argument(kernel, 3, sizeof(cl_mem), &results);
+    kernel_argument(compute, kernel, 1, scalar_size, wide ? (const void *)&factor : &factor_single);
+    kernel_argument(compute, kernel, 2, scalar_size, wide ? (const void *)&addend : &addend_single);
+    kernel_argument(compute, kernel, 3, sizeof(cl_mem), &results);
     cl_uint rounds = 256;
     double best = 0, start = clock_seconds();
-    while (clock_seconds() - start < total_seconds) {
-        kernel_argument(kernel, 0, sizeof rounds, &rounds);
+    while (compute_ok(compute) && clock_seconds() - start < total_seconds) {
+        kernel_argument(compute, kernel, 0, sizeof rounds, &rounds);
         LaunchTime time = kernel_launch(compute, kernel, 1, &items, &group);
         double seconds = launch_length(peak, &time);
         double rate = (double)items * lanes * rounds * FLOPS_OF_ROUND / seconds;
@@ -48,7 +40,7 @@ static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, u
         if (seconds < launch_seconds && rounds < 1u << 28) rounds *= 2;
     }
     peak->flops_per_second[wide] = best;
-    cl_must(clReleaseMemObject(results));
+    buffer_release(results);
 }
 
 static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
@@ -63,16 +55,17 @@ static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
         buffers[i] = buffer_create(compute, bytes, NULL, CL_MEM_READ_WRITE);
     double best = 0, start = clock_seconds();
     // there and back, so that both have been written before what is read counts
-    for (cl_uint turn = 0; turn < 3 || clock_seconds() - start < total_seconds; turn++) {
-        kernel_argument(kernel, 0, sizeof(cl_mem), &buffers[turn % 2]);
-        kernel_argument(kernel, 1, sizeof(cl_mem), &buffers[1 - turn % 2]);
+    for (cl_uint turn = 0; compute_ok(compute) && (turn < 3 || clock_seconds() - start < total_seconds);
+         turn++) {
+        kernel_argument(compute, kernel, 0, sizeof(cl_mem), &buffers[turn % 2]);
+        kernel_argument(compute, kernel, 1, sizeof(cl_mem), &buffers[1 - turn % 2]);
         LaunchTime time = kernel_launch(compute, kernel, 1, &items, NULL);
         double rate = 2 * (double)bytes / launch_length(peak, &time);
         if (turn >= 2 && rate > best) best = rate;
     }
     peak->bytes_per_second = best;
     for (cl_uint i = 0; i < 2; i++)
-        cl_must(clReleaseMemObject(buffers[i]));
+        buffer_release(buffers[i]);
 }
 
 // At the device's own width, whatever the renderer's.
@@ -84,12 +77,13 @@ static void program_measure(Peak *peak, Compute *compute, bool wide)
     ProgramRequest request = {.root = "peak.cl", .prelude = text_c(&prelude), .options = "-cl-std=CL1.2"};
     Program program;
     program_build(compute, &request, &program);
-    cl_kernel arithmetic = kernel_open(&program, "arithmetic"), copy = kernel_open(&program, "copy");
+    cl_kernel arithmetic = program_kernel(compute, &program, "arithmetic"),
+              copy = program_kernel(compute, &program, "copy");
     arithmetic_measure(peak, compute, arithmetic, lanes, wide);
     if (!wide) copy_measure(peak, compute, copy);
     program_store(compute, &request, &program);
-    cl_must(clReleaseKernel(arithmetic));
-    cl_must(clReleaseKernel(copy));
+    if (arithmetic) clReleaseKernel(arithmetic);
+    if (copy) clReleaseKernel(copy);
     program_close(&program);
     text_free(&prelude);
 }

@@ -1,41 +1,97 @@
-// The context, its queue, and what goes in and out of it.
+// The context, its queue, its first failure, and buffers.
 #include "host/opencl/compute.h"
 
 #include "host/base/fault.h"
+#include "host/base/text.h"
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 
-void compute_open(Compute *compute, const Device *device)
+bool compute_open(Compute *compute, const Device *device)
 {
     *compute = (Compute){.device = device};
     const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM, (cl_context_properties)device->platform,
                                                 0};
     cl_int status;
     compute->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &status);
-    cl_check(status, "clCreateContext");
+    if (!compute_check_object(compute, compute->context, status, "clCreateContext")) return false;
     compute->queue = clCreateCommandQueue(compute->context, device->id, CL_QUEUE_PROFILING_ENABLE, &status);
-    cl_check(status, "clCreateCommandQueue");
+    return compute_check_object(compute, compute->queue, status, "clCreateCommandQueue");
 }
 
 void compute_close(Compute *compute)
 {
     if (compute->queue) clReleaseCommandQueue(compute->queue);
     if (compute->context) clReleaseContext(compute->context);
+    free(compute->failure.detail);
     *compute = (Compute){0};
 }
 
+// Takes the detail.
+static void failure_keep(Compute *compute, const char *call, cl_int status, char *detail)
+{
+    if (!compute_ok(compute)) {
+        free(detail);
+        return;
+    }
+    compute->failure.status = status;
+    compute->failure.detail = detail;
+    snprintf(compute->failure.call, sizeof compute->failure.call, "%.*s", (int)strcspn(call, "("), call);
+}
+
+void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
+{
+    char *text;
+    va_list arguments;
+    va_start(arguments, detail);
+    if (vasprintf(&text, detail, arguments) < 0) fault("out of memory: message");
+    va_end(arguments);
+    failure_keep(compute, call, status, text);
+}
+
+bool compute_check(Compute *compute, cl_int status, const char *call)
+{
+    if (status != CL_SUCCESS) failure_keep(compute, call, status, NULL);
+    return compute_ok(compute);
+}
+
+bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call)
+{
+    if (status != CL_SUCCESS || !object) failure_keep(compute, call, status, NULL);
+    return compute_ok(compute);
+}
+
+char *compute_failure_text(const Compute *compute)
+{
+    const ComputeFailure *failure = &compute->failure;
+    Text text = {0};
+    text_appendf(&text, "%s: ", failure->call);
+    if (failure->status == CL_SUCCESS)
+        text_appendf(&text, "NULL with CL_SUCCESS");
+    else
+        text_appendf(&text, "%s (%d)", cl_status_name(failure->status), failure->status);
+    text_appendf(&text, " on %s", compute->device->name);
+    if (failure->detail) text_appendf(&text, ": %s", failure->detail);
+    return text.items;
+}
+
+// OpenCL 1.2 takes the bytes as a pointer to non-const, and only reads them here (section 5.2.1).
 static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags)
 {
+    if (!compute_ok(compute)) return NULL;
     cl_int status;
-    // OpenCL 1.2 takes the bytes as a pointer to non-const, and only reads them here (section 5.2.1).
     cl_mem buffer =
         clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);
-    if (status != CL_SUCCESS) {
+    if (status != CL_SUCCESS || !buffer) {
         const Device *device = compute->device;
         const double mebi = 1024.0 * 1024.0;
-        fault("clCreateBuffer: %s: %.1f MiB asked for; %s has %.1f MiB, at most %.1f MiB in one buffer",
-              cl_status_name(status), (double)size / mebi, device->name, (double)device->memory_bytes / mebi,
-              (double)device->largest_buffer_bytes / mebi);
+        compute_fail(compute, "clCreateBuffer", status,
+                     "%.1f MiB requested; the device has %.1f MiB, at most %.1f MiB in one buffer",
+                     (double)size / mebi, (double)device->memory_bytes / mebi,
+                     (double)device->largest_buffer_bytes / mebi);
+        return NULL;
     }
     return buffer;
 }
@@ -47,7 +103,24 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
     return buffer_make(compute, size, size > 0 ? bytes : nothing, flags | CL_MEM_COPY_HOST_PTR);
 }
 
-// The largest type of OpenCL C has 128 bytes, and no device asks for buffers to begin at more than that.
+void buffer_release(cl_mem buffer)
+{
+    if (buffer) clReleaseMemObject(buffer);
+}
+
+bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes)
+{
+    return compute_try(compute,
+                       clEnqueueReadBuffer(compute->queue, buffer, CL_TRUE, 0, size, bytes, 0, NULL, NULL));
+}
+
+bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes)
+{
+    return compute_try(compute,
+                       clEnqueueWriteBuffer(compute->queue, buffer, CL_TRUE, 0, size, bytes, 0, NULL, NULL));
+}
+
+// The largest type of OpenCL C has 128 bytes, and no device requires more alignment than that.
 enum { BUFFER_ALIGNMENT = 128, LARGE_PAGE = 1 << 21 };
 
 static bool is_large(size_t size)
@@ -62,7 +135,7 @@ void *buffer_bytes_allocate(size_t size)
     void *bytes = aligned_alloc(alignment, rounded);
     if (!bytes) fault("out of memory for a buffer of %zu bytes", size);
 #ifdef MADV_HUGEPAGE
-    if (is_large(size)) madvise(bytes, rounded, MADV_HUGEPAGE); // a wish: no harm if not granted
+    if (is_large(size)) madvise(bytes, rounded, MADV_HUGEPAGE); // a hint: no harm if ignored
 #endif
     return bytes;
 }
@@ -75,22 +148,26 @@ static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
 
 cl_mem buffer_take(Compute *compute, size_t size, void *bytes)
 {
-    // what is small is copied: Oclgrind takes memory that it did not copy for uninitialised
+    // small contents are copied: Oclgrind reports memory that it did not copy as uninitialized
     bool in_place = (compute->device->type & CL_DEVICE_TYPE_CPU) && is_large(size);
     cl_mem buffer = buffer_make(compute, size, bytes,
                                 CL_MEM_READ_ONLY | (in_place ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR));
-    if (in_place)
-        cl_must(clSetMemObjectDestructorCallback(buffer, bytes_free, bytes));
-    else
-        free(bytes);
+    if (in_place && compute_try(compute, clSetMemObjectDestructorCallback(buffer, bytes_free, bytes)))
+        return buffer;
+    if (!compute_ok(compute)) {
+        buffer_release(buffer);
+        buffer = NULL;
+    }
+    free(bytes);
     return buffer;
 }
 
-void kernel_argument(cl_kernel kernel, cl_uint index, size_t size, const void *value)
+void kernel_argument(Compute *compute, cl_kernel kernel, cl_uint index, size_t size, const void *value)
 {
+    if (!compute_ok(compute)) return;
     cl_int status = clSetKernelArg(kernel, index, size, value);
     if (status == CL_SUCCESS) return;
     char name[64] = "?";
     clGetKernelInfo(kernel, CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
-    fault("clSetKernelArg: argument %u of %s, %zu bytes: %s", index, name, size, cl_status_name(status));
+    compute_fail(compute, "clSetKernelArg", status, "argument %u of %s, %zu bytes", index, name, size);
 }

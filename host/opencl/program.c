@@ -1,4 +1,4 @@
-// Programs: composed, then built or taken from the cache.
+// Programs: composed, then loaded from the cache or built.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
@@ -21,11 +21,11 @@ static char *request_text(const ProgramRequest *request)
 {
     char *missing = NULL;
     char *text = kernel_compose(kernel_files, request->root, or_empty(request->prelude), &missing);
-    if (!text) fault("the kernel file %s is not embedded (asked for by %s)", missing, request->root);
+    if (!text) fault("the kernel file %s, which %s includes, is not embedded", missing, request->root);
     return text;
 }
 
-// All that the compiled program depends on. The native width is a sign of the processor beside its name.
+// All that the compiled program depends on. The native width distinguishes processors of the same name.
 static char *request_key(const Compute *compute, const ProgramRequest *request, const char *text)
 {
     const Device *device = compute->device;
@@ -51,34 +51,38 @@ static char *build_log(const Compute *compute, cl_program program)
     return log;
 }
 
-// Keeps the text for who reads the build log. Says where; valid until the next call.
-static const char *save_text(const char *text)
+// Saves the text for the reader of the build log. Caller frees the path, or what replaces it in a message.
+static char *save_text(const char *text)
 {
-    static char path[4096];
+    char path[4096];
     const char *folder = getenv("TMPDIR");
     snprintf(path, sizeof path, "%s/glint-kernel-XXXXXX.cl", folder && folder[0] != '\0' ? folder : "/tmp");
     int descriptor = mkstemps(path, 3);
     FILE *file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
     bool written = file && fputs(text, file) >= 0;
     if (file && fclose(file) != 0) written = false;
-    return written ? path : "could not be saved";
+    return memory_copy_text(written ? path : "could not be saved");
 }
 
-static cl_program build_from_source(const Compute *compute, const char *text, const char *options)
+// NULL: failed.
+static cl_program build_from_source(Compute *compute, const char *text, const char *options)
 {
     cl_int status;
     cl_program program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
-    cl_check(status, "clCreateProgramWithSource");
+    if (!compute_check_object(compute, program, status, "clCreateProgramWithSource")) return NULL;
     status = clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL);
-    if (status != CL_SUCCESS)
-        fault("clBuildProgram: %s on %s with options \"%s\"\n%s\nthe composed text: %s",
-              cl_status_name(status), compute->device->name, options, build_log(compute, program),
-              save_text(text));
-    return program;
+    if (status == CL_SUCCESS) return program;
+    char *log = build_log(compute, program), *path = save_text(text);
+    compute_fail(compute, "clBuildProgram", status, "options \"%s\"\n%s\nthe composed text: %s", options, log,
+                 path);
+    free(path);
+    free(log);
+    clReleaseProgram(program);
+    return NULL;
 }
 
-// PoCL keeps a cache of its own, with the options in its key: an option never used before makes it build.
-static cl_program build_afresh(const Compute *compute, const char *text, const char *options)
+// PoCL has a cache of its own, with the options in its key: an option never used before makes it build.
+static cl_program build_afresh(Compute *compute, const char *text, const char *options)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
@@ -103,12 +107,14 @@ static cl_program build_from_binary(const Compute *compute, const Text *binary, 
     return NULL;
 }
 
-void program_build(Compute *compute, const ProgramRequest *request, Program *program)
+bool program_build(Compute *compute, const ProgramRequest *request, Program *program)
 {
+    *program = (Program){0};
+    if (!compute_ok(compute)) return false;
     double start = clock_seconds();
     const char *options = or_empty(request->options);
     char *text = request_text(request);
-    *program = (Program){.text_hash = hash_bytes(HASH_START, text, strlen(text))};
+    program->text_hash = hash_bytes(HASH_START, text, strlen(text));
     if (request->no_cache) {
         program->program = build_afresh(compute, text, options);
     } else {
@@ -122,15 +128,26 @@ void program_build(Compute *compute, const ProgramRequest *request, Program *pro
     }
     free(text);
     program->build_seconds = clock_seconds() - start;
+    return compute_ok(compute);
+}
+
+cl_kernel program_kernel(Compute *compute, const Program *program, const char *name)
+{
+    if (!compute_ok(compute)) return NULL;
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program->program, name, &status);
+    compute_check_object(compute, kernel, status, "clCreateKernel");
+    return kernel;
 }
 
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program)
 {
-    if (request->no_cache || program->from_cache) return;
+    if (request->no_cache || program->from_cache || !compute_ok(compute)) return;
     size_t size = 0;
-    // a driver that gives no binary costs the next run its build, not this one its picture
-    cl_int told = clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL);
-    if (told != CL_SUCCESS || size == 0) return;
+    // a driver without a binary costs the next run a build; this one has its image
+    if (clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL) != CL_SUCCESS ||
+        size == 0)
+        return;
     char *bytes = memory_allocate(size, 1);
     if (clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL) != CL_SUCCESS) {
         free(bytes);

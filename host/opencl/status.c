@@ -1,5 +1,4 @@
 // OpenCL's status codes by name.
-#include "host/base/fault.h"
 #include "host/opencl/compute.h"
 #include <CL/cl_ext.h>
 
@@ -71,11 +70,6 @@ const char *cl_status_name(cl_int status)
         STATUS(CL_INVALID_DEVICE_PARTITION_COUNT);
         STATUS(CL_PLATFORM_NOT_FOUND_KHR);
     default:
-        return "a status OpenCL 1.2 does not name";
+        return "a status unknown to OpenCL 1.2";
     }
-}
-
-void cl_check(cl_int status, const char *call)
-{
-    if (status != CL_SUCCESS) fault("%s: %s (%d)", call, cl_status_name(status), status);
 }

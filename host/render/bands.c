@@ -88,7 +88,7 @@ static void film_close(Film *film)
     cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->losses, film->ray, film->t,
                         film->normal,  film->position,   film->object, film->shadow, film->path};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
-        if (buffers[i]) cl_must(clReleaseMemObject(buffers[i]));
+        buffer_release(buffers[i]);
     *film = (Film){0};
 }
 
@@ -111,7 +111,7 @@ static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint a
     const RenderSettings *settings = &renderer->settings;
     cl_uint4 band = {
         {settings->region_x, settings->region_y + rows.first_row, settings->region_width, rows.row_count}};
-    kernel_argument(kernel, argument, sizeof band, &band);
+    kernel_argument(renderer->compute, kernel, argument, sizeof band, &band);
 }
 
 _Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");
@@ -119,15 +119,13 @@ _Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), 
 static void ray_counts_clear(Renderer *renderer, const Film *film)
 {
     const uint32_t zeros[RAYS_COUNT] = {0};
-    cl_must(clEnqueueWriteBuffer(renderer->compute->queue, film->ray_counts, CL_TRUE, 0, sizeof zeros, zeros,
-                                 0, NULL, NULL));
+    buffer_write(renderer->compute, film->ray_counts, sizeof zeros, zeros);
 }
 
 static void ray_counts_add(Renderer *renderer, const Film *film)
 {
-    uint32_t counts[RAYS_COUNT];
-    cl_must(clEnqueueReadBuffer(renderer->compute->queue, film->ray_counts, CL_TRUE, 0, sizeof counts, counts,
-                                0, NULL, NULL));
+    uint32_t counts[RAYS_COUNT] = {0};
+    buffer_read(renderer->compute, film->ray_counts, sizeof counts, counts);
     for (size_t i = 0; i < RAYS_COUNT; i++)
         renderer->report.rays[i] += counts[i];
 }
@@ -136,13 +134,13 @@ static void ray_counts_add(Renderer *renderer, const Film *film)
 static double band_render(Renderer *renderer, const Film *film, BandRows rows, uint32_t first, uint32_t last)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
-    kernel_argument(kernel, FLAT_COUNT, sizeof(cl_mem), &film->offsets);
-    kernel_argument(kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->colors);
-    kernel_argument(kernel, FLAT_COUNT + 2, sizeof(cl_mem), &film->losses);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &film->offsets);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->colors);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &film->losses);
     band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
-    kernel_argument(kernel, FLAT_COUNT + 4, sizeof first, &first);
-    kernel_argument(kernel, FLAT_COUNT + 5, sizeof last, &last);
-    kernel_argument(kernel, FLAT_COUNT + 6, sizeof(cl_mem), &film->ray_counts);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &film->ray_counts);
     if (renderer->settings.counting) ray_counts_clear(renderer, film);
     LaunchTime time = band_launch(renderer, KERNEL_RENDER, rows);
     if (renderer->settings.counting) ray_counts_add(renderer, film);
@@ -156,9 +154,9 @@ static void band_aovs(Renderer *renderer, const Film *film, unsigned aovs, BandR
     const cl_mem *buffers[] = {&film->ray,      &film->t,      &film->normal,
                                &film->position, &film->object, &film->shadow};
     for (cl_uint i = 0; i < 6; i++)
-        kernel_argument(kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
+        kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
     cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
-    kernel_argument(kernel, FLAT_COUNT + 7, sizeof shadow_count, &shadow_count);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 7, sizeof shadow_count, &shadow_count);
     band_launch(renderer, KERNEL_AOV, rows);
 }
 
@@ -166,7 +164,7 @@ static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_PATH);
     band_set_place(renderer, kernel, FLAT_COUNT, rows);
-    kernel_argument(kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->path);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->path);
     band_launch(renderer, KERNEL_PATH, rows);
 }
 
@@ -219,11 +217,11 @@ static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, Ba
                  .ray = mapped[6],
                  .path = mapped[7]};
     double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
-    bool go_on = sink(context, &band, done);
+    bool go_on = compute_ok(renderer->compute) && sink(context, &band, done);
     free(t);
     free(position);
     for (size_t i = 0; i < PART_COUNT; i++)
-        if (mapped[i]) renderer_unmap(renderer, parts[i].buffer, mapped[i]);
+        renderer_unmap(renderer, parts[i].buffer, mapped[i]);
     return go_on;
 }
 
@@ -269,10 +267,11 @@ static uint32_t film_rows_largest(const Renderer *renderer, unsigned aovs)
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
 {
     const RenderSettings *settings = &renderer->settings;
+    const Compute *compute = renderer->compute;
     Film film = {0};
     film_open(&film, renderer, aovs, film_rows_largest(renderer, aovs));
     Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
-    bool go_on = true;
+    bool go_on = compute_ok(compute);
     BandRows rows = {0};
     while (go_on && rows.first_row < settings->region_height) {
         uint32_t left = settings->region_height - rows.first_row;
@@ -284,7 +283,7 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
             double seconds = band_render(renderer, &film, rows, first, first + samples);
             pace_note_launch(&pace, pixels, samples, seconds);
             first += samples;
-            go_on = !settings->stop || !settings->stop();
+            go_on = compute_ok(compute) && !(settings->stop && settings->stop());
         }
         if (!go_on) break;
         // one ray a pixel, as the band's first launch had
@@ -294,5 +293,5 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
         rows.first_row += rows.row_count;
     }
     film_close(&film);
-    return go_on;
+    return go_on && compute_ok(compute);
 }

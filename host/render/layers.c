@@ -8,12 +8,12 @@ PictureLayers layers_allocate(uint32_t width, uint32_t height, uint32_t light_co
 {
     PictureLayers layers = {.width = width, .height = height, .light_count = light_count};
     const size_t pixels = layers_pixel_count(&layers);
-    layers.color = memory_allocate(3 * pixels, sizeof *layers.color);
-    layers.t = memory_allocate(pixels, sizeof *layers.t);
-    layers.normal = memory_allocate(3 * pixels, sizeof *layers.normal);
-    layers.object = memory_allocate(pixels, sizeof *layers.object);
-    layers.shadow = memory_allocate(light_count * pixels, sizeof *layers.shadow);
-    layers.path = memory_allocate(pixels, sizeof *layers.path);
+    layers.color = memory_allocate_zeroed(3 * pixels, sizeof *layers.color);
+    layers.t = memory_allocate_zeroed(pixels, sizeof *layers.t);
+    layers.normal = memory_allocate_zeroed(3 * pixels, sizeof *layers.normal);
+    layers.object = memory_allocate_zeroed(pixels, sizeof *layers.object);
+    layers.shadow = memory_allocate_zeroed(light_count * pixels, sizeof *layers.shadow);
+    layers.path = memory_allocate_zeroed(pixels, sizeof *layers.path);
     return layers;
 }
 

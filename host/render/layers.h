@@ -25,7 +25,7 @@ static inline size_t layers_pixel_count(const PictureLayers *layers)
     return (size_t)layers->width * layers->height;
 }
 
-// Room for all but position and ray.
+// Zeroed arrays of all but position and ray.
 PictureLayers layers_allocate(uint32_t width, uint32_t height, uint32_t light_count);
 void layers_free(PictureLayers *layers); // and zeroes
 

@@ -226,7 +226,8 @@ static bool scene_lay(CompiledScene *flat, const Scene *scene, Renderer *rendere
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    if (!settings_fit(settings, compute->device, messages) || !scene_is_small_enough(scene, messages))
+    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages) ||
+        !scene_is_small_enough(scene, messages))
         return NULL;
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
@@ -263,6 +264,10 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     upload(renderer, &flat);
     report->upload_seconds = clock_seconds() - start;
     compiled_scene_free(&flat);
+    if (!compute_ok(compute)) {
+        renderer_close(renderer);
+        return NULL;
+    }
     prelude_write(renderer);
     return renderer;
 }
@@ -271,15 +276,16 @@ void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
     for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
-        if (!renderer->kernels[kind].kernel) continue;
         KernelSlot *slot = &renderer->kernels[kind];
-        // by now it has been launched: what is kept holds finished machine code
-        program_store(renderer->compute, &slot->request, &slot->program);
-        cl_must(clReleaseKernel(slot->kernel));
+        if (slot->kernel) {
+            // it has been launched: its program's binary holds finished machine code
+            program_store(renderer->compute, &slot->request, &slot->program);
+            clReleaseKernel(slot->kernel);
+        }
         program_close(&slot->program);
     }
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        cl_must(clReleaseMemObject(renderer->arrays[kind]));
+        buffer_release(renderer->arrays[kind]);
     text_free(&renderer->prelude);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
@@ -306,11 +312,9 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     if (kind != KERNEL_AOV && kind != KERNEL_PATH) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
-    cl_int status;
-    slot->kernel = clCreateKernel(slot->program.program, kernel_sources[kind].name, &status);
-    cl_check(status, "clCreateKernel");
+    slot->kernel = program_kernel(renderer->compute, &slot->program, kernel_sources[kind].name);
     for (cl_uint i = 0; i < FLAT_COUNT; i++)
-        kernel_argument(slot->kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
+        kernel_argument(renderer->compute, slot->kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
     return slot->kernel;
 }
 
@@ -325,20 +329,28 @@ LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensio
 
 const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
 {
+    Compute *compute = renderer->compute;
+    if (!compute_ok(compute)) return NULL;
     double start = clock_seconds();
-    cl_event event;
+    cl_event event = NULL;
     cl_int status;
-    const void *mapped = clEnqueueMapBuffer(renderer->compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size,
-                                            0, NULL, &event, &status);
-    cl_check(status, "clEnqueueMapBuffer");
-    array_push(renderer->report.reads, ((NamedLaunch){"read-back", event_time(event, start)}));
+    const void *mapped =
+        clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size, 0, NULL, &event, &status);
+    if (!compute_check_object(compute, mapped, status, "clEnqueueMapBuffer")) {
+        if (event) clReleaseEvent(event);
+        return NULL;
+    }
+    NamedLaunch read = {"read-back", event_time(compute, event, "clEnqueueMapBuffer", start)};
+    array_push(renderer->report.reads, read);
     return mapped;
 }
 
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped)
 {
-    cl_must(
-        clEnqueueUnmapMemObject(renderer->compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL));
+    if (!mapped) return;
+    cl_int status =
+        clEnqueueUnmapMemObject(renderer->compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL);
+    compute_check(renderer->compute, status, "clEnqueueUnmapMemObject");
 }
 
 const RenderReport *renderer_report(const Renderer *renderer)

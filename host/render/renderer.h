@@ -57,9 +57,9 @@ enum { PERTURB_SCALE_LARGEST = 1000 };
 
 typedef struct Renderer Renderer;
 
-// Flattens and uploads; kernels are built when first used. NULL with a message where the settings do not fit
-// the device (double without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the
-// precision. The compute outlives it.
+// Flattens and uploads; kernels are built when first used. NULL with a message: the settings do not fit the
+// device (double without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the precision.
+// NULL without one: the device failed, see Compute. The compute outlives it.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
 void renderer_close(Renderer *renderer);
@@ -80,11 +80,13 @@ typedef struct {
 // Called for each band from the top; returns false to stop (a user's interrupt).
 typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
 
-// Renders the region in bands of about band_seconds each. False if the sink stopped it.
+// Renders the region in bands of about band_seconds each. False: the device failed (compute_ok says so), else
+// `stop` or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
-// Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders.
-void renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
+// Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders. False: the
+// device failed, and `hits` are undefined.
+bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
 
 // A kernel's launch, or a transfer.
 typedef struct {

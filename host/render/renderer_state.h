@@ -26,13 +26,15 @@ struct Renderer {
 
 size_t renderer_scalar_size(const Renderer *renderer);
 
-// The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first asked for.
+// The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first requested. NULL:
+// the device failed.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 
 // Launches (as kernel_launch does) and notes the time in the report.
 LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
                            const size_t *group);
 
-// Maps a buffer for the host to read, noting the time; release with renderer_unmap.
+// Maps a buffer for the host to read, noting the time; NULL: the device failed. Released with renderer_unmap,
+// which accepts NULL.
 const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

@@ -72,30 +72,32 @@ static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count
     cl_mem objects = buffer_create(compute, object_size, NULL, CL_MEM_WRITE_ONLY);
 
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
-    kernel_argument(kernel, FLAT_COUNT, sizeof(cl_mem), &ray_buffer);
-    kernel_argument(kernel, FLAT_COUNT + 1, sizeof count, &count);
-    kernel_argument(kernel, FLAT_COUNT + 2, sizeof(cl_mem), &results);
-    kernel_argument(kernel, FLAT_COUNT + 3, sizeof(cl_mem), &objects);
+    kernel_argument(compute, kernel, FLAT_COUNT, sizeof(cl_mem), &ray_buffer);
+    kernel_argument(compute, kernel, FLAT_COUNT + 1, sizeof count, &count);
+    kernel_argument(compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &results);
+    kernel_argument(compute, kernel, FLAT_COUNT + 3, sizeof(cl_mem), &objects);
     size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = TRACE_GROUP;
     renderer_launch(renderer, KERNEL_TRACE, 1, &items, &group);
 
     const void *result = renderer_map(renderer, results, result_size);
     const uint32_t *object = renderer_map(renderer, objects, object_size);
-    for (uint32_t i = 0; i < count; i++)
+    for (uint32_t i = 0; i < count && compute_ok(compute); i++)
         hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, wide, object[i], unit);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
-    cl_must(clFinish(compute->queue));
-    cl_must(clReleaseMemObject(ray_buffer));
-    cl_must(clReleaseMemObject(results));
-    cl_must(clReleaseMemObject(objects));
+    compute_try(compute, clFinish(compute->queue));
+    buffer_release(ray_buffer);
+    buffer_release(results);
+    buffer_release(objects);
 }
 
-void renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
-    for (size_t first = 0; first < ray_count; first += TRACE_RAYS_OF_LAUNCH) {
+    const Compute *compute = renderer->compute;
+    for (size_t first = 0; first < ray_count && compute_ok(compute); first += TRACE_RAYS_OF_LAUNCH) {
         size_t left = ray_count - first;
         uint32_t count = left < TRACE_RAYS_OF_LAUNCH ? (uint32_t)left : TRACE_RAYS_OF_LAUNCH;
         trace_batch(renderer, rays + first, count, hits + first);
     }
+    return compute_ok(compute);
 }

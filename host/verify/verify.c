@@ -189,8 +189,8 @@ PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, 
 {
     PictureLayers picture = layers_allocate(width, height, (uint32_t)scene->lights.count);
     const size_t pixels = layers_pixel_count(&picture);
-    picture.position = memory_allocate(3 * pixels, sizeof *picture.position);
-    picture.ray = memory_allocate(3 * pixels, sizeof *picture.ray);
+    picture.position = memory_allocate_zeroed(3 * pixels, sizeof *picture.position);
+    picture.ray = memory_allocate_zeroed(3 * pixels, sizeof *picture.ray);
     run->renderer->render(run->renderer->context, scene, hierarchy, &picture);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
@@ -396,6 +396,6 @@ void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyCho
             if (strcmp(probe_tables[k].name, result.name) == 0) run_table(&run, &probe_tables[k]);
         for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
-        sink(context, &result);
+        if (!sink(context, &result)) return;
     }
 }

@@ -47,7 +47,8 @@ typedef struct {
 
 bool verify_holds(const VerifyResult *result);
 
-typedef void (*VerifySink)(void *context, const VerifyResult *result);
+// Returns whether to go on with the next case.
+typedef bool (*VerifySink)(void *context, const VerifyResult *result);
 
 // Which cases to run, by name; NULL: all.
 typedef struct {
@@ -61,6 +62,6 @@ bool verify_is_case(const char *name);
 // pictures at `double` are judged by their like; rays have exact answers all the same.
 int verify_oracle_bits(void);
 
-// Runs the cases in turn.
+// Runs the cases in turn, until the sink ends it.
 void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
                 void *context);

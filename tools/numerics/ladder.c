@@ -1,8 +1,9 @@
 // How far t is off, by shape, precision and distance: random rays through the kernels that this program was
-// built with, each beside the quadruple-precision reference of host/verify/reference.c on the very bits that the
-// kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --hold it prints what
+// built with, each beside the quadruple-precision reference of host/verify/reference.c on the very bits that
+// the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --hold it prints what
 // breaks the hard cases' bounds instead.
 #include "host/base/clock.h"
+#include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/render/renderer.h"
@@ -228,13 +229,18 @@ static double cpu_seconds(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
+static void rays_trace(Renderer *renderer, const Rays *rays)
+{
+    if (!renderer_trace(renderer, rays->rays, rays->count, rays->answers)) fault("the device failed");
+}
+
 // The shortest of several runs of the trace kernel, in CPU time of all threads.
 static double trace_seconds(Renderer *renderer, const Rays *rays)
 {
     double least = HUGE_VAL;
     for (int run = 0; run <= TIMED_RUNS; run++) {
         double start = cpu_seconds();
-        renderer_trace(renderer, rays->rays, rays->count, rays->answers);
+        rays_trace(renderer, rays);
         double seconds = cpu_seconds() - start;
         if (run > 0) least = fmin(least, seconds); // the first builds
     }
@@ -305,7 +311,7 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
         Scene scene = scene_of(object, 1, &material);
         *renderer = renderer_of(compute, &scene, precision);
     }
-    renderer_trace(*renderer, rays->rays, rays->count, rays->answers);
+    rays_trace(*renderer, rays);
 }
 
 // One shape on one rung: each precision of the same width on the same rays. True if all kept to their tiers.
