@@ -18,7 +18,7 @@ enum { BALLS_PER_APEX = 4096, APEX_COUNT = 64, BALL_COUNT = BALLS_PER_APEX * APE
 
 static const char kernel_text[] =
     "#include \"ray.h\"\n"
-    "kernel void misses(global const scalar *lines, global const Ball *balls, uint apex, global int "
+    "kernel void misses(global const scalar *lines, global const CullSphere *balls, uint apex, global int "
     "*missed)\n"
     "{\n"
     "    size_t i = get_global_id(0);\n"
