@@ -5,9 +5,9 @@
 
 static KERNEL_BODY void tile_sign(const Scene *scene, const Tile *tile, global int *paths)
 {
-    natural signature;
+    unsigned_integer signature;
     ray_color(scene, camera_ray(scene->header, tile->pixels, 0, 0, tile->inside), &signature);
-    film_store_integer(paths, tile, 1, 0, integer_from_natural(signature));
+    film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 
 kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)

@@ -20,7 +20,7 @@ static KERNEL_BODY void tile_render(const Scene *scene, const Tile *tile, global
         Ray ray = camera_ray(scene->header, tile->pixels, offsets[2 * sample], offsets[2 * sample + 1],
                              tile->inside);
         rays_count(scene, RAYS_CAMERA, ray.active);
-        natural path;
+        unsigned_integer path;
         Color3 color = vector_subtract(ray_color(scene, ray, &path), lost);
         Color3 next = vector_add(sum, color);
         lost = vector_subtract(vector_subtract(next, sum), color);

@@ -31,7 +31,7 @@ static const char fma_text[] =
     "                         global float *errors)\n"
     "{\n"
     "    size_t i = get_global_id(0) * LANES;\n"
-    "    RealLanes sum = {fma(real_load(a + i), real_load(b + i), real_load(c + i))};\n"
+    "    RealLanes sum = {real_fma(real_load(a + i), real_load(b + i), real_load(c + i))};\n"
     "    RealLanes error = {pair_product(real_load(a + i), real_load(b + i)).low};\n"
     "    for (uint lane = 0; lane < LANES; lane++) {\n"
     "        sums[i + lane] = sum.each[lane];\n"

@@ -14,21 +14,21 @@ static inline real real_turns(real x, real y)
     real larger = real_max(along, across), smaller = real_min(along, across);
     real tangent = real_divide(smaller, lanes_select(larger == (real)(0), (real)(1), larger));
     for (uint halving = 0; halving < 2; halving++)
-        tangent = real_divide(tangent, (real)(1) + real_sqrt(fma(tangent, tangent, (real)(1))));
+        tangent = real_divide(tangent, (real)(1) + real_sqrt(real_fma(tangent, tangent, (real)(1))));
     real squared = tangent * tangent;
     real series;
 #if IS_DOUBLE
     series = (real)(0);
     for (scalar n = 25; n >= 3; n -= 2)
-        series = fma(-squared, series, (real)(1 / n));
+        series = real_fma(-squared, series, (real)(1 / n));
     const real turns_of_quarter = (real)(0x1.45f306dc9c883p-1);
 #else
-    series = fma(-squared, (real)(1.0f / 9), (real)(1.0f / 7));
-    series = fma(-squared, series, (real)(1.0f / 5));
-    series = fma(-squared, series, (real)(1.0f / 3));
+    series = real_fma(-squared, (real)(1.0f / 9), (real)(1.0f / 7));
+    series = real_fma(-squared, series, (real)(1.0f / 5));
+    series = real_fma(-squared, series, (real)(1.0f / 3));
     const real turns_of_quarter = (real)(0x1.45f306p-1f); // 4 / (2 pi)
 #endif
-    real turns = fma(-(tangent * squared), series, tangent) * turns_of_quarter;
+    real turns = real_fma(-(tangent * squared), series, tangent) * turns_of_quarter;
     turns = lanes_select(across > along, (real)(0.25f) - turns, turns);
     turns = lanes_select(x < (real)(0), (real)(0.5f) - turns, turns);
     return lanes_select(y < (real)(0), -turns, turns);

@@ -67,15 +67,15 @@ typedef int scalar_integer;
 typedef LANES_TYPE(REAL_BASE) real;
 typedef LANES_TYPE(INTEGER_BASE) integer;
 typedef integer mask;
-typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) natural; // wraps around
+typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps around
 
 #define real_from_integer LANES_CONVERT(REAL_BASE)
 #define integer_from_real LANES_CONVERT(INTEGER_BASE)
 #define real_from_bits    LANES_AS(REAL_BASE)
 #define bits_from_real    LANES_AS(INTEGER_BASE)
 
-#define natural_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
-#define integer_from_natural LANES_AS(INTEGER_BASE)
+#define unsigned_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
+#define integer_from_unsigned LANES_AS(INTEGER_BASE)
 
 // The tile that one work-item carries at once (types.h), and each lane's place in it.
 #define TILE_WIDTH  TILE_WIDTH_OF(LANES)
@@ -169,29 +169,29 @@ static inline scalar_integer lanes_smallest(integer value)
 static inline bool lanes_any(mask condition)
 {
 #if LANES == 16
-    JOIN(INTEGER_BASE, 8) eighth = condition.lo | condition.hi;
-    JOIN(INTEGER_BASE, 4) quarter = eighth.lo | eighth.hi;
+    JOIN(INTEGER_BASE, 8) eight = condition.lo | condition.hi;
+    JOIN(INTEGER_BASE, 4) four = eight.lo | eight.hi;
 #elif LANES == 8
-    JOIN(INTEGER_BASE, 4) quarter = condition.lo | condition.hi;
+    JOIN(INTEGER_BASE, 4) four = condition.lo | condition.hi;
 #else
-    JOIN(INTEGER_BASE, 4) quarter = condition;
+    JOIN(INTEGER_BASE, 4) four = condition;
 #endif
-    JOIN(INTEGER_BASE, 2) half_ = quarter.lo | quarter.hi;
-    return (half_.x | half_.y) != 0;
+    JOIN(INTEGER_BASE, 2) two = four.lo | four.hi;
+    return (two.x | two.y) != 0;
 }
 
 static inline scalar_integer lanes_smallest(integer value)
 {
 #if LANES == 16
-    JOIN(INTEGER_BASE, 8) eighth = min(value.lo, value.hi);
-    JOIN(INTEGER_BASE, 4) quarter = min(eighth.lo, eighth.hi);
+    JOIN(INTEGER_BASE, 8) eight = min(value.lo, value.hi);
+    JOIN(INTEGER_BASE, 4) four = min(eight.lo, eight.hi);
 #elif LANES == 8
-    JOIN(INTEGER_BASE, 4) quarter = min(value.lo, value.hi);
+    JOIN(INTEGER_BASE, 4) four = min(value.lo, value.hi);
 #else
-    JOIN(INTEGER_BASE, 4) quarter = value;
+    JOIN(INTEGER_BASE, 4) four = value;
 #endif
-    JOIN(INTEGER_BASE, 2) half_ = min(quarter.lo, quarter.hi);
-    return min(half_.x, half_.y);
+    JOIN(INTEGER_BASE, 2) two = min(four.lo, four.hi);
+    return min(two.x, two.y);
 }
 #endif
 

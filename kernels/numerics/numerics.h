@@ -47,10 +47,10 @@ static inline real repaired_quotient(real a, real b)
     a = real_from_bits((a_bits & MANTISSA) | BITS_OF_ONE);
     b = real_from_bits((b_bits & MANTISSA) | BITS_OF_ONE);
     real quotient = device_divide(a, b);
-    quotient = fma(fma(-quotient, b, a), device_divide((real)(1), b), quotient);
-    real remainder_ = fma(-quotient, b, a), half_b = (real)(0.5f) * b;
+    quotient = real_fma(real_fma(-quotient, b, a), device_divide((real)(1), b), quotient);
+    real residual = real_fma(-quotient, b, a), half_b = (real)(0.5f) * b;
     real up = real_above(quotient), down = real_below(quotient);
-    mask rises = remainder_ > (up - quotient) * half_b, falls = remainder_ < (down - quotient) * half_b;
+    mask rises = residual > (up - quotient) * half_b, falls = residual < (down - quotient) * half_b;
     quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
     quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & SIGN_BIT));
     // in two factors: one may be beyond the largest real where the product is not
@@ -67,9 +67,9 @@ static inline real repaired_root(real a)
     integer half_exponent = (bits_from_real(a) - BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
     a = real_from_bits(bits_from_real(a) - (half_exponent << 24));
     real root = device_sqrt(a);
-    root = fma(fma(-root, root, a), device_divide((real)(0.5f), root), root);
+    root = real_fma(real_fma(-root, root, a), device_divide((real)(0.5f), root), root);
     real up = real_above(root), down = real_below(root);
-    mask rises = fma(-root, up, a) > (real)(0), falls = fma(-root, down, a) <= (real)(0);
+    mask rises = real_fma(-root, up, a) > (real)(0), falls = real_fma(-root, down, a) <= (real)(0);
     return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
 }
 
@@ -106,8 +106,8 @@ static inline real real_inverse_power(real a)
 static inline real product_difference(real a, real b, real c, real d)
 {
     real cd = c * d;
-    real rest = fma(-c, d, cd);
-    return fma(a, b, -cd) + rest;
+    real rest = real_fma(-c, d, cd);
+    return real_fma(a, b, -cd) + rest;
 }
 
 // Sums and products of pairs follow Joldes, Muller, Popescu, Tight and rigorous error bounds for basic
@@ -118,10 +118,10 @@ static inline Pair pair_of(real value)
     return (Pair){value, (real)(0)};
 }
 
-static inline Pair pair_fast_sum(real large, real small_)
+static inline Pair pair_fast_sum(real larger, real smaller)
 {
-    real sum = large + small_;
-    return (Pair){sum, small_ - (sum - large)};
+    real sum = larger + smaller;
+    return (Pair){sum, smaller - (sum - larger)};
 }
 
 static inline Pair pair_negate(Pair a)
@@ -145,13 +145,13 @@ static inline Pair pair_subtract(Pair a, Pair b)
 static inline Pair pair_multiply(Pair a, Pair b)
 {
     Pair product = pair_product(a.high, b.high);
-    return pair_fast_sum(product.high, product.low + fma(a.high, b.low, a.low * b.high));
+    return pair_fast_sum(product.high, product.low + real_fma(a.high, b.low, a.low * b.high));
 }
 
 static inline Pair pair_scale(Pair a, real factor)
 {
     Pair product = pair_product(a.high, factor);
-    return pair_fast_sum(product.high, fma(a.low, factor, product.low));
+    return pair_fast_sum(product.high, real_fma(a.low, factor, product.low));
 }
 
 // a b - c d in pairs.
@@ -180,18 +180,18 @@ static inline real real_log_complement(real s)
     real series = (real)(0);
 #if IS_DOUBLE
     for (scalar n = 23; n >= 3; n -= 2)
-        series = fma(series, zz, (real)(1.0 / n));
+        series = real_fma(series, zz, (real)(1.0 / n));
     const real ln2_high = (real)(0x1.62e42fefa39efp-1), ln2_low = (real)(0x1.abc9e3b39803fp-56);
 #else
-    series = fma(zz, (real)(1.0f / 9), (real)(1.0f / 7));
-    series = fma(series, zz, (real)(1.0f / 5));
-    series = fma(series, zz, (real)(1.0f / 3));
+    series = real_fma(zz, (real)(1.0f / 9), (real)(1.0f / 7));
+    series = real_fma(series, zz, (real)(1.0f / 5));
+    series = real_fma(series, zz, (real)(1.0f / 3));
     const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
 #endif
     real two_z = z + z;
-    real log_m = fma(two_z * zz, series, two_z);
+    real log_m = real_fma(two_z * zz, series, two_z);
     real k = real_from_integer(exponent);
-    return fma(k, ln2_high, fma(k, ln2_low, log_m));
+    return real_fma(k, ln2_high, real_fma(k, ln2_low, log_m));
 }
 
 // Below this real_exp_negative is 0.
@@ -213,22 +213,22 @@ static inline real real_exp_negative(real x)
     const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
 #endif
     real within = real_max(x, lowest);
-    real k = floor(fma(within, log2_e, (real)(0.5f)));
-    real r = fma(-k, ln2_low, fma(-k, ln2_high, within));
+    real k = floor(real_fma(within, log2_e, (real)(0.5f)));
+    real r = real_fma(-k, ln2_low, real_fma(-k, ln2_high, within));
     real series;
 #if IS_DOUBLE
     series = (real)(1);
     for (scalar n = 13; n >= 1; n -= 1)
-        series = fma(series, r * (real)(1 / n), (real)(1));
+        series = real_fma(series, r * (real)(1 / n), (real)(1));
     real power = real_from_bits((integer_from_real(k) + (integer)(1023)) << 52);
 #else
-    series = fma(r, (real)(1.0f / 5040), (real)(1.0f / 720));
-    series = fma(series, r, (real)(1.0f / 120));
-    series = fma(series, r, (real)(1.0f / 24));
-    series = fma(series, r, (real)(1.0f / 6));
-    series = fma(series, r, (real)(0.5f));
-    series = fma(series, r, (real)(1));
-    series = fma(series, r, (real)(1));
+    series = real_fma(r, (real)(1.0f / 5040), (real)(1.0f / 720));
+    series = real_fma(series, r, (real)(1.0f / 120));
+    series = real_fma(series, r, (real)(1.0f / 24));
+    series = real_fma(series, r, (real)(1.0f / 6));
+    series = real_fma(series, r, (real)(0.5f));
+    series = real_fma(series, r, (real)(1));
+    series = real_fma(series, r, (real)(1));
     real power = real_from_bits((integer_from_real(k) + (integer)(127)) << 23);
 #endif
     return lanes_select(x < lowest, (real)(0), series * power);

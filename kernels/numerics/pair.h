@@ -1,12 +1,12 @@
-// Sums and products without error, and fma for devices that do it in software.
+// Sums and products without error, and real_fma: a b + c, rounded once.
 //
-// Theirs goes through integers, at several times the operations; inlined in hundreds of places it is more
-// than some compilers finish. Ours adds the product's two halves to c without error and rounds the sum once,
-// what is left out being rounded to odd before (Boldo, Melquiond, Emulation of a FMA and correctly rounded
-// sums: proved algorithms using rounding to odd, IEEE Transactions on Computers 57(4), 2008; the operands are
-// split between bits here, which overflows nowhere). Bits differ from fma's only where the product or the sum
-// is within a few ulp of the largest real or beyond it, or the product is so small, below 2^-102, that its
-// lower half is no normal number; below some 2^-80 on a device that takes subnormal numbers for 0.
+// A device that emulates fma does it with integers, at several times the operations; inlined in hundreds of
+// places that is more than some compilers finish. There real_fma adds the two parts of the product to c
+// without error and rounds the sum once, after rounding the remainder to odd (Boldo, Melquiond, Emulation of
+// a FMA and correctly rounded sums: proved algorithms using rounding to odd, IEEE Transactions on Computers
+// 57(4), 2008; here operands are split between bits, which never overflows). Its bits differ from fma's only
+// where the product or the sum is within a few ulp of the largest real or beyond it, or the product is below
+// 2^-102, so that its low part is subnormal; below some 2^-80 on a device that flushes subnormals.
 #ifndef PAIR_H
 #define PAIR_H
 
@@ -27,59 +27,55 @@ static inline Pair pair_sum(real a, real b)
 
 #if HAS_FMA
 
+#define real_fma fma
+
 // a b without error.
 static inline Pair pair_product(real a, real b)
 {
     real product = a * b;
-    return (Pair){product, fma(a, b, -product)};
+    return (Pair){product, real_fma(a, b, -product)};
 }
 
 #else
 
-// By halves of 12 bits, whose products are exact (Dekker, A floating-point technique for extending the
-// available precision, Numerische Mathematik 18, 1971).
+// a b without error, from parts of 12 bits, whose products are exact (Dekker, A floating-point technique for
+// extending the available precision, Numerische Mathematik 18, 1971).
 static inline Pair pair_product(real a, real b)
 {
-    const integer upper_half = (integer)(~0xfff);
+    const integer high_bits = (integer)(~0xfff);
     real product = a * b;
-    real a_high = real_from_bits(bits_from_real(a) & upper_half), a_low = a - a_high;
-    real b_high = real_from_bits(bits_from_real(b) & upper_half), b_low = b - b_high;
+    real a_high = real_from_bits(bits_from_real(a) & high_bits), a_low = a - a_high;
+    real b_high = real_from_bits(bits_from_real(b) & high_bits), b_low = b - b_high;
     real missing = ((product - a_high * b_high) - a_low * b_high) - a_high * b_low;
     return (Pair){product, a_low * b_low - missing};
 }
 
 #if IS_FAST
 
-// Of products only pair_product's are exact here: a product_difference is a plain difference.
-#undef fma
-#define fma mad
+// May round twice: of all products only pair_product's are exact here.
+#define real_fma mad
 
 #else
 
-// The sum's higher half; where the lower is not 0, of the two reals around the sum the one whose last bit is
-// 1: a step away from 0, or to it, leads there.
-static inline real pair_odd(Pair sum)
+// high + low rounded to odd: if low is not 0, the one of the two reals around the sum whose last bit is 1.
+static inline real pair_round_to_odd(Pair sum)
 {
     integer bits = bits_from_real(sum.high);
-    integer step = ((bits ^ bits_from_real(sum.low)) >> 31) | (integer)(1);
+    integer step = ((bits ^ bits_from_real(sum.low)) >> 31) | (integer)(1); // away from 0, or towards it
     mask moves = (sum.low != (real)(0)) & ((bits & (integer)(1)) == (integer)(0));
     return real_from_bits(lanes_select(moves, bits + step, bits));
 }
 
-static inline real fma_in_software(real a, real b, real c)
+static inline real real_fma(real a, real b, real c)
 {
     Pair product = pair_product(a, b);
     Pair lower = pair_sum(c, product.low), upper = pair_sum(product.high, lower.high);
-    real once = upper.high + pair_odd(pair_sum(upper.low, lower.low));
-    // has the right sign where the sum is 0, and is a number or infinity beyond the largest real
-    real twice = product.high + c;
-    mask finite = (fabs(twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
-    return lanes_select(finite & (once != (real)(0)), once, twice);
+    real rounded_once = upper.high + pair_round_to_odd(pair_sum(upper.low, lower.low));
+    // has the right sign if the sum is 0, and is right beyond the largest real
+    real rounded_twice = product.high + c;
+    mask finite = (fabs(rounded_twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
+    return lanes_select(finite & (rounded_once != (real)(0)), rounded_once, rounded_twice);
 }
-
-// Of lanes; the device's own remains (fma)(a, b, c).
-#undef fma
-#define fma(a, b, c) fma_in_software(a, b, c)
 
 #endif
 

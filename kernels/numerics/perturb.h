@@ -13,11 +13,11 @@
 #if IS_DOUBLE
 #define MANTISSA        ((integer)(0xfffffffffffffL))
 #define HALF_WORD       32
-#define HASH_MULTIPLIER ((natural)(0x9e3779b97f4a7c15UL))
+#define HASH_MULTIPLIER ((unsigned_integer)(0x9e3779b97f4a7c15UL))
 #else
 #define MANTISSA        ((integer)(0x7fffff))
 #define HALF_WORD       16
-#define HASH_MULTIPLIER ((natural)(0x9e3779b1U))
+#define HASH_MULTIPLIER ((unsigned_integer)(0x9e3779b1U))
 #endif
 
 enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTURBED_LOG2, PERTURBED_COUNT };
@@ -25,23 +25,23 @@ enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTUR
 // In ulp. The device's own rounding comes on top.
 enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16, NATIVE_ERROR = 8192 };
 
-static inline natural perturb_hash(uint operation, integer a, integer b)
+static inline unsigned_integer perturb_hash(uint operation, integer a, integer b)
 {
-    natural hash = (natural)(PERTURB_SEED * PERTURBED_COUNT + operation) * HASH_MULTIPLIER;
-    hash = (hash ^ (hash >> HALF_WORD) ^ natural_from_integer(a)) * HASH_MULTIPLIER;
-    hash = (hash ^ (hash >> HALF_WORD) ^ natural_from_integer(b)) * HASH_MULTIPLIER;
+    unsigned_integer hash = (unsigned_integer)(PERTURB_SEED * PERTURBED_COUNT + operation) * HASH_MULTIPLIER;
+    hash = (hash ^ (hash >> HALF_WORD) ^ unsigned_from_integer(a)) * HASH_MULTIPLIER;
+    hash = (hash ^ (hash >> HALF_WORD) ^ unsigned_from_integer(b)) * HASH_MULTIPLIER;
     return (hash ^ (hash >> HALF_WORD)) * HASH_MULTIPLIER;
 }
 
 // From -largest to largest.
-static inline integer perturb_steps(natural hash, uint largest)
+static inline integer perturb_steps(unsigned_integer hash, uint largest)
 {
-    return integer_from_natural(mul_hi(hash, (natural)(2 * largest + 1))) -
+    return integer_from_unsigned(mul_hi(hash, (unsigned_integer)(2 * largest + 1))) -
            (integer)((scalar_integer)largest);
 }
 
 // The real so many ulp away. 0, and what is nearly too small or too large for a real, stays.
-static inline real perturb(real value, natural hash, uint largest)
+static inline real perturb(real value, unsigned_integer hash, uint largest)
 {
     integer steps = perturb_steps(hash, largest * PERTURB_SCALE);
     mask ordinary = (fabs(value) > (real)(SMALLEST_RATIO)) & (fabs(value) < (real)(1 / SMALLEST_RATIO));
@@ -53,7 +53,8 @@ static inline real device_divide(real a, real b)
 {
     real quotient = a / b;
     if (!PERTURB || IS_DOUBLE) return quotient;
-    natural hash = perturb_hash(PERTURBED_DIVIDE, bits_from_real(a) & MANTISSA, bits_from_real(b) & MANTISSA);
+    unsigned_integer hash =
+        perturb_hash(PERTURBED_DIVIDE, bits_from_real(a) & MANTISSA, bits_from_real(b) & MANTISSA);
     real moved = perturb(quotient, hash, DIVIDE_ERROR);
     if (!IS_FAST) return moved;
     mask promised = (fabs(a) > (real)(0x1p-62f)) & (fabs(a) < (real)(0x1p62f)) &
@@ -93,9 +94,9 @@ static inline real device_log2(real a)
 {
     real logarithm = native_log2(a);
     if (!PERTURB) return logarithm;
-    natural hash = perturb_hash(PERTURBED_LOG2, bits_from_real(a), (integer)(0));
+    unsigned_integer hash = perturb_hash(PERTURBED_LOG2, bits_from_real(a), (integer)(0));
     real steps = real_from_integer(perturb_steps(hash, NATIVE_ERROR * PERTURB_SCALE));
-    return fma(steps, (real)(0x1p-21f / NATIVE_ERROR), perturb(logarithm, hash, NATIVE_ERROR));
+    return real_fma(steps, (real)(0x1p-21f / NATIVE_ERROR), perturb(logarithm, hash, NATIVE_ERROR));
 }
 #endif
 

@@ -32,7 +32,7 @@ static inline Vector vector_scale(Vector a, real factor)
 // a + b factor
 static inline Vector vector_fma(Vector b, real factor, Vector a)
 {
-    return (Vector){fma(b.x, factor, a.x), fma(b.y, factor, a.y), fma(b.z, factor, a.z)};
+    return (Vector){real_fma(b.x, factor, a.x), real_fma(b.y, factor, a.y), real_fma(b.z, factor, a.z)};
 }
 
 static inline Vector vector_negate(Vector a)
@@ -48,7 +48,7 @@ static inline Vector vector_select(mask condition, Vector yes, Vector no)
 
 static inline real vector_dot(Vector a, Vector b)
 {
-    return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
+    return real_fma(a.x, b.x, real_fma(a.y, b.y, a.z * b.z));
 }
 
 // The dot product as if in twice the precision (Ogita, Rump, Oishi, Accurate sum and dot product, SIAM J.
@@ -75,16 +75,16 @@ static inline real vector_length(Vector a)
 // Unit to 2.5 u. The zero vector stays zero.
 static inline Vector vector_normalize(Vector a)
 {
-    real length_ = vector_length(a);
-    mask zero = length_ == (real)(0);
-    return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), length_)));
+    real norm = vector_length(a);
+    mask zero = norm == (real)(0);
+    return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), norm)));
 }
 
 // The same for what is unit but for some rounding, e: by Newton's step, whose error is e^2.
 static inline Vector vector_renormalize(Vector a)
 {
     if (IS_COMPENSATED) return vector_normalize(a);
-    return vector_scale(a, fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
+    return vector_scale(a, real_fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
 }
 
 // |x| + |y| + |z|: what error bounds are proportional to.
@@ -97,7 +97,7 @@ static inline real vector_magnitude(Vector a)
 // surface of that normal. Those along the surface leave it there.
 static inline real vector_magnitude_along(Vector unit, Vector a)
 {
-    return fma(fabs(unit.x), fabs(a.x), fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
+    return real_fma(fabs(unit.x), fabs(a.x), real_fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
 }
 
 // Vectors of pairs, for the compensated forms.
@@ -144,7 +144,7 @@ static inline real pair_vector_dot_once(PairVector a, Vector b)
 {
     Pair x = pair_product(a.x.high, b.x), y = pair_product(a.y.high, b.y), z = pair_product(a.z.high, b.z);
     Pair two = pair_sum(x.high, y.high), three = pair_sum(two.high, z.high);
-    real low = fma(a.x.low, b.x, fma(a.y.low, b.y, a.z.low * b.z));
+    real low = real_fma(a.x.low, b.x, real_fma(a.y.low, b.y, a.z.low * b.z));
     return three.high + ((((x.low + y.low) + z.low) + (two.low + three.low)) + low);
 }
 
@@ -152,9 +152,9 @@ static inline real pair_vector_dot_once(PairVector a, Vector b)
 static inline Vector pair_vector_cross_once(PairVector a, Vector b)
 {
     Vector high = vector_cross(pair_vector_high(a), b);
-    return (Vector){high.x + fma(a.y.low, b.z, -(a.z.low * b.y)),
-                    high.y + fma(a.z.low, b.x, -(a.x.low * b.z)),
-                    high.z + fma(a.x.low, b.y, -(a.y.low * b.x))};
+    return (Vector){high.x + real_fma(a.y.low, b.z, -(a.z.low * b.y)),
+                    high.y + real_fma(a.z.low, b.x, -(a.x.low * b.z)),
+                    high.z + real_fma(a.x.low, b.y, -(a.y.low * b.x))};
 }
 
 #endif

@@ -19,24 +19,26 @@ static inline Color3 surface_color(const Scene *scene, const Surface *surface)
 }
 
 // Takes up what a ray met and which rays came of it.
-static inline natural path_sign(natural path, const Ray *ray, const Hit *hit, mask mirrored, mask passed,
-                                mask total)
+static inline unsigned_integer path_sign(unsigned_integer path, const Ray *ray, const Hit *hit, mask mirrored,
+                                         mask passed, mask total)
 {
     const integer none = (integer)(0);
     integer events = lanes_select(mirrored, (integer)(PATH_REFLECTED), none) |
                      lanes_select(passed, (integer)(PATH_REFRACTED), none) |
                      lanes_select(mirrored & total, (integer)(PATH_TOTAL_REFLECTION), none);
-    natural word = natural_from_integer((hit->object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
-    natural longer = ((path ^ word) * (natural)(PATH_FACTOR)) & (natural)(0xffffffffu);
+    unsigned_integer word =
+        unsigned_from_integer((hit->object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
+    unsigned_integer longer =
+        ((path ^ word) * (unsigned_integer)(PATH_FACTOR)) & (unsigned_integer)(0xffffffffu);
     return lanes_select(ray->active, longer, path);
 }
 
 // Follows a ray and all that it becomes: at each surface the mirrored ray first, with all that comes of it,
 // then the one that passes. Where SIGNS_PATHS, *path is the signature (types.h) of the way taken, which in a
 // lane does not depend on the others, and the color is without meaning.
-static inline Color3 ray_color(const Scene *scene, Ray ray, natural *path)
+static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *path)
 {
-    *path = (natural)(PATH_START);
+    *path = (unsigned_integer)(PATH_START);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 background = vector_of(scene->header->background);
     Color3 color = black, weight = white;

@@ -18,7 +18,7 @@ static inline real spot_strength(const Light *light, Vector from_light)
     real s = (real)(0.5f) * vector_dot(difference, difference);
     real x = ((real)(light->cone.x) - s) * (real)(light->cone.z);
     x = real_min(real_max(x, (real)(0)), (real)(1));
-    real soft = x * x * fma((real)(-2), x, (real)(3));
+    real soft = x * x * real_fma((real)(-2), x, (real)(3));
     real hard = lanes_select(s <= (real)(light->cone.x), (real)(1), (real)(0));
     return light->cone.z == 0 ? hard : soft;
 }

@@ -13,8 +13,8 @@ static inline Color3 color_multiply(Color3 a, Color3 b)
 
 static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
 {
-    return (Color3){fma(weight.x, color.x, sum.x), fma(weight.y, color.y, sum.y),
-                    fma(weight.z, color.z, sum.z)};
+    return (Color3){real_fma(weight.x, color.x, sum.x), real_fma(weight.y, color.y, sum.y),
+                    real_fma(weight.z, color.z, sum.z)};
 }
 
 typedef struct {
@@ -181,7 +181,7 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
     surface.shading_normal =
         vector_select(shading_away, vector_negate(patch.shading_normal), patch.shading_normal);
     surface.error =
-        (real)(UNIT_ROUNDOFF)*fma((real)(16), patch.size, (real)(4) * vector_magnitude(patch.position));
+        (real)(UNIT_ROUNDOFF)*real_fma((real)(16), patch.size, (real)(4) * vector_magnitude(patch.position));
     surface.behind = surface.error + surface.error;
     return surface;
 }

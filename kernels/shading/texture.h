@@ -17,12 +17,12 @@ typedef struct {
 // at the equator tell how dense they are.
 static inline PicturePoint sphere_picture_point(const Sphere *sphere, Vector outward, uint4 level)
 {
-    real equator = real_sqrt(fma(outward.x, outward.x, outward.z * outward.z));
-    const real half_ = (real)(0.5f), two = (real)(2), inverse_pi = (real)(0x1.45f306p-2f);
+    real equator = real_sqrt(real_fma(outward.x, outward.x, outward.z * outward.z));
+    const real one_half = (real)(0.5f), two = (real)(2), inverse_pi = (real)(0x1.45f306p-2f);
     PicturePoint point;
-    point.u = half_ + real_turns(outward.z, outward.x);
-    point.v = fma(two, real_turns(equator, outward.y), half_);
-    real texels = inverse_pi * real_max((real)((scalar)level.y) * half_, (real)((scalar)level.z));
+    point.u = one_half + real_turns(outward.z, outward.x);
+    point.v = real_fma(two, real_turns(equator, outward.y), one_half);
+    real texels = inverse_pi * real_max((real)((scalar)level.y) * one_half, (real)((scalar)level.z));
     point.density = real_divide(texels, fabs((real)(sphere->center_radius.w)));
     return point;
 }
@@ -92,14 +92,14 @@ static inline scalar4 texel_color(const Scene *scene, uint index)
 
 static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
 {
-    return (fma)(b - a, (scalar4)(part), a);
+    return fma(b - a, (scalar4)(part), a);
 }
 
 // Texels stand for their centers; between centers colors change linearly. `level`: x its first texel, y
 // width, z height.
 static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, bool repeats_upward)
 {
-    scalar x = (fma)(u, (scalar)level.y, (scalar)(-0.5f)), y = (fma)(1 - v, (scalar)level.z, (scalar)(-0.5f));
+    scalar x = fma(u, (scalar)level.y, (scalar)(-0.5f)), y = fma(1 - v, (scalar)level.z, (scalar)(-0.5f));
     scalar left = floor(x), top = floor(y);
     uint column_0 = texel_repeated(left, level.y), column_1 = texel_repeated(left + 1, level.y);
     uint row_0 = repeats_upward ? texel_repeated(top, level.z) : texel_held(top, level.z);
@@ -131,14 +131,14 @@ static inline scalar4 picture_filtered(const Scene *scene, uint4 image, scalar u
     return scalar4_between(color, coarser, part);
 }
 
-// The picture's color where the lanes in `wanted` meet a surface, `distance_` along from the eye. What is
+// The picture's color where the lanes in `wanted` meet a surface, `travelled` along from the eye. What is
 // seen at a slant counts as at most 2^10 times longer.
 static inline Vector picture_color(const Scene *scene, uint kind, const Material *material,
-                                   PicturePoint point, const Patch *patch, const Ray *ray, real distance_,
+                                   PicturePoint point, const Patch *patch, const Ray *ray, real travelled,
                                    mask wanted)
 {
     real cosine = real_max(fabs(vector_dot(patch->normal, ray->direction)), (real)(0x1p-10f));
-    real width = distance_ * (real)(scene->header->sample.x);
+    real width = travelled * (real)(scene->header->sample.x);
     RealLanes u = {point.u}, v = {point.v}, footprint = {real_divide(width * point.density, cosine)};
     RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
     IntegerLanes lanes = {wanted};

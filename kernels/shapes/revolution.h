@@ -62,7 +62,7 @@ static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *sha
     Vector q = vector_cross(d, axis);
     real g = radius, h = (real)(0), reach;
     if (sloped) {
-        g = fma(slope, vector_dot(f, axis), radius);
+        g = real_fma(slope, vector_dot(f, axis), radius);
         h = slope * vector_dot(d, axis);
         Vector v = {product_difference(g, q.x, h, m.x), product_difference(g, q.y, h, m.y),
                     product_difference(g, q.z, h, m.z)};
@@ -72,9 +72,9 @@ static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *sha
     }
     real turn = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
     RevolutionQuadric quadric;
-    quadric.a = fma(-h, h, vector_dot(q, q));
-    quadric.b = fma(-g, h, vector_dot(m, q));
-    quadric.c = fma(-g, g, vector_dot(m, m));
+    quadric.a = real_fma(-h, h, vector_dot(q, q));
+    quadric.b = real_fma(-g, h, vector_dot(m, q));
+    quadric.c = real_fma(-g, g, vector_dot(m, m));
     quadric.discriminant = (reach - turn) * (reach + turn);
     quadric.q = q;
     quadric.m = m;
@@ -134,10 +134,10 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 {
     for (uint i = 0; i < 2; i++) {
         Vector across = vector_fma(quadric->q, t, quadric->m);
-        real radius = fma(quadric->h, t, quadric->g);
-        real distance_ = vector_length(across);
-        real excess = (distance_ - fabs(radius)) * (distance_ + fabs(radius));
-        real steepness = (real)(2) * fma(-radius, quadric->h, vector_dot(across, quadric->q));
+        real radius = real_fma(quadric->h, t, quadric->g);
+        real norm = vector_length(across);
+        real excess = (norm - fabs(radius)) * (norm + fabs(radius));
+        real steepness = (real)(2) * real_fma(-radius, quadric->h, vector_dot(across, quadric->q));
         mask steep = (fabs(excess) * (real)(SMALLEST_RATIO) < fabs(steepness)) & (fabs(t) < (real)(LARGEST));
         real step = real_divide(excess, lanes_select(steep, steepness, (real)(1)));
         t = lanes_select(steep, t - step, t);
@@ -239,7 +239,7 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
                                       const Ray *ray, real t)
 {
     scalar first = shape->base_radius.w;
-    scalar widest = fmax(first, (fma)(shape->axis_slope.w, shape->range.x, first));
+    scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
     Vector way = vector_scale(ray->direction, t);
     real size =
         vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_magnitude(way);
@@ -281,32 +281,32 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
-    real length_ = (real)(shape->range.y), squared_axis = (real)(shape->range.z);
+    real axis_length = (real)(shape->range.y), squared_axis = (real)(shape->range.z);
     Vector p = ray_point_from(ray, base, t);
     real height = vector_dot(p, axis);
 
     // outward from the axis: p minus its part along the axis
     Vector across = vector_fma(axis, -real_divide(height, squared_axis), p);
-    real distance_ = vector_length(across);
+    real axis_distance = vector_length(across);
     Vector radial = vector_normalize(across);
-    real radius = real_divide((real)(shape->base_radius.w), length_);
+    real radius = real_divide((real)(shape->base_radius.w), axis_length);
     Vector normal = radial, place;
     if (sloped) {
         // |p x w| - R - k p . w has the gradient |w| radial - k w, on the mirror nappe |w| radial + k w
         real slope = (real)(shape->axis_slope.w);
-        real signed_radius = fma(slope, height, (real)(shape->base_radius.w));
+        real signed_radius = real_fma(slope, height, (real)(shape->base_radius.w));
         mask mirrored = signed_radius < (real)(0);
         real turn = lanes_select(mirrored, -slope, slope);
-        Vector gradient = vector_fma(axis, -turn, vector_scale(radial, length_));
+        Vector gradient = vector_fma(axis, -turn, vector_scale(radial, axis_length));
         // at the apex the side has no normal: the axis stands in, as it does for an eye looking at the tip
-        mask apex = distance_ == (real)(0);
+        mask apex = axis_distance == (real)(0);
         normal = vector_normalize(vector_select(apex, axis, gradient));
-        real excess = distance_ - real_divide(fabs(signed_radius), length_);
+        real excess = axis_distance - real_divide(fabs(signed_radius), axis_length);
         // along the normal: times the cosine of the half-angle, whose tangent is the slope
-        real lean = real_divide((real)(1), real_sqrt(fma(slope, slope, (real)(1))));
+        real lean = real_divide((real)(1), real_sqrt(real_fma(slope, slope, (real)(1))));
         place = vector_fma(normal, -excess * lean, p);
     } else {
-        place = vector_fma(radial, radius - distance_, p);
+        place = vector_fma(radial, radius - axis_distance, p);
     }
 
     real size = vector_magnitude(p) + vector_magnitude(base) + radius;

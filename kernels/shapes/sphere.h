@@ -16,10 +16,10 @@ static inline SphereCoefficients sphere_coefficients(PairVector to_center, real 
     Pair xx = pair_product(x, x), yy = pair_product(y, y), zz = pair_product(z, z);
     Pair one = pair_sum(xx.high, -rr.high), two = pair_sum(one.high, yy.high),
          three = pair_sum(two.high, zz.high);
-    real twice_low = fma(x, to_center.x.low, fma(y, to_center.y.low, z * to_center.z.low));
+    real twice_low = real_fma(x, to_center.x.low, real_fma(y, to_center.y.low, z * to_center.z.low));
     real low = ((one.low + two.low) + three.low) + ((xx.low + yy.low) + (zz.low - rr.low));
     return (SphereCoefficients){-pair_vector_dot_once(to_center, ray->direction),
-                                three.high + fma((real)(2), twice_low, low)};
+                                three.high + real_fma((real)(2), twice_low, low)};
 }
 
 // From rounded b and c, off by 2 u (b^2 + |a c|): right where the line's closest approach is within the
@@ -33,7 +33,7 @@ static inline real sphere_discriminant_beside(SphereCoefficients exact, const Ra
 // distance.
 static inline real sphere_discriminant_afar(Vector moment, real radius, const Ray *ray)
 {
-    return fma(ray->squared * radius, radius, -vector_dot(moment, moment));
+    return real_fma(ray->squared * radius, radius, -vector_dot(moment, moment));
 }
 
 // Takes the better of the two.
@@ -62,7 +62,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real radius = (real)(sphere->center_radius.w), squared_radius = radius * radius;
     Vector f = vector_subtract(ray->origin, center);
     real b = vector_dot(f, ray->direction), squared_distance = vector_dot(f, f);
-    real lowered_c = fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF));
+    real lowered_c = real_fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF));
     mask hit = !(b * (b * ray->inverse_squared) < lowered_c);
     if (!lanes_any(hit)) return mask_none();
     hit = hit & RAY_ACTIVE(ray);
@@ -83,7 +83,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         hit = hit & (discriminant >= (real)(0));
     } else {
         Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
-        real half_chord_squared = fma(radius, radius, -vector_dot(l, l));
+        real half_chord_squared = real_fma(radius, radius, -vector_dot(l, l));
         discriminant = ray->squared * half_chord_squared;
         mask meets = half_chord_squared >= (real)(0),
              beside = hit & (fabs(c) < (real)(0.5f) * squared_distance);
@@ -113,7 +113,7 @@ static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, r
     real inverse = real_divide((real)(1), ray->squared);
     Vector l = vector_scale(vector_cross(moment, ray->direction), inverse);
     real h = real_sqrt(discriminant) * inverse;
-    mask far_side = fma(ray->squared, t, exact.b) > (real)(0);
+    mask far_side = real_fma(ray->squared, t, exact.b) > (real)(0);
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 

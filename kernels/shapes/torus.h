@@ -26,19 +26,19 @@ static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
     Vector radial = vector_fma(line->turn, s, line->across);
     real rho = vector_length(radial);
-    real z = fma(line->rise, s, line->height);
+    real z = real_fma(line->rise, s, line->height);
     real off = rho - line->major;
-    real from_circle = real_sqrt(fma(off, off, z * z));
+    real from_circle = real_sqrt(real_fma(off, off, z * z));
     real rho_slope = vector_dot(radial, line->turn) * real_inverse_or_zero(rho);
-    *slope = fma(off, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
+    *slope = real_fma(off, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
     return from_circle - line->minor;
 }
 
 // The quartic's derivative, 4 s^3 + 2 p s + q.
 static inline real torus_cubic(real p, real q, real s, real *slope)
 {
-    *slope = fma((real)(12) * s, s, p + p);
-    return fma(fma((real)(4) * s, s, p + p), s, q);
+    *slope = real_fma((real)(12) * s, s, p + p);
+    return real_fma(real_fma((real)(4) * s, s, p + p), s, q);
 }
 
 // The next guess within a bracket: Newton's where it lies inside, else the middle.
@@ -111,9 +111,9 @@ enum { TORUS_PLACES = 5 };
 static inline void torus_places(const TorusLine *line, real squared_distance, real span,
                                 real places[TORUS_PLACES])
 {
-    real k = fma(line->major, line->major, squared_distance) - line->minor * line->minor;
+    real k = real_fma(line->major, line->major, squared_distance) - line->minor * line->minor;
     real squared_major = line->major * line->major;
-    real p = fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
+    real p = real_fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
     real q = (real)(8) * squared_major * line->height * line->rise;
     real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
     places[0] = -span;
@@ -130,7 +130,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     Vector closest = torus_closest(torus, ray, &closest_t);
     real reach = major + minor;
     real squared_distance = vector_dot(closest, closest);
-    real half_chord_squared = fma(reach * (real)(1.001f), reach, -squared_distance);
+    real half_chord_squared = real_fma(reach * (real)(1.001f), reach, -squared_distance);
     mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
     if (!lanes_any(hit)) return hit;
 
@@ -156,13 +156,13 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
         mask crosses = hit & !found & (entering != (after > (real)(0))) & (places[i + 1] > start);
         if (lanes_any(crosses)) {
             real s = torus_zero(&line, places[i], places[i + 1], entering);
-            mask first = crosses & (fma(s, inverse_length, closest_t) > ray->near);
+            mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->near);
             found_s = lanes_select(first, s, found_s);
             found = found | first;
         }
         before = after;
     }
-    *t = lanes_select(found, fma(found_s, inverse_length, closest_t), *t);
+    *t = lanes_select(found, real_fma(found_s, inverse_length, closest_t), *t);
     return found;
 }
 

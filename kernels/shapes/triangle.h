@@ -104,12 +104,12 @@ static inline real roots_hold(Roots roots, real t)
 // A triangle seen edge-on would else be hit far outside itself: the edge functions do not know of the
 // distance, whose error grows as the angle gets lower. It is held between the vertices' distances, and within
 // their box, since the hierarchy looks for hits in boxes alone: its own are larger by four times this slack.
-static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real distance_)
+static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real plane_t)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
     Vector reach = corners_reach((Corners){a, b, c});
     real slack = (real)(16 * UNIT_ROUNDOFF) * vector_magnitude(reach);
-    real t = distance_;
+    real t = plane_t;
     t = roots_hold(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
     t = roots_hold(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
     t = roots_hold(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
@@ -155,7 +155,7 @@ static inline real triangle_distance_careful(const Triangle *triangle, const Tri
 {
     // in the triangle's own plane any place of it will do
     real otherwise = vector_dot(edges->a, ray->along);
-    real distance_ = triangle_plane_distance(triangle, ray, otherwise);
+    real t = triangle_plane_distance(triangle, ray, otherwise);
     mask held = hit;
     // At other angles, of a sine of 1/4 or more since the normal's square is 3 at most, the distance is
     // within 5 u over that sine, a third of what boxes allow. A needle's normal may be worse than that in
@@ -164,9 +164,8 @@ static inline real triangle_distance_careful(const Triangle *triangle, const Tri
         real facing = vector_dot(triangle_normal(triangle), ray->direction);
         held = held & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
     }
-    if (lanes_any(held))
-        distance_ = lanes_select(held, triangle_distance_held(edges, ray, distance_), distance_);
-    return distance_;
+    if (lanes_any(held)) t = lanes_select(held, triangle_distance_held(edges, ray, t), t);
+    return t;
 }
 
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)

@@ -32,8 +32,8 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
 {
     Vector center = vector_of(bounds);
     real reach = vector_magnitude(vector_subtract(ray->origin, center)) + (real)(bounds.w);
-    real coordinates = fma((real)(2), vector_magnitude(center), reach);
-    real slack = fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
+    real coordinates = real_fma((real)(2), vector_magnitude(center), reach);
+    real slack = real_fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
     const real huge = (real)(1 / SMALLEST_RATIO);
     real largest = real_min(huge * real_inverse_power(coordinates), huge);
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),
@@ -68,8 +68,9 @@ typedef struct {
 // Where rays are between two planes across an axis.
 static inline BoxSpan box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
 {
-    return (BoxSpan){real_min(fma((real)(low), inverse, to_near), fma((real)(high), inverse, to_near)),
-                     real_max(fma((real)(low), inverse, to_far), fma((real)(high), inverse, to_far))};
+    return (BoxSpan){
+        real_min(real_fma((real)(low), inverse, to_near), real_fma((real)(high), inverse, to_near)),
+        real_max(real_fma((real)(low), inverse, to_far), real_fma((real)(high), inverse, to_far))};
 }
 
 // Which rays meet a box between `near` and `limit`.
@@ -111,8 +112,8 @@ static inline void beam_axis_gather(BeamLeasts *leasts, uint axis, mask members,
     const real none = (real)(LARGEST), side = (real)(negative ? -1 : 1);
     leasts->ways.all[BEAM_LEAST + axis] = lanes_select(members, fabs(inverse), none);
     leasts->ways.all[BEAM_MOST + axis] = lanes_select(members, -fabs(inverse), none);
-    leasts->origins.all[BEAM_START + axis] = lanes_select(members, fma(origin, -side, -slack), none);
-    leasts->origins.all[BEAM_END + axis] = lanes_select(members, fma(origin, side, -slack), none);
+    leasts->origins.all[BEAM_START + axis] = lanes_select(members, real_fma(origin, -side, -slack), none);
+    leasts->origins.all[BEAM_END + axis] = lanes_select(members, real_fma(origin, side, -slack), none);
 }
 
 static inline BeamAxis beam_axis(const BeamLeasts *leasts, uint axis, bool negative, scalar everywhere)
@@ -174,12 +175,12 @@ static inline real boxes_planes(global const scalar *boxes, uint which)
 
 static inline real beam_axis_enter(const BeamAxis *axis, global const scalar *boxes)
 {
-    return fma(boxes_planes(boxes, axis->near), (real)(axis->least), (real)(axis->to_near));
+    return real_fma(boxes_planes(boxes, axis->near), (real)(axis->least), (real)(axis->to_near));
 }
 
 static inline real beam_axis_leave(const BeamAxis *axis, global const scalar *boxes)
 {
-    return fma(boxes_planes(boxes, axis->far), (real)(axis->most), (real)(axis->to_far));
+    return real_fma(boxes_planes(boxes, axis->far), (real)(axis->most), (real)(axis->to_far));
 }
 
 // The boxes, as many as there are lanes, that the beam meets, and the distance before which no ray is in
@@ -202,12 +203,12 @@ static inline real box_plane(global const scalar *box, uint which)
 static inline mask beam_rays_meet(const Beam *beam, const BoxRays *rays, global const scalar *box, real limit)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
-    real near_x = fma(box_plane(box, beam->x.near), inverse.x, to_near.x);
-    real near_y = fma(box_plane(box, beam->y.near), inverse.y, to_near.y);
-    real near_z = fma(box_plane(box, beam->z.near), inverse.z, to_near.z);
-    real far_x = fma(box_plane(box, beam->x.far), inverse.x, to_far.x);
-    real far_y = fma(box_plane(box, beam->y.far), inverse.y, to_far.y);
-    real far_z = fma(box_plane(box, beam->z.far), inverse.z, to_far.z);
+    real near_x = real_fma(box_plane(box, beam->x.near), inverse.x, to_near.x);
+    real near_y = real_fma(box_plane(box, beam->y.near), inverse.y, to_near.y);
+    real near_z = real_fma(box_plane(box, beam->z.near), inverse.z, to_near.z);
+    real far_x = real_fma(box_plane(box, beam->x.far), inverse.x, to_far.x);
+    real far_y = real_fma(box_plane(box, beam->y.far), inverse.y, to_far.y);
+    real far_z = real_fma(box_plane(box, beam->z.far), inverse.z, to_far.z);
     return real_max(real_max(near_x, near_y), real_max(near_z, rays->near)) <=
            real_min(real_min(far_x, far_y), real_min(far_z, limit));
 }
@@ -229,12 +230,12 @@ static inline mask laid_ray_meets(const BoxRays *rays, uint lane, global const s
     real inverse_x = real_of_lane(&rays->inverse.x, lane);
     real inverse_y = real_of_lane(&rays->inverse.y, lane);
     real inverse_z = real_of_lane(&rays->inverse.z, lane);
-    real near_x = fma(boxes_planes(boxes, x), inverse_x, real_of_lane(&rays->to_near.x, lane));
-    real near_y = fma(boxes_planes(boxes, 1 + y), inverse_y, real_of_lane(&rays->to_near.y, lane));
-    real near_z = fma(boxes_planes(boxes, 2 + z), inverse_z, real_of_lane(&rays->to_near.z, lane));
-    real far_x = fma(boxes_planes(boxes, other - x), inverse_x, real_of_lane(&rays->to_far.x, lane));
-    real far_y = fma(boxes_planes(boxes, 1 + other - y), inverse_y, real_of_lane(&rays->to_far.y, lane));
-    real far_z = fma(boxes_planes(boxes, 2 + other - z), inverse_z, real_of_lane(&rays->to_far.z, lane));
+    real near_x = real_fma(boxes_planes(boxes, x), inverse_x, real_of_lane(&rays->to_near.x, lane));
+    real near_y = real_fma(boxes_planes(boxes, 1 + y), inverse_y, real_of_lane(&rays->to_near.y, lane));
+    real near_z = real_fma(boxes_planes(boxes, 2 + z), inverse_z, real_of_lane(&rays->to_near.z, lane));
+    real far_x = real_fma(boxes_planes(boxes, other - x), inverse_x, real_of_lane(&rays->to_far.x, lane));
+    real far_y = real_fma(boxes_planes(boxes, 1 + other - y), inverse_y, real_of_lane(&rays->to_far.y, lane));
+    real far_z = real_fma(boxes_planes(boxes, 2 + other - z), inverse_z, real_of_lane(&rays->to_far.z, lane));
     *near = real_max(real_max(near_x, near_y), real_max(near_z, real_of_lane(&rays->near, lane)));
     return *near <= real_min(real_min(far_x, far_y), real_min(far_z, (real)(limit)));
 }

@@ -56,7 +56,7 @@ static inline real real_inverse_or_huge(real a)
     mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
     real inverse = real_divide((real)(1), lanes_select(zero, (real)(1), a));
     if ((HAS_BOXES | HAS_TRIANGLES) & !IS_COMPENSATED)
-        inverse = lanes_select(steps, fma(fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
+        inverse = lanes_select(steps, real_fma(real_fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
 
@@ -66,11 +66,11 @@ static inline real real_inverse_or_huge(real a)
 static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
     real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
-    real length_ = vector_length(d);
-    real w = fma(side, length_, d.z);
-    real length_w = length_ * w;
-    *u = (Vector){fma(-side * d.x, d.x, length_w), -side * d.x * d.y, -side * d.x * w};
-    *v = (Vector){-d.x * d.y, fma(-d.y, d.y, side * length_w), -d.y * w};
+    real norm = vector_length(d);
+    real w = real_fma(side, norm, d.z);
+    real norm_w = norm * w;
+    *u = (Vector){real_fma(-side * d.x, d.x, norm_w), -side * d.x * d.y, -side * d.x * w};
+    *v = (Vector){-d.x * d.y, real_fma(-d.y, d.y, side * norm_w), -d.y * w};
 }
 
 static inline Ray ray_make(Vector origin, Vector direction, real near, real far, mask active)
@@ -129,10 +129,10 @@ static inline void ray_take_apex(Ray *ray, uint common_origin)
 static inline mask ray_misses_cull_sphere(const Ray *ray, global const CullSphere *ball)
 {
     global const scalar *center_power = (global const scalar *)ball;
-    real along =
-        fma((real)(center_power[0]), ray->direction.x,
-            fma((real)(center_power[1]), ray->direction.y, (real)(center_power[2]) * ray->direction.z));
-    return fma(along, along, ray->apex_slack) < ray->squared * (real)(center_power[3]);
+    real along = real_fma(
+        (real)(center_power[0]), ray->direction.x,
+        real_fma((real)(center_power[1]), ray->direction.y, (real)(center_power[2]) * ray->direction.z));
+    return real_fma(along, along, ray->apex_slack) < ray->squared * (real)(center_power[3]);
 }
 
 // The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies
@@ -181,7 +181,7 @@ static inline void patch_move_to_ray(Patch *patch, const Ray *ray, real t, real 
         real reach = vector_magnitude(ray->origin) + way;
         mask beside = reach < limit;
         patch->position = vector_select(beside, ray_point(ray, t), patch->position);
-        patch->size = lanes_select(beside, fma((real)(UNIT_ROUNDOFF), magnitude, reach), patch->size);
+        patch->size = lanes_select(beside, real_fma((real)(UNIT_ROUNDOFF), magnitude, reach), patch->size);
     }
 }
 

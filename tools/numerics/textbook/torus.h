@@ -45,7 +45,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     Vector axis = vector_of(torus->axis_minor);
     real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
     // |direction| = 1 makes the quartic's first coefficient 1
-    real length_ = sqrt(ray->squared), inverse_length = (real)(1) / length_;
+    real norm = sqrt(ray->squared), inverse_length = (real)(1) / norm;
     Vector d = vector_scale(ray->direction, inverse_length);
     Vector f = vector_subtract(ray->origin, vector_of(torus->center_major));
     real m = vector_dot(f, d), n = vector_dot(f, f);
@@ -72,7 +72,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     v = sqrt(real_max(v, (real)(0)));
     v = lanes_select(q < (real)(0), -v, v);
     Ray unit = *ray;
-    unit.near = ray->near * length_;
+    unit.near = ray->near * norm;
     Nearest nearest = {*t, mask_none()};
     quadratic_offer(v, y - u, shift, splits, &unit, &nearest);
     quadratic_offer(-v, y + u, shift, splits, &unit, &nearest);
