@@ -73,11 +73,14 @@ function readScene(section, scene) {
   const chosenIsShown = find(".stage img.right").src === scene.images.at(-1).difference;
   find(".worst button").click();
   const [x, y] = find(".worst figcaption").textContent.match(/\d+/g).map(Number);
-  const stage = find(".stage").getBoundingClientRect(), pane = find(".window").getBoundingClientRect();
-  const isWithin = (position, start, size) => start <= position && position <= start + size;
+  const stage = find(".stage"), pane = find(".window");
+  // how far the pane's scroll position is from that which centers the pixel, or from its end
+  const scrollError = (position, scroll, visible, whole) =>
+    Math.abs(scroll - Math.min(Math.max(8 * (position + 0.5) - visible / 2, 0), Math.max(whole - visible, 0)));
   return {
-    heading: find("h2").textContent, panels, chosen, split, chosenIsShown, zoom: stage.width / scene.size[0],
-    isInSight: isWithin(stage.x + 8 * (x + 0.5), pane.x, pane.width) && isWithin(stage.y + 8 * (y + 0.5), pane.y, pane.height),
+    heading: find("h2").textContent, panels, chosen, split, chosenIsShown, zoom: stage.offsetWidth / scene.size[0],
+    offCenter: [scrollError(x, pane.scrollLeft, pane.clientWidth, stage.offsetWidth),
+                scrollError(y, pane.scrollTop, pane.clientHeight, stage.offsetHeight)],
     tables: sortTables(section), pixels: readWorst(scene),
     broken: [...section.querySelectorAll("img")].filter((image) => !image.naturalWidth).length,
   };

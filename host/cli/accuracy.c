@@ -185,7 +185,7 @@ static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVaria
     PictureLayers layers;
     if (!layers_render(&layers, variant->renderer, &variant->settings, scene->light_count))
         return EXIT_INTERRUPTED;
-    compared->picture = layers_narrow_color(&layers);
+    compared->image = layers_narrow_color(&layers);
     if (is_reference(scene, compared))
         compared->status = ACCURACY_REFERENCE;
     else
@@ -206,7 +206,7 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
     const PictureLayers *reference = &accuracy->reference;
     accuracy_count_unsound(reference, &scene->reference.nonfinite, &scene->reference.negative);
     accuracy_edges_find(&scene->edges, reference);
-    scene->reference.picture = layers_narrow_color(reference);
+    scene->reference.image = layers_narrow_color(reference);
     if (!layers_keep(accuracy, scene_index, NULL, reference)) status = EXIT_USER;
     for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++)
         status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);

@@ -56,7 +56,7 @@ static void difference_json(Json *json, const AccuracyScene *scene, float *value
 {
     const size_t pixels = (size_t)scene->width * scene->height;
     Image reference = {
-        .width = scene->width, .height = scene->height, .channels = 3, .values = scene->reference.picture};
+        .width = scene->width, .height = scene->height, .channels = 3, .values = scene->reference.image};
     Image image = reference;
     image.values = values;
     float *differences = memory_allocate(pixels, sizeof *differences);
@@ -77,23 +77,23 @@ static void image_json(Json *json, const AccuracyScene *scene, float *values)
     json_begin_object(json, NULL);
     json_begin_array(json, "variants");
     for (size_t i = 0; i < scene->variant_count; i++)
-        if (same_image(scene, scene->variants[i].picture, values)) json_integer(json, NULL, (int64_t)i);
+        if (same_image(scene, scene->variants[i].image, values)) json_integer(json, NULL, (int64_t)i);
     json_end(json);
     uint8_t *colors = memory_allocate(count, 1);
     transfer_quantize(colors, values, count, scene->display_values ? TRANSFER_NONE : TRANSFER_SRGB, 8);
     png_json(json, "image", scene, colors, NULL);
     free(colors);
-    if (values != scene->reference.picture) difference_json(json, scene, values);
+    if (values != scene->reference.image) difference_json(json, scene, values);
     json_end(json);
 }
 
 // Whether the image is that of the reference or of an earlier variant.
 static bool is_repeated(const AccuracyScene *scene, size_t variant)
 {
-    const float *values = scene->variants[variant].picture;
-    bool repeated = same_image(scene, scene->reference.picture, values);
+    const float *values = scene->variants[variant].image;
+    bool repeated = same_image(scene, scene->reference.image, values);
     for (size_t i = 0; i < variant && !repeated; i++)
-        repeated = same_image(scene, scene->variants[i].picture, values);
+        repeated = same_image(scene, scene->variants[i].image, values);
     return repeated;
 }
 
@@ -109,10 +109,10 @@ static void scene_json(Json *json, const AccuracyScene *scene)
     }
     json_end(json);
     json_begin_array(json, "images");
-    image_json(json, scene, scene->reference.picture);
+    image_json(json, scene, scene->reference.image);
     for (size_t i = 0; i < scene->variant_count; i++)
-        if (scene->variants[i].picture && !is_repeated(scene, i))
-            image_json(json, scene, scene->variants[i].picture);
+        if (scene->variants[i].image && !is_repeated(scene, i))
+            image_json(json, scene, scene->variants[i].image);
     json_end(json);
     json_end(json);
 }

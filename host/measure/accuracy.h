@@ -95,7 +95,7 @@ typedef struct {
     uint32_t samples;
     AccuracyStatus status;
     AccuracyErrors errors;
-    float *picture;       // linear, 3 per pixel; NULL where unavailable
+    float *image;         // linear, 3 per pixel; NULL where unavailable
     unsigned crossed_out; // set of CROSSED_…: why its speed does not count
     unsigned pareto;      // set of 1 << AccuracyKind: no other is as good in less time
 } AccuracyVariant;
@@ -119,7 +119,7 @@ typedef struct {
         uint32_t lanes, samples;
         uint64_t kernel_hash;
         size_t nonfinite, negative; // pixels
-        float *picture;             // linear, 3 per pixel
+        float *image;               // linear, 3 per pixel
     } reference;
     AccuracyEdges edges;
     AccuracyVariant *variants;

@@ -12,9 +12,9 @@ const double accuracy_budgets[BUDGET_COUNT] = {1e-2, 1e-4, 1e-6};
 void accuracy_scene_free(AccuracyScene *scene)
 {
     for (size_t i = 0; i < scene->variant_count; i++)
-        free(scene->variants[i].picture);
+        free(scene->variants[i].image);
     free(scene->variants);
-    free(scene->reference.picture);
+    free(scene->reference.image);
     accuracy_edges_free(&scene->edges);
     *scene = (AccuracyScene){0};
 }

@@ -17,17 +17,10 @@ const kinds = [
 const logarithmic = (low, high, from, to) =>
   (value) => from + ((to - from) * Math.log10(value / low)) / Math.log10(high / low);
 
-// 1, 2 and 5 times powers of ten: the last not above `low` to the first not below `high`.
+// 1, 2 and 5 times powers of ten, from the last not above `low` to the first above `high`.
 function timeTicks(low, high) {
-  const ticks = [];
-  for (let exponent = Math.floor(Math.log10(low)); ; exponent++) {
-    for (const digit of [1, 2, 5]) {
-      const tick = Number(`${digit}e${exponent}`);
-      if (tick <= low) ticks.length = 0;
-      ticks.push(tick);
-      if (tick >= high && ticks.length > 1) return ticks;
-    }
-  }
+  const ticks = Array.from({ length: 36 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`));
+  return ticks.slice(ticks.findLastIndex((tick) => tick <= low), ticks.findIndex((tick) => tick > high) + 1);
 }
 
 // The measured variants that have this kind's error.
