@@ -2,8 +2,7 @@
 // without them, as the hierarchy makes the difference): none that a line meets, or comes nearer to than a
 // shape's test may be off, is passed over, and those that it misses clearly are.
 #include "host/base/memory.h"
-#include "host/compile/culling.h"
-#include "host/compile/features.h"
+#include "host/compile/stages.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
 #include <float.h>
@@ -41,16 +40,16 @@ typedef struct {
     size_t met_count, missed_count, between_count;
 } Trial;
 
-static double rounded(const Trial *trial, double value)
+static double trial_rounded(const Trial *trial, double value)
 {
     if (trial->wide) return value;
     volatile float narrow = (float)value;
     return narrow;
 }
 
-static Vector3 vector_rounded(const Trial *trial, Vector3 v)
+static Vector3 trial_vector_rounded(const Trial *trial, Vector3 v)
 {
-    return (Vector3){rounded(trial, v.x), rounded(trial, v.y), rounded(trial, v.z)};
+    return (Vector3){trial_rounded(trial, v.x), trial_rounded(trial, v.y), trial_rounded(trial, v.z)};
 }
 
 static double random_power(Random *random, double low, double high)
@@ -64,21 +63,22 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
     Random *random = &trial->random;
     Vector3 way =
         vector_scale(vector_normalize(random_in_ball(random)), trial->scale * random_power(random, -2, 4));
-    Vector3 origin = from_eye ? (Vector3){0, 0, 0} : vector_rounded(trial, vector_subtract(trial->apex, way));
+    Vector3 origin =
+        from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, vector_subtract(trial->apex, way));
     Vector3 direction =
-        vector_rounded(trial, from_eye ? vector_normalize(way) : vector_subtract(trial->apex, origin));
+        trial_vector_rounded(trial, from_eye ? vector_normalize(way) : vector_subtract(trial->apex, origin));
     double *line = trial->lines + 6 * index;
     memcpy(line, (double[]){origin.x, origin.y, origin.z, direction.x, direction.y, direction.z},
            6 * sizeof *line);
 
     double along = trial->scale * random_between(random, -1, 1) * random_power(random, -2, 4);
-    double radius = rounded(trial, trial->scale * random_power(random, -3, 3));
+    double radius = trial_rounded(trial, trial->scale * random_power(random, -3, 3));
     double off =
         random_power(random, trial->wide ? -15 : -8, 1) * (random_between(random, -1, 1) < 0 ? -1 : 1);
     Vector3 across = vector_normalize(vector_cross(direction, random_in_ball(random)));
     Vector3 point = vector_add(trial->apex, vector_scale(vector_normalize(direction), along));
     Vector3 center =
-        vector_rounded(trial, vector_add(point, vector_scale(across, radius * fmax(0, 1 + off))));
+        trial_vector_rounded(trial, vector_add(point, vector_scale(across, radius * fmax(0, 1 + off))));
     ((Sphere *)trial->flat.arrays[FLAT_FIRST_SHAPE + KIND_SPHERES].items)[index].center_radius =
         (scalar4){center.x, center.y, center.z, radius};
 }
@@ -86,7 +86,6 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
 static void trial_open(Trial *trial, bool from_eye)
 {
     FlatArray *arrays = trial->flat.arrays;
-    arrays[FLAT_HEADER] = flat_array_make(FLAT_HEADER, 1);
     arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, 1);
     arrays[FLAT_FIRST_SHAPE + KIND_SPHERES] =
         flat_array_make(FLAT_FIRST_SHAPE + KIND_SPHERES, BALLS_PER_APEX);
@@ -94,7 +93,7 @@ static void trial_open(Trial *trial, bool from_eye)
     trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 16));
     Vector3 apex =
         vector_scale(random_in_ball(&trial->random), trial->scale * random_power(&trial->random, -2, 4));
-    trial->apex = from_eye ? (Vector3){0, 0, 0} : vector_rounded(trial, apex);
+    trial->apex = from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, apex);
     ((FlatLight *)arrays[FLAT_LIGHTS].items)->position =
         (scalar4){trial->apex.x, trial->apex.y, trial->apex.z, 0};
     for (size_t i = 0; i < BALLS_PER_APEX; i++)
@@ -114,9 +113,8 @@ static void trial_run(Trial *trial, cl_program program, uint32_t apex)
             ((float *)(void *)lines)[i] = (float)trial->lines[i];
     }
     const FlatArray *balls = &trial->flat.arrays[FLAT_CULL_SPHERES];
-    const SceneHeader *header = trial->flat.arrays[FLAT_HEADER].items;
     // behind the hierarchy's own
-    FlatArray row = {flat_array_at(balls, (apex - COMMON_ORIGIN_EYE) * header->cull_spheres.x + 1),
+    FlatArray row = {flat_array_at(balls, (apex - COMMON_ORIGIN_EYE) * trial->flat.cull_sphere_count + 1),
                      BALLS_PER_APEX, balls->layout};
     size_t row_size = flat_array_size(&row, trial->wide);
     void *row_bytes = memory_allocate(row_size, 1);

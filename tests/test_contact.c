@@ -1,7 +1,7 @@
 // The box around where transparent and opaque things may touch: what lies outside it is never asked for an
 // opaque surface in the same place, so it must hold all such places, and is of use where it holds little
 // else.
-#include "host/compile/contact.h"
+#include "host/compile/compile.h"
 #include "tests/scene_reading.h"
 #include <float.h>
 #include <math.h>
@@ -101,12 +101,14 @@ enum { TRIAL_COUNT = sizeof trials / sizeof *trials };
 
 static Bounds contact_of(const Scene *scene)
 {
-    CompiledScene flat;
-    flatten(&flat, scene, &(FlattenSettings){.width = 1, .height = 1, .sample_count = 1});
-    contact_find(&flat);
-    const SceneHeader *header = flat.arrays[FLAT_HEADER].items;
+    CompiledScene compiled;
+    const CompileSettings settings = {
+        .width = 1, .height = 1, .sample_count = 1, .extra_features = FEATURE_TRANSMISSION};
+    MessageList messages = {0};
+    assert_true(scene_compile(&compiled, scene, &settings, &messages));
+    const SceneHeader *header = compiled.arrays[FLAT_HEADER].items;
     Bounds contact = {vector3_of(&header->contact_low), vector3_of(&header->contact_high)};
-    compiled_scene_free(&flat);
+    compiled_scene_free(&compiled);
     return contact;
 }
 

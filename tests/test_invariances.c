@@ -1,7 +1,7 @@
 // Random scenes of every shape, light and kind of material: what must not change a picture nor what lies
 // behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
 #include "host/base/array.h"
-#include "host/scene/transform.h"
+#include "host/compile/transform.h"
 #include "tests/frame.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"

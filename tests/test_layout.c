@@ -2,9 +2,7 @@
 // members, as the device's compiler has them in float and in double, and their values after the host's
 // narrowing.
 #include "host/base/memory.h"
-#include "host/compile/bvh_flatten.h"
-#include "host/compile/culling.h"
-#include "host/compile/textures.h"
+#include "host/compile/compile.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
@@ -116,7 +114,7 @@ typedef struct {
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY)};
 enum { MEMBER_COUNT = sizeof members / sizeof *members };
 
-// One object of every shape and a picture, so that flatten shows every struct's layout.
+// One object of every shape and a picture, so that the compiled scene has every struct's layout.
 static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
                                  "lights: [{point: {position: [1, 2, 3]}}]\n"
                                  "objects:\n"
@@ -135,20 +133,21 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
 static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
 {
     Scene scene = scene_of_text("layout.yaml", scene_text);
-    CompiledScene flat;
-    const FlattenSettings settings = {
-        .width = 1, .height = 1, .sample_count = 1, .shift_to_eye = true, .wide = wide};
-    flatten(&flat, &scene, &settings);
+    CompiledScene compiled;
+    const CompileSettings settings = {.width = 1,
+                                      .height = 1,
+                                      .sample_count = 1,
+                                      .precision = wide ? PRECISION_DOUBLE : PRECISION_SINGLE,
+                                      .lanes = 1,
+                                      .bvh = BVH_ON,
+                                      .shift_to_eye = true};
     MessageList messages = {0};
-    assert_true(textures_load(&flat, &scene, &settings, &messages));
-    message_list_free(&messages);
-    bvh_flatten(&flat, 1);
-    culling_fill(&flat, wide);
+    assert_true(scene_compile(&compiled, &scene, &settings, &messages));
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        assert_true(flat.arrays[kind].count > 0);
-        layouts[kind] = flat.arrays[kind].layout;
+        assert_true(compiled.arrays[kind].count > 0);
+        layouts[kind] = compiled.arrays[kind].layout;
     }
-    compiled_scene_free(&flat);
+    compiled_scene_free(&compiled);
     scene_free(&scene);
 }
 

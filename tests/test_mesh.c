@@ -1,5 +1,6 @@
 // Meshes: what a file's triangles become, where they stand, what is refused, and which ids they get.
-#include "host/compile/flatten.h"
+#include "host/compile/compile.h"
+#include "host/compile/scene_bounds.h"
 #include "host/import/mesh/mesh_import.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
@@ -511,13 +512,15 @@ static void ids_count_the_triangles(void **state)
                                    "  - triangle: {vertices: [[0, 0, 5], [1, 0, 5], [0, 1, 5]]}\n"
                                    "  - sphere: {center: [-9, 0, 0], radius: 1}\n");
     CompiledScene flat;
-    flatten(&flat, &scene, &(FlattenSettings){.width = 1, .height = 1, .sample_count = 1});
+    const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .bvh = BVH_OFF};
+    MessageList messages = {0};
+    assert_true(scene_compile(&flat, &scene, &settings, &messages));
     assert_int_equal(flat.arrays[FLAT_OBJECTS].count, 11);
     const ObjectEntry *entries = flat.arrays[FLAT_OBJECTS].items;
     for (uint32_t id = 0; id < 11; id++) {
         uint4 entry = entries[id].kind_index_material;
         assert_int_equal(entry.x, id == 0 || id == 10 ? KIND_SPHERES : KIND_TRIANGLES);
-        assert_int_equal(flat_id(&flat.arrays[FLAT_FIRST_SHAPE + entry.x], entry.y), id);
+        assert_int_equal(*flat_id(&flat.arrays[FLAT_FIRST_SHAPE + entry.x], entry.y), id);
     }
     compiled_scene_free(&flat);
     scene_free(&scene);

@@ -1,4 +1,5 @@
 // Bounds against points on each shape, known in closed form.
+#include "host/compile/scene_bounds.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>

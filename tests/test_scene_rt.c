@@ -1,4 +1,5 @@
 // `.rt`: every element's values, and what files in the wild hold and is tolerated.
+#include "host/compile/scene_bounds.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 // What must not change a picture, bit for bit: lanes, features built in without need, bands, the region, a
 // repeated run; and what must change it in a known way: the scene's scale, its mirror image.
+#include "host/compile/transform.h"
 #include "host/import/load.h"
-#include "host/scene/transform.h"
 #include "tests/frame.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

@@ -4,6 +4,7 @@
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/compile/features.h"
+#include "host/compile/scene_bounds.h"
 #include "host/import/load.h"
 #include "host/import/report.h"
 #include <ctype.h>

@@ -318,7 +318,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
         .node_count = 1,
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
     };
-    if (!builder.references) fault("out of memory for a hierarchy of %zu primitives", count);
+    if (!builder.references) fault("out of memory for a BVH of %zu primitives", count);
     double largest = largest_coordinate(boxes, count);
     double scale = largest > 0 ? 1 / largest : 1;
     for (size_t i = 0; i < count; i++) {
@@ -330,7 +330,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
     }
     BvhChild root = {.first = 0};
     if (count > 0) {
-        // the root is node 0; a scene that is one leaf hangs it there alone
+        // the root is node 0; a single leaf is its only child
         size_t middle = range_cut(&builder, (Range){0, count}, 0);
         builder.depth = 1;
         if (middle == count)

@@ -1,63 +1,13 @@
-#include "host/compile/bvh_flatten.h"
-
 #include "host/base/memory.h"
 #include "host/compile/bvh_widen.h"
+#include "host/compile/shapes.h"
+#include "host/compile/stages.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static bool revolution_box(const Revolution *shape, Bounds *box)
-{
-    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
-    Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
-    double length = shape->range.y, radius = shape->base_radius.w / length;
-    double height = shape->range.x / shape->range.z; // in units of the stored axis
-    double end_radius = radius + shape->axis_slope.w * height * length;
-    Vector3 reach = circle_reach(vector_scale(axis, 1 / length));
-    *box = bounds_join(
-        bounds_around(base, vector_scale(reach, fabs(radius))),
-        bounds_around(vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius))));
-    return true;
-}
-
-bool primitive_box(size_t kind, const void *primitive, Bounds *box)
-{
-    switch (kind) {
-    case KIND_SPHERES: {
-        const Sphere *sphere = primitive;
-        *box = bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
-        return true;
-    }
-    case KIND_DISCS: {
-        const Disc *disc = primitive;
-        *box = bounds_around(vector3_of(&disc->center_radius), vector_all(disc->center_radius.w));
-        return true;
-    }
-    case KIND_BOXES: {
-        const Box *shape = primitive;
-        *box = (Bounds){vector3_of(&shape->low), vector3_of(&shape->high)};
-        return true;
-    }
-    case KIND_CYLINDERS:
-    case KIND_CONES:
-        return revolution_box(primitive, box);
-    case KIND_TRIANGLES: {
-        const Triangle *triangle = primitive;
-        *box =
-            bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
-        return true;
-    }
-    case KIND_TORI: {
-        const Torus *torus = primitive;
-        Vector3 reach = vector_scale(circle_reach(vector3_of(&torus->axis_minor)), torus->center_major.w);
-        *box = bounds_around(vector3_of(&torus->center_major),
-                             vector_add(reach, vector_all(torus->axis_minor.w)));
-        return true;
-    }
-    default:
-        return false;
-    }
-}
+// From this many bounded primitives on a BVH is faster than testing each.
+enum { BVH_WORTHWHILE = 24 };
 
 // The bounded primitives on their way into the tree.
 typedef struct {
@@ -65,23 +15,23 @@ typedef struct {
     uint8_t *kinds;
     uint32_t *places; // in their shapes' arrays
     size_t count;
-    size_t kind_counts[KIND_COUNT];
+    uint32_t kind_counts[KIND_COUNT];
 } Bounded;
 
-static void bounded_collect(Bounded *bounded, const CompiledScene *flat)
+static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
 {
     size_t capacity = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        capacity += flat->arrays[FLAT_FIRST_SHAPE + kind].count;
+        capacity += compiled->arrays[FLAT_FIRST_SHAPE + kind].count;
     *bounded = (Bounded){
         .boxes = memory_allocate(capacity + 1, sizeof(Bounds)),
         .kinds = memory_allocate(capacity + 1, 1),
         .places = memory_allocate(capacity + 1, sizeof(uint32_t)),
     };
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++) {
-            if (!primitive_box(kind, flat_array_at(array, i), &bounded->boxes[bounded->count])) continue;
+            if (!primitive_bounds(kind, flat_array_at(array, i), &bounded->boxes[bounded->count])) continue;
             bounded->kinds[bounded->count] = (uint8_t)kind;
             bounded->places[bounded->count++] = (uint32_t)i;
             bounded->kind_counts[kind]++;
@@ -128,10 +78,11 @@ static void array_permute(FlatArray *array, uint32_t *from)
     free(first);
 }
 
-// Moves a shape's primitives into the leaves' order, the unbounded behind them, and tells the objects.
-static void array_reorder(CompiledScene *flat, size_t kind, const Bvh *bvh, const Bounded *bounded)
+// Moves a shape's primitives into the leaves' order, the unbounded behind them, and updates the objects'
+// entries.
+static void array_reorder(CompiledScene *compiled, size_t kind, const Bvh *bvh, const Bounded *bounded)
 {
-    FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+    FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
     if (array->count == 0) return;
     uint32_t *from = memory_allocate(array->count, sizeof *from);
     size_t count = 0;
@@ -139,12 +90,12 @@ static void array_reorder(CompiledScene *flat, size_t kind, const Bvh *bvh, cons
         if (bounded->kinds[bvh->order[i]] == kind) from[count++] = bounded->places[bvh->order[i]];
     Bounds box;
     for (size_t i = 0; count < array->count; i++)
-        if (!primitive_box(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
+        if (!primitive_bounds(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
     array_permute(array, from);
     free(from);
-    ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
+    ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < array->count; i++)
-        entries[flat_id(array, i)].kind_index_material.y = (uint32_t)i;
+        entries[*flat_id(array, i)].kind_index_material.y = (uint32_t)i;
 }
 
 // Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
@@ -180,11 +131,11 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
     }
 }
 
-static void nodes_write(CompiledScene *flat, const Bvh *bvh, const Bounded *bounded, unsigned width)
+static void nodes_write(CompiledScene *compiled, const Bvh *bvh, const Bounded *bounded, unsigned width)
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
-    FlatArray *nodes = &flat->arrays[FLAT_NODES];
+    FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     free(nodes->items);
     *nodes = flat_nodes_make(wide.node_count, width);
     uint32_t *order = order_in_kinds(bvh, bounded);
@@ -195,48 +146,42 @@ static void nodes_write(CompiledScene *flat, const Bvh *bvh, const Bounded *boun
     bvh_wide_free(&wide);
 }
 
-static void header_note(SceneHeader *header, const Bvh *bvh, const Bounded *bounded)
-{
-    uint32_t counts[4 * sizeof header->bounded_counts / sizeof *header->bounded_counts] = {0};
-    _Static_assert(KIND_COUNT <= sizeof counts / sizeof *counts, "a kind without a place in SceneHeader");
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        counts[kind] = (uint32_t)bounded->kind_counts[kind];
-    memcpy(header->bounded_counts, counts, sizeof counts);
-    const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]);
-    Vector3 low = bounds.min, high = bounds.max;
-    Vector3 half_low = vector_scale(low, 0.5), half_high = vector_scale(high, 0.5);
-    Vector3 center = vector_add(half_low, half_high), reach = vector_subtract(half_high, half_low);
-    header->bounds = (scalar4){center.x, center.y, center.z, reach.x + reach.y + reach.z};
-    header->bounds_low = (scalar4){low.x, low.y, low.z, 0};
-    header->bounds_high = (scalar4){high.x, high.y, high.z, 0};
-}
-
-void bvh_flatten(CompiledScene *flat, unsigned lanes)
-{
-    Bounded bounded;
-    bounded_collect(&bounded, flat);
-    if (bounded.count > 0) {
-        Bvh bvh;
-        bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
-        free(bounded.boxes);
-        bounded.boxes = NULL;
-        nodes_write(flat, &bvh, &bounded, lanes < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : lanes);
-        for (size_t kind = 0; kind < KIND_COUNT; kind++)
-            array_reorder(flat, kind, &bvh, &bounded);
-        header_note(flat->arrays[FLAT_HEADER].items, &bvh, &bounded);
-        bvh_free(&bvh);
-    }
-    bounded_free(&bounded);
-}
-
-size_t bounded_primitive_count(const CompiledScene *flat)
+static size_t bounded_primitive_count(const CompiledScene *compiled)
 {
     size_t count = 0;
     Bounds box;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++)
-            count += primitive_box(kind, flat_array_at(array, i), &box);
+            count += primitive_bounds(kind, flat_array_at(array, i), &box);
     }
     return count;
+}
+
+static bool bvh_is_wanted(const CompiledScene *compiled, BvhChoice choice)
+{
+    if (choice == BVH_OFF) return false;
+    size_t count = bounded_primitive_count(compiled);
+    return count > 0 && (choice == BVH_ON || count >= BVH_WORTHWHILE);
+}
+
+void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
+{
+    compiled->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, 1); // leads nowhere: a kernel may visit it
+    if (!bvh_is_wanted(compiled, settings->bvh)) return;
+    compiled->features |= FEATURE_BVH;
+    Bounded bounded;
+    bounded_collect(&bounded, compiled);
+    Bvh bvh;
+    bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
+    free(bounded.boxes);
+    bounded.boxes = NULL;
+    nodes_write(compiled, &bvh, &bounded,
+                settings->lanes < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : settings->lanes);
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        array_reorder(compiled, kind, &bvh, &bounded);
+    memcpy(compiled->bounded_counts, bounded.kind_counts, sizeof compiled->bounded_counts);
+    compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
+    bvh_free(&bvh);
+    bounded_free(&bounded);
 }

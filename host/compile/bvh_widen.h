@@ -1,4 +1,4 @@
-// A binary hierarchy gathered into nodes of many children.
+// A binary BVH collapsed into nodes of many children.
 #pragma once
 
 #include "host/compile/bvh.h"

@@ -6,7 +6,7 @@
 
 typedef struct {
     Vector3 forward;   // unit
-    Vector3 right, up; // half a pixel along the picture's width and height, at distance 1
+    Vector3 right, up; // half a pixel along the image's width and height, at distance 1
 } CameraBasis;
 
 // Where `up` is zero or parallel to the view, the world axis least aligned with the view stands in for it

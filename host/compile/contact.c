@@ -1,8 +1,6 @@
-#include "host/compile/contact.h"
-
 #include "host/base/memory.h"
-#include "host/compile/bvh_flatten.h"
-#include <float.h>
+#include "host/compile/shapes.h"
+#include "host/compile/stages.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -12,17 +10,17 @@
 // most.
 #define NEARNESS 0x1p-14
 
-// More pairs than this, 5 to 30 ms of them, are not held against each other: a box around all opaque
-// primitives that have one takes their place.
+// More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives
+// takes their place.
 #define PAIRS_LARGEST ((size_t)1 << 19)
 
-// Where a primitive is: in its box, infinite where it has none; what is flat also in its plane, normal . p =
-// offset.
+// Where a primitive is: in its box, infinite where it is unbounded; what is flat also in its plane, normal .
+// p = offset.
 typedef struct {
     Bounds box;
     Vector3 normal; // 0: not flat
     double offset;
-    double reach; // how far from the origin, mostly the eye, its numbers are
+    double reach; // the largest magnitude of its numbers, relative to the origin, mostly the eye
 } Extent;
 
 typedef struct {
@@ -40,30 +38,20 @@ static Bounds everywhere(void)
     return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
 }
 
-static double extent_reach(const Extent *extent, size_t kind, const void *primitive)
-{
-    if (extent_is_bounded(extent))
-        return fmax(vector_largest(extent->box.min), vector_largest(extent->box.max));
-    if (kind == KIND_PLANES) return fabs(extent->offset);
-    const Revolution *endless = primitive;
-    return vector_largest(vector3_of(&endless->base_radius)) + endless->base_radius.w / endless->range.y;
-}
-
 static Extent extent_of(size_t kind, const void *primitive)
 {
+    const ShapeOps *shape = shape_ops[kind];
     Extent extent = {.box = everywhere()};
-    primitive_box(kind, primitive, &extent.box);
-    Vector3 point = {0, 0, 0};
-    if (kind == KIND_PLANES) {
-        extent.normal = vector3_of(&((const Plane *)primitive)->normal);
-        point = vector3_of(&((const Plane *)primitive)->point);
-    } else if (kind == KIND_DISCS) {
-        extent.normal = vector3_of(&((const Disc *)primitive)->normal);
-        point = vector3_of(&((const Disc *)primitive)->center_radius);
+    if (primitive_bounds(kind, primitive, &extent.box))
+        extent.reach = fmax(vector_largest(extent.box.min), vector_largest(extent.box.max));
+    else
+        extent.reach = shape->reach(primitive);
+    if (shape->plane) {
+        Vector3 point;
+        shape->plane(primitive, &point, &extent.normal);
+        extent.normal = vector_normalize(extent.normal);
+        extent.offset = vector_dot(extent.normal, point);
     }
-    if (!vector_is_zero(extent.normal)) extent.normal = vector_normalize(extent.normal);
-    extent.offset = vector_dot(extent.normal, point);
-    extent.reach = extent_reach(&extent, kind, primitive);
     return extent;
 }
 
@@ -77,8 +65,8 @@ static Interval interval_scale(double low, double high, double factor)
     return factor > 0 ? (Interval){low * factor, high * factor} : (Interval){high * factor, low * factor};
 }
 
-// What of a box lies within `margin` of a plane: along each axis that the normal has a part of,
-// n_x x = offset - n_y y - n_z z, for all y and z of the box.
+// The part of a box within `margin` of a plane: along each axis with n_x != 0, n_x x = offset - n_y y - n_z z
+// for all y and z of the box.
 static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
 {
     const double normal[3] = {flat->normal.x, flat->normal.y, flat->normal.z};
@@ -97,8 +85,8 @@ static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
     return (Bounds){{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-// A box around where two may touch. What is endless errs the more the farther it is seen: two such are never
-// told apart.
+// A box around where two may touch. The error of an unbounded primitive grows with the distance: two such may
+// touch anywhere.
 static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
 {
     if (!extent_is_bounded(a) && !extent_is_bounded(b)) return everywhere();
@@ -110,17 +98,17 @@ static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
     return both;
 }
 
-// The primitives that pass light, or those that do not. Returns how far any reaches.
-static double extents_collect(ExtentList *list, const CompiledScene *flat, bool transparent)
+// The transparent primitives, or the opaque ones. Returns the largest reach.
+static double extents_collect(ExtentList *list, const CompiledScene *compiled, bool transparent)
 {
-    const ObjectEntry *entries = flat->arrays[FLAT_OBJECTS].items;
-    const FlatMaterial *materials = flat->arrays[FLAT_MATERIALS].items;
-    *list = (ExtentList){.items = memory_allocate(flat->arrays[FLAT_OBJECTS].count + 1, sizeof(Extent))};
+    const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
+    const FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
+    *list = (ExtentList){.items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count + 1, sizeof(Extent))};
     double largest = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        const FlatArray *array = &flat->arrays[FLAT_FIRST_SHAPE + kind];
+        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++) {
-            const FlatMaterial *material = &materials[entries[flat_id(array, i)].kind_index_material.z];
+            const FlatMaterial *material = &materials[entries[*flat_id(array, i)].kind_index_material.z];
             if (transparent != (material->reflection_transmission_ior.y > 0)) continue;
             list->items[list->count] = extent_of(kind, flat_array_at(array, i));
             largest = fmax(largest, list->items[list->count++].reach);
@@ -129,7 +117,7 @@ static double extents_collect(ExtentList *list, const CompiledScene *flat, bool 
     return largest;
 }
 
-// One in place of all that have boxes.
+// One in place of all bounded ones.
 static void extents_join_bounded(ExtentList *list)
 {
     Bounds all = bounds_empty();
@@ -144,7 +132,7 @@ static void extents_join_bounded(ExtentList *list)
     list->count = count;
 }
 
-// Leaves out what is far from all of the others.
+// Removes what is far from all of the others.
 static void extents_keep_near(ExtentList *list, const ExtentList *others, double margin)
 {
     Bounds around = bounds_empty();
@@ -173,22 +161,13 @@ static Bounds lists_meet(ExtentList *transparent, ExtentList *opaque, double mar
     return all;
 }
 
-// Kernels at `fast` need not know infinities.
-static scalar4 scalar4_within_floats(Vector3 v)
-{
-    v = vector_max(vector_min(v, vector_all(FLT_MAX)), vector_all(-FLT_MAX));
-    return (scalar4){v.x, v.y, v.z, 0};
-}
-
-void contact_find(CompiledScene *flat)
+Bounds contact_find(const CompiledScene *compiled)
 {
     ExtentList transparent, opaque;
-    double reach = extents_collect(&transparent, flat, true);
-    reach = fmax(reach, extents_collect(&opaque, flat, false));
+    double reach = extents_collect(&transparent, compiled, true);
+    reach = fmax(reach, extents_collect(&opaque, compiled, false));
     Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * reach);
-    SceneHeader *header = flat->arrays[FLAT_HEADER].items;
-    header->contact_low = scalar4_within_floats(contact.min);
-    header->contact_high = scalar4_within_floats(contact.max);
     free(transparent.items);
     free(opaque.items);
+    return contact;
 }

@@ -1,16 +1,14 @@
 #include "host/compile/features.h"
 
+#include "host/compile/shapes.h"
+
 #define FEATURE_NAME(name) #name,
 const char *const feature_names[FEATURE_COUNT] = {FEATURE_LIST(FEATURE_NAME)};
 #undef FEATURE_NAME
 
-static const FeatureSet shape_features[SHAPE_COUNT] = {
-    [SHAPE_SPHERE] = FEATURE_SPHERES,     [SHAPE_PLANE] = FEATURE_PLANES,
-    [SHAPE_DISC] = FEATURE_DISCS,         [SHAPE_BOX] = FEATURE_BOXES,
-    [SHAPE_CYLINDER] = FEATURE_CYLINDERS, [SHAPE_CONE] = FEATURE_CONES,
-    [SHAPE_TRIANGLE] = FEATURE_TRIANGLES, [SHAPE_TORUS] = FEATURE_TORI,
-    [SHAPE_MESH] = FEATURE_TRIANGLES,
-};
+#define SHAPE_FEATURE(feature, Type, name, names) [KIND_##feature] = FEATURE_##feature,
+static const FeatureSet shape_features[KIND_COUNT] = {SHAPE_LIST(SHAPE_FEATURE)};
+#undef SHAPE_FEATURE
 
 static const FeatureSet light_features[] = {
     [LIGHT_POINT] = FEATURE_POINT_LIGHTS,
@@ -34,7 +32,8 @@ FeatureSet features_of(const Scene *scene)
     FeatureSet set = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        set |= shape_features[object->kind] | material_features(&scene->materials.items[object->material]);
+        set |= shape_features[shape_ops[object->kind]->kind] |
+               material_features(&scene->materials.items[object->material]);
         if (object->kind != SHAPE_MESH) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         for (size_t k = 0; mesh->materials && k < mesh->triangle_count; k++)

@@ -1,4 +1,4 @@
-#include "host/compile/textures.h"
+#include "host/compile/stages.h"
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Of a side: beyond it a place in float, 24 bits, no longer tells parts of a texel. Of all pictures: a kernel
+// Of a side: beyond it a position in float, 24 bits, cannot resolve a texel. Of all textures: a kernel
 // counts texels in 32 bits.
 enum { SIDE_LARGEST = 1 << 16, TEXELS_LARGEST = 1 << 28 };
 
@@ -21,7 +21,7 @@ typedef struct {
     struct {
         Level *items;
         size_t count, capacity;
-    } levels; // of all pictures, one after another
+    } levels; // of all textures, one after another
     size_t texel_count;
 } LevelList;
 
@@ -57,7 +57,7 @@ static double span_covers(const Span *span, uint32_t texel)
     return fmin(span->end, texel + 1.0) - fmax(span->start, texel);
 }
 
-// Half as many texels each way, rounded up; each is the mean of what it covers, so that the picture's mean
+// Half as many texels each way, rounded up; each is the mean of what it covers, so that the texture's mean
 // stays.
 static Level level_halved(const Level *fine)
 {
@@ -98,13 +98,13 @@ static bool level_fill(Level *level, const Image *image, bool decodes)
     return true;
 }
 
-// What is wrong with a picture that was read, or NULL.
+// What is wrong with the image, or NULL.
 static const char *levels_add(LevelList *list, const Image *image, bool as_displayed)
 {
     if (image->width > SIDE_LARGEST || image->height > SIDE_LARGEST)
         return "a side of more than 65536 texels";
     if ((size_t)image->width * image->height > TEXELS_LARGEST - list->texel_count)
-        return "too many texels in all pictures";
+        return "too many texels in all textures";
     Level level = level_open(image->width, image->height);
     array_push(list->levels, level);
     if (!level_fill(&level, image, image->display && !as_displayed)) return "a color is not finite";
@@ -114,19 +114,21 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
         array_push(list->levels, level);
         list->texel_count += (size_t)level.width * level.height;
     }
-    return list->texel_count > TEXELS_LARGEST ? "too many texels in all pictures" : NULL;
+    return list->texel_count > TEXELS_LARGEST ? "too many texels in all textures" : NULL;
 }
 
-static bool image_add(LevelList *list, TextureSize *size, const Scene *scene, const SceneImage *scene_image,
-                      MessageList *messages)
+static bool image_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
+                      const SceneImage *scene_image, MessageList *messages)
 {
+    const uint32_t first_level = (uint32_t)list->levels.count;
     const Source source = scene_source(scene);
     Image image;
     MessageList problems = {0};
     bool done = image_read(&image, scene_image->path, &problems);
     if (done) {
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
-        *size = (TextureSize){image.width, image.height};
+        *texture = (CompiledTexture){image.width, image.height, first_level,
+                                     (uint32_t)list->levels.count - first_level};
         image_free(&image);
         done = !problem;
         if (problem)
@@ -140,12 +142,12 @@ static bool image_add(LevelList *list, TextureSize *size, const Scene *scene, co
     return done;
 }
 
-static void levels_flatten(CompiledScene *flat, const LevelList *list)
+static void levels_flatten(CompiledScene *compiled, const LevelList *list)
 {
-    flat->arrays[FLAT_TEXTURE_LEVELS] = flat_array_make(FLAT_TEXTURE_LEVELS, list->levels.count);
-    flat->arrays[FLAT_TEXELS] = flat_array_make(FLAT_TEXELS, list->texel_count);
-    TextureLevel *levels = flat->arrays[FLAT_TEXTURE_LEVELS].items;
-    Texel *texels = flat->arrays[FLAT_TEXELS].items;
+    compiled->arrays[FLAT_TEXTURE_LEVELS] = flat_array_make(FLAT_TEXTURE_LEVELS, list->levels.count);
+    compiled->arrays[FLAT_TEXELS] = flat_array_make(FLAT_TEXELS, list->texel_count);
+    TextureLevel *levels = compiled->arrays[FLAT_TEXTURE_LEVELS].items;
+    Texel *texels = compiled->arrays[FLAT_TEXELS].items;
     uint32_t first = 0;
     for (size_t i = 0; i < list->levels.count; i++) {
         const Level *level = &list->levels.items[i];
@@ -157,40 +159,14 @@ static void levels_flatten(CompiledScene *flat, const LevelList *list)
     }
 }
 
-// The levels of picture i are first_levels[i] .. first_levels[i + 1] - 1.
-static void materials_tell(CompiledScene *flat, const Scene *scene, const uint32_t *first_levels,
-                           const TextureSize *sizes)
+bool textures_load(CompiledScene *compiled, const Scene *scene, MessageList *messages)
 {
-    FlatMaterial *materials = flat->arrays[FLAT_MATERIALS].items;
-    for (size_t i = 0; i < scene->materials.count; i++) {
-        const Material *material = &scene->materials.items[i];
-        if (material->image == 0) continue;
-        size_t image = material->image - 1;
-        materials[i].image =
-            (uint4){1 + first_levels[image], first_levels[image + 1] - first_levels[image], 0, 0};
-        materials[i].reflection_transmission_ior.w = sizes[image].width / material->image_size;
-    }
-}
-
-bool textures_load(CompiledScene *flat, const Scene *scene, const FlattenSettings *settings,
-                   MessageList *messages)
-{
-    size_t count = scene->images.count;
     LevelList list = {0};
-    TextureSize *sizes = memory_allocate_zeroed(count + 1, sizeof *sizes);
-    uint32_t *first_levels = memory_allocate_zeroed(count + 1, sizeof *first_levels);
+    compiled->textures = memory_allocate_zeroed(scene->images.count + 1, sizeof *compiled->textures);
     bool done = true;
-    for (size_t i = 0; i < count && done; i++) {
-        done = image_add(&list, &sizes[i], scene, &scene->images.items[i], messages);
-        first_levels[i + 1] = (uint32_t)list.levels.count;
-    }
-    if (done) {
-        levels_flatten(flat, &list);
-        materials_tell(flat, scene, first_levels, sizes);
-        texture_mapping_fill(flat, scene, sizes, settings);
-    }
+    for (size_t i = 0; i < scene->images.count && done; i++)
+        done = image_add(&list, &compiled->textures[i], scene, &scene->images.items[i], messages);
+    if (done) levels_flatten(compiled, &list);
     levels_free(&list);
-    free(sizes);
-    free(first_levels);
     return done;
 }

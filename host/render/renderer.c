@@ -1,22 +1,10 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
-#include "host/compile/bvh_flatten.h"
-#include "host/compile/contact.h"
-#include "host/compile/culling.h"
-#include "host/compile/textures.h"
+#include "host/compile/compile.h"
 #include "host/render/renderer_state.h"
-#include "host/scene/transform.h"
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double"};
-
-const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
-
-// From so many bounded primitives on the hierarchy is faster than the plain loop.
-enum { BVH_WORTHWHILE = 24 };
 
 static const struct {
     const char *file, *name;
@@ -52,93 +40,13 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
     return true;
 }
 
-// The hierarchy counts with 28 bits.
-static bool scene_is_small_enough(const Scene *scene, MessageList *messages)
+// False with a message where the arrays exceed the memory that the device reports.
+static bool device_has_room(const CompiledScene *compiled, const Device *device, bool wide,
+                            MessageList *messages)
 {
-    const size_t largest = (size_t)1 << 28;
-    size_t count = scene_primitive_count(scene);
-    if (count <= largest) return true;
-    message_add(messages, MESSAGE_ERROR, "the scene has %zu objects and triangles, more than %zu", count,
-                largest);
-    return false;
-}
-
-static bool array_is_finite(const FlatArray *array, bool wide)
-{
-    double largest = wide ? INFINITY : 3.4028234663852886e38;
-    for (size_t i = 0; i < array->count; i++) {
-        const double *numbers =
-            (const double *)(const void *)((const char *)array->items + i * array->layout.size);
-        for (size_t k = 0; k < 4 * array->layout.scalar4_count; k++)
-            if (!(fabs(numbers[k]) <= largest) || isinf(numbers[k])) return false;
-    }
-    return true;
-}
-
-static bool scene_fits(const CompiledScene *flat, const Renderer *renderer, MessageList *messages)
-{
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        if (array_is_finite(&flat->arrays[kind], renderer->report.wide)) continue;
-        message_add(messages, MESSAGE_ERROR,
-                    "a number of the scene does not fit precision %s: its magnitude is beyond %s",
-                    precision_names[renderer->settings.precision],
-                    renderer->report.wide ? "1.8e308" : "3.4e38");
-        return false;
-    }
-    return true;
-}
-
-static double distance_largest(Vector3 from, Vector3 to)
-{
-    return vector_largest(vector_subtract(to, from));
-}
-
-// The unit of lengths on the device. In float a torus a trillion units large, or a trillionth, is lost, as
-// the third and fourth powers of lengths overflow or vanish; other shapes are at 1e19 and 1e-19. So where the
-// farthest point lies beyond 2^30, or within 2^-30, lengths are counted so that it and the smallest object
-// lie on the two sides of 1. Powers of two are exact: the picture is that of the scene as it is.
-static double scene_unit(const Scene *scene, const RenderSettings *settings)
-{
-    const int kept = 30; // exponents up to there are no trouble
-    Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
-    size_t unbounded_count;
-    Bounds bounds = scene_bounds(scene, &unbounded_count);
-    if (settings->precision == PRECISION_DOUBLE || bounds_is_empty(&bounds)) return 1;
-    int farthest, smallest;
-    frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
-    if (abs(farthest) <= kept) return 1;
-    frexp(scene_smallest_size(scene), &smallest);
-    int middle = (farthest + smallest) / 2;
-    return farthest > 0 && middle < 0 ? 1 : ldexp(1, middle);
-}
-
-// Whether the squared way to each light fits a float.
-static bool lights_are_near_enough(const Scene *scene, const Renderer *renderer, MessageList *messages)
-{
-    const double farthest = 1e18;
-    Vector3 eye = renderer->settings.shift_to_eye ? scene->camera.position : (Vector3){0};
-    if (renderer->report.wide) return true;
-    for (size_t i = 0; i < scene->lights.count; i++) {
-        const Light *light = &scene->lights.items[i];
-        double away = distance_largest(eye, light->position);
-        if (light->kind == LIGHT_DIRECTIONAL || away <= farthest) continue;
-        message_add(
-            messages, MESSAGE_ERROR,
-            "a light lies %.3g from the eye, farther than precision %s can square (%.3g): a directional "
-            "light shines from as far, and double sees it",
-            away * renderer->unit, precision_names[renderer->settings.precision], farthest * renderer->unit);
-        return false;
-    }
-    return true;
-}
-
-// Whether the device has room for the arrays, as far as it says.
-static bool device_has_room(const CompiledScene *flat, const Renderer *renderer, MessageList *messages)
-{
-    const Device *device = renderer->compute->device;
     size_t sum = 0, largest = 0;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        size_t size = flat_array_size(&flat->arrays[kind], renderer->report.wide);
+        size_t size = flat_array_size(&compiled->arrays[kind], wide);
         sum += size;
         if (size > largest) largest = size;
     }
@@ -153,15 +61,15 @@ static bool device_has_room(const CompiledScene *flat, const Renderer *renderer,
 }
 
 // Frees each array of the host as it goes, so that no two copies of all of them exist.
-static void upload(Renderer *renderer, CompiledScene *flat)
+static void upload(Renderer *renderer, CompiledScene *compiled)
 {
     bool wide = renderer->report.wide;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        size_t size = flat_array_size(&flat->arrays[kind], wide);
+        size_t size = flat_array_size(&compiled->arrays[kind], wide);
         void *bytes = buffer_bytes_allocate(size);
-        flat_array_write(&flat->arrays[kind], wide, bytes);
-        free(flat->arrays[kind].items);
-        flat->arrays[kind].items = NULL;
+        flat_array_write(&compiled->arrays[kind], wide, bytes);
+        free(compiled->arrays[kind].items);
+        compiled->arrays[kind].items = NULL;
         renderer->arrays[kind] = buffer_take(renderer->compute, size, bytes);
     }
 }
@@ -196,74 +104,45 @@ static void prelude_write(Renderer *renderer)
         renderer->options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
 }
 
-// Makes the flat arrays, in the scene's unit, and the renderer's unit; false, without arrays, on a user's
-// fault.
-static bool scene_lay(CompiledScene *flat, const Scene *scene, Renderer *renderer, MessageList *messages)
-{
-    const RenderSettings *settings = &renderer->settings;
-    double start = clock_seconds();
-    renderer->unit = scene_unit(scene, settings);
-    Scene scaled = {0};
-    if (renderer->unit != 1) {
-        scaled = scene_scaled(scene, 1 / renderer->unit);
-        scene = &scaled;
-    }
-    bool lit = lights_are_near_enough(scene, renderer, messages), whole = false;
-    if (lit) {
-        const FlattenSettings flattening = {settings->width,        settings->height,
-                                            settings->sample_count, settings->bounce_count,
-                                            settings->shift_to_eye, renderer->report.wide};
-        flatten(flat, scene, &flattening);
-        whole = textures_load(flat, scene, &flattening, messages) && scene_fits(flat, renderer, messages);
-        if (whole && renderer->report.features & FEATURE_TRANSMISSION) contact_find(flat);
-        if (!whole) compiled_scene_free(flat);
-    }
-    scene_scaled_free(&scaled);
-    renderer->report.flatten_seconds = clock_seconds() - start;
-    return whole;
-}
-
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages) ||
-        !scene_is_small_enough(scene, messages))
+    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
+    const bool wide = settings->precision == PRECISION_DOUBLE;
+    const CompileSettings compile_settings = {
+        .width = settings->width,
+        .height = settings->height,
+        .sample_count = settings->sample_count,
+        .bounce_count = settings->bounce_count,
+        .precision = settings->precision,
+        .lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, wide),
+        .bvh = settings->bvh,
+        .extra_features = settings->extra_features,
+        .shift_to_eye = settings->shift_to_eye,
+    };
+    CompiledScene compiled;
+    if (!scene_compile(&compiled, scene, &compile_settings, messages)) return NULL;
+    if (!device_has_room(&compiled, compute->device, wide, messages)) {
+        compiled_scene_free(&compiled);
         return NULL;
+    }
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
     renderer->settings = *settings;
     renderer->light_count = scene->lights.count;
-    RenderReport *report = &renderer->report;
-    report->wide = settings->precision == PRECISION_DOUBLE;
-    report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->wide);
-    report->features = features_of(scene) | settings->extra_features;
-    report->build_from_cache = true;
-
-    CompiledScene flat;
-    if (!scene_lay(&flat, scene, renderer, messages)) {
-        free(renderer);
-        return NULL;
-    }
-    size_t bounded_count = bounded_primitive_count(&flat);
-    bool hangs = settings->bvh == BVH_ON || (settings->bvh == BVH_AUTO && bounded_count >= BVH_WORTHWHILE);
-    if (hangs && bounded_count > 0) {
-        double start = clock_seconds();
-        bvh_flatten(&flat, report->lanes);
-        report->features |= FEATURE_BVH;
-        report->bvh_seconds = clock_seconds() - start;
-    }
+    renderer->unit = compiled.unit;
+    renderer->report = (RenderReport){
+        .features = compiled.features,
+        .lanes = compile_settings.lanes,
+        .wide = wide,
+        .flatten_seconds = compiled.flatten_seconds,
+        .bvh_seconds = compiled.bvh_seconds,
+        .build_from_cache = true,
+    };
     double start = clock_seconds();
-    culling_fill(&flat, report->wide);
-    report->flatten_seconds += clock_seconds() - start;
-    if (!device_has_room(&flat, renderer, messages)) {
-        compiled_scene_free(&flat);
-        free(renderer);
-        return NULL;
-    }
-    start = clock_seconds();
-    upload(renderer, &flat);
-    report->upload_seconds = clock_seconds() - start;
-    compiled_scene_free(&flat);
+    upload(renderer, &compiled);
+    renderer->report.upload_seconds = clock_seconds() - start;
+    compiled_scene_free(&compiled);
     if (!compute_ok(compute)) {
         renderer_close(renderer);
         return NULL;

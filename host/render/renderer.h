@@ -2,21 +2,12 @@
 // The only room that joins scene and opencl.
 #pragma once
 
-#include "host/compile/features.h"
+#include "host/compile/settings.h"
 #include "host/opencl/compute.h"
 #include "host/render/trace.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
 #include <stdint.h>
-
-typedef enum {
-    PRECISION_FAST,
-    PRECISION_SINGLE,
-    PRECISION_STRICT,
-    PRECISION_DOUBLE,
-    PRECISION_COUNT
-} Precision;
-extern const char *const precision_names[PRECISION_COUNT];
 
 // What a picture can hold beside its color; a set of bits.
 enum {
@@ -28,10 +19,6 @@ enum {
     AOV_RAY = 32,
     AOV_PATH = 64
 };
-
-// Whether rays go through a hierarchy. The picture is the same either way.
-typedef enum { BVH_AUTO, BVH_ON, BVH_OFF, BVH_CHOICE_COUNT } BvhChoice;
-extern const char *const bvh_choice_names[BVH_CHOICE_COUNT];
 
 typedef struct {
     uint32_t width, height;                                   // of the whole picture

@@ -1,7 +1,7 @@
 // The inside of a Renderer, shared by the files of this room.
 #pragma once
 
-#include "host/compile/flatten.h"
+#include "host/compile/compiled_scene.h"
 #include "host/render/renderer.h"
 
 typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_PATH, KERNEL_TRACE, KERNEL_COUNT } KernelKind;

@@ -46,16 +46,22 @@ static inline Bounds bounds_of_triangle(Vector3 a, Vector3 b, Vector3 c)
     return (Bounds){vector_min(vector_min(a, b), c), vector_max(vector_max(a, b), c)};
 }
 
-static inline double bounds_half_area(Bounds bounds)
-{
-    Vector3 size = vector_subtract(bounds.max, bounds.min);
-    return size.x * size.y + size.y * size.z + size.z * size.x;
-}
-
 // How far a circle of radius 1 across the unit vector n reaches along each axis: as far as that axis'
 // projection into the circle's plane is long, sqrt(1 - n_x^2), here as the length of n's other components,
 // which does not cancel.
 static inline Vector3 circle_reach(Vector3 n)
 {
     return (Vector3){hypot(n.y, n.z), hypot(n.x, n.z), hypot(n.x, n.y)};
+}
+
+// `normal` need not be unit.
+static inline Bounds bounds_of_disc(Vector3 center, Vector3 normal, double radius)
+{
+    return bounds_around(center, vector_scale(circle_reach(vector_normalize(normal)), radius));
+}
+
+static inline double bounds_half_area(Bounds bounds)
+{
+    Vector3 size = vector_subtract(bounds.max, bounds.min);
+    return size.x * size.y + size.y * size.z + size.z * size.x;
 }

@@ -7,11 +7,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-const char *const shape_names[SHAPE_COUNT] = {
-    [SHAPE_SPHERE] = "sphere",     [SHAPE_PLANE] = "plane",       [SHAPE_DISC] = "disc",
-    [SHAPE_BOX] = "box",           [SHAPE_CYLINDER] = "cylinder", [SHAPE_CONE] = "cone",
-    [SHAPE_TRIANGLE] = "triangle", [SHAPE_TORUS] = "torus",       [SHAPE_MESH] = "mesh",
-};
+#define SHAPE_NAME(NAME, name) name,
+const char *const shape_names[SHAPE_COUNT] = {SCENE_SHAPE_LIST(SHAPE_NAME)};
+#undef SHAPE_NAME
 
 Material material_default(void)
 {

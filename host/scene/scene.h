@@ -1,9 +1,8 @@
 // A scene as its file says it: plain arrays in double, world coordinates, no OpenCL.
-// Readers fill it; `flatten` (host/render) turns it into the device's arrays.
+// Readers fill it; scene_compile (host/compile) turns it into the device's arrays.
 #pragma once
 
 #include "host/base/text.h"
-#include "host/scene/bounds.h"
 #include "host/scene/vector.h"
 #include <stdbool.h>
 #include <stddef.h>
@@ -11,7 +10,7 @@
 
 typedef Vector3 Color; // linear RGB in x, y, z; 1 = full
 
-// What of the picture the field of view spans; pixels are square, the other side follows.
+// The side of the image that the field of view spans; pixels are square.
 typedef enum { FIELD_VERTICAL, FIELD_HORIZONTAL } FieldAxis;
 
 typedef struct {
@@ -43,29 +42,33 @@ typedef struct {
     Color checker_colors[2]; // in place of color
     double checker_size;     // side of a square, > 0, in scene units
     uint32_t image;          // in place of color: 1 + index into the scene's images; 0: none
-    double image_size;       // width of a picture on a plane or disc, > 0, in scene units
+    double image_size;       // width of a texture on a plane or disc, > 0, in scene units
 } Material;
 
-// A picture that lies on surfaces; who renders the scene reads it.
+// An image file for textures; scene_compile reads it.
 typedef struct {
     char *path;
     size_t offset; // of its name in the scene's text
 } SceneImage;
 
-typedef enum {
-    SHAPE_SPHERE,
-    SHAPE_PLANE,
-    SHAPE_DISC,
-    SHAPE_BOX,
-    SHAPE_CYLINDER,
-    SHAPE_CONE,
-    SHAPE_TRIANGLE,
-    SHAPE_TORUS,
-    SHAPE_MESH,
-    SHAPE_COUNT
-} ShapeKind;
+// Every shape, by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
+// then the mesh.
+#define SCENE_SHAPE_LIST(SHAPE)                                                                              \
+    SHAPE(SPHERE, "sphere")                                                                                  \
+    SHAPE(PLANE, "plane")                                                                                    \
+    SHAPE(DISC, "disc")                                                                                      \
+    SHAPE(BOX, "box")                                                                                        \
+    SHAPE(CYLINDER, "cylinder")                                                                              \
+    SHAPE(CONE, "cone")                                                                                      \
+    SHAPE(TRIANGLE, "triangle")                                                                              \
+    SHAPE(TORUS, "torus")                                                                                    \
+    SHAPE(MESH, "mesh")
 
-extern const char *const shape_names[SHAPE_COUNT]; // "sphere", "plane", …
+#define SHAPE_ENUMERATOR(NAME, name) SHAPE_##NAME,
+typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_COUNT } ShapeKind;
+#undef SHAPE_ENUMERATOR
+
+extern const char *const shape_names[SHAPE_COUNT];
 
 // Axes and normals are as the file has them, not made unit, never zero.
 typedef struct {
@@ -163,7 +166,7 @@ typedef struct {
     char *file; // of a scene that has images, and
     Text text;  // what was read from it: for messages about them, see scene_source
     ColorMeaning color_meaning;
-    unsigned width, height; // the file's own picture size, or 0
+    unsigned width, height; // the file's own image size, or 0
 } Scene;
 
 void scene_free(Scene *scene); // and zeroes
@@ -187,8 +190,3 @@ Material material_default(void);
 // How many ids an object takes: one for each triangle of a mesh, else one.
 size_t object_primitive_count(const Scene *scene, const Object *object);
 size_t scene_primitive_count(const Scene *scene);
-
-// Of all bounded objects; *unbounded_count counts the rest (planes, infinite cylinders and cones).
-Bounds scene_bounds(const Scene *scene, size_t *unbounded_count);
-// The largest side of the smallest bounded object's box, a mesh being one; 0 if none has any size.
-double scene_smallest_size(const Scene *scene);

@@ -1,5 +1,5 @@
 // A scene of every shape, scaled, mirrored and turned: the picture may change in the known way only.
-#include "host/scene/transform.h"
+#include "host/compile/transform.h"
 #include "host/verify/run.h"
 #include <math.h>
 #include <stdlib.h>

@@ -160,28 +160,6 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
     return true;
 }
 
-bool material_fits(YamlReader *reader, const YamlNode *mapping, const Object *object)
-{
-    const Scene *scene = reader->scene;
-    if (scene->materials.items[object->material].image == 0) return true;
-    const YamlNode *place = field_node(reader, mapping, "material");
-    switch (object->kind) {
-    case SHAPE_SPHERE:
-    case SHAPE_PLANE:
-    case SHAPE_DISC:
-        return true;
-    case SHAPE_MESH:
-        if (scene->meshes.items[object->as.mesh.index].uvs) return true;
-        report_error(&reader->report, place->offset, "the mesh has no uv for the material's image");
-        return false;
-    default:
-        report_error(&reader->report, place->offset,
-                     "an image lies on a sphere, plane, disc or mesh, not on a %s",
-                     shape_names[object->kind]);
-        return false;
-    }
-}
-
 uint32_t material_default_index(YamlReader *reader)
 {
     if (reader->default_material == UINT32_MAX) {

@@ -63,7 +63,12 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
         reader->scene->meshes.items[object.as.mesh.index].path = path;
         path = NULL;
         if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-        if (material_fits(reader, mapping, &object)) array_push(reader->scene->objects, object);
+        if (reader->scene->materials.items[object.material].image > 0 &&
+            !reader->scene->meshes.items[object.as.mesh.index].uvs)
+            report_error(&reader->report, field_node(reader, mapping, "material")->offset,
+                         "the mesh has no uv for the material's image");
+        else
+            array_push(reader->scene->objects, object);
     }
     free(path);
 }

@@ -146,20 +146,21 @@ typedef struct {
     // Checks fields against each other and derives members. Reports an error and returns false if they do not
     // fit. May be NULL.
     bool (*finish)(YamlReader *reader, const YamlNode *mapping, Form form, Object *object);
+    bool takes_image; // of its material
 } Shape;
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
 
 // Indexed by ShapeKind; a mesh has its own reader.
 static const Shape shapes[SHAPE_MESH] = {
-    {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL},
-    {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL},
-    {{.kind = SHAPE_DISC}, FIELDS(disc_fields), NULL},
-    {{.kind = SHAPE_BOX}, FIELDS(box_fields), box_finish},
-    {{.kind = SHAPE_CYLINDER, .as.cylinder.caps = true}, FIELDS(cylinder_fields), cylinder_finish},
-    {{.kind = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish},
-    {{.kind = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish},
-    {{.kind = SHAPE_TORUS}, FIELDS(torus_fields), NULL},
+    {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL, true},
+    {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL, true},
+    {{.kind = SHAPE_DISC}, FIELDS(disc_fields), NULL, true},
+    {{.kind = SHAPE_BOX}, FIELDS(box_fields), box_finish, false},
+    {{.kind = SHAPE_CYLINDER, .as.cylinder.caps = true}, FIELDS(cylinder_fields), cylinder_finish, false},
+    {{.kind = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish, false},
+    {{.kind = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish, false},
+    {{.kind = SHAPE_TORUS}, FIELDS(torus_fields), NULL, false},
 };
 
 static void object_read(YamlReader *reader, const YamlNode *item)
@@ -185,7 +186,11 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         return;
     if (shape->finish && !shape->finish(reader, mapping, form, &object)) return;
     if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-    if (!material_fits(reader, mapping, &object)) return;
+    if (reader->scene->materials.items[object.material].image > 0 && !shape->takes_image) {
+        report_error(&reader->report, field_node(reader, mapping, "material")->offset,
+                     "an image lies on a sphere, plane, disc or mesh, not on a %s", shape_names[kind]);
+        return;
+    }
     array_push(reader->scene->objects, object);
 }
 

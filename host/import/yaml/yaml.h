@@ -10,9 +10,6 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node);
 // Reads a material's name or an inline material; the target is a uint32_t, the material's index.
 FieldReader read_material;
 
-// Whether the object can have its material: textures need a sphere, plane, disc or mesh with uv.
-bool material_fits(YamlReader *reader, const YamlNode *mapping, const Object *object);
-
 // The default material's index.
 uint32_t material_default_index(YamlReader *reader);
 

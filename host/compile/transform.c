@@ -1,56 +1,11 @@
-#include "host/scene/transform.h"
+#include "host/compile/transform.h"
+
 #include "host/base/memory.h"
+#include "host/compile/shapes.h"
 #include <stdlib.h>
 #include <string.h>
 
-enum { VECTORS_LARGEST = 6 };
-
-// The object's places, and what reaches from one to another; returns how many.
-static size_t object_vectors(Object *object, Vector3 *vectors[VECTORS_LARGEST])
-{
-    size_t count = 0;
-    switch (object->kind) {
-    case SHAPE_SPHERE:
-        vectors[count++] = &object->as.sphere.center;
-        break;
-    case SHAPE_PLANE:
-        vectors[count++] = &object->as.plane.point;
-        vectors[count++] = &object->as.plane.normal;
-        break;
-    case SHAPE_DISC:
-        vectors[count++] = &object->as.disc.center;
-        vectors[count++] = &object->as.disc.normal;
-        break;
-    case SHAPE_BOX:
-        vectors[count++] = &object->as.box.min;
-        vectors[count++] = &object->as.box.max;
-        break;
-    case SHAPE_CYLINDER:
-        vectors[count++] = &object->as.cylinder.from;
-        vectors[count++] = &object->as.cylinder.axis;
-        break;
-    case SHAPE_CONE:
-        vectors[count++] = &object->as.cone.from;
-        vectors[count++] = &object->as.cone.axis;
-        break;
-    case SHAPE_TRIANGLE:
-        for (size_t i = 0; i < 3; i++) {
-            vectors[count++] = &object->as.triangle.vertices[i];
-            vectors[count++] = &object->as.triangle.normals[i];
-        }
-        break;
-    case SHAPE_TORUS:
-        vectors[count++] = &object->as.torus.center;
-        vectors[count++] = &object->as.torus.axis;
-        break;
-    case SHAPE_MESH:
-    case SHAPE_COUNT:
-        break;
-    }
-    return count;
-}
-
-// Every vector that is a place or reaches from one to another, but for those of meshes.
+// Every position and every vector between two, but for those of meshes.
 static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
 {
     change(&scene->camera.position, factor);
@@ -61,10 +16,11 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
         change(&scene->lights.items[i].direction, factor);
     }
     for (size_t i = 0; i < scene->objects.count; i++) {
-        Vector3 *vectors[VECTORS_LARGEST];
-        size_t count = object_vectors(&scene->objects.items[i], vectors);
-        for (size_t k = 0; k < count; k++)
-            change(vectors[k], factor);
+        Object *object = &scene->objects.items[i];
+        const ShapeOps *shape = shape_ops[object->kind];
+        for (const size_t *offset = shape->vectors; *offset > 0; offset++)
+            change((Vector3 *)(void *)((char *)object + *offset), factor);
+        if (shape->restore) shape->restore(object);
     }
 }
 
@@ -78,13 +34,8 @@ void scene_scale(Scene *scene, double factor)
     scene_for_each_vector(scene, vector_grow, factor);
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
-        if (object->kind == SHAPE_SPHERE) object->as.sphere.radius *= factor;
-        if (object->kind == SHAPE_DISC) object->as.disc.radius *= factor;
-        if (object->kind == SHAPE_CYLINDER) object->as.cylinder.radius *= factor;
-        if (object->kind == SHAPE_TORUS) object->as.torus.major *= factor;
-        if (object->kind == SHAPE_TORUS) object->as.torus.minor *= factor;
-        if (object->kind == SHAPE_CONE) object->as.cone.radius[0] *= factor;
-        if (object->kind == SHAPE_CONE) object->as.cone.radius[1] *= factor;
+        for (const size_t *offset = shape_ops[object->kind]->lengths; *offset > 0; offset++)
+            *(double *)(void *)((char *)object + *offset) *= factor;
     }
     for (size_t i = 0; i < scene->meshes.count; i++)
         for (size_t k = 0; k < scene->meshes.items[i].vertex_count; k++)
@@ -138,13 +89,6 @@ static void vector_mirror(Vector3 *vector, double factor)
 void scene_mirror(Scene *scene)
 {
     scene_for_each_vector(scene, vector_mirror, -1);
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        Object *object = &scene->objects.items[i];
-        if (object->kind != SHAPE_BOX) continue;
-        double low = object->as.box.max.x;
-        object->as.box.max.x = object->as.box.min.x;
-        object->as.box.min.x = low;
-    }
     for (size_t i = 0; i < scene->materials.count; i++) {
         Color *colors = scene->materials.items[i].checker_colors, first = colors[0];
         colors[0] = colors[1];

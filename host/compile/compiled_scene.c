@@ -1,0 +1,99 @@
+#include "host/compile/compiled_scene.h"
+
+#include "host/base/fault.h"
+#include <stdlib.h>
+#include <string.h>
+
+// clang-format off
+// Of a struct whose uint4 members are those from `first` to `last`, and of one that has none.
+#define LAYOUT(Type, first, last)                           \
+    {sizeof(Type), offsetof(Type, first) / sizeof(scalar4), \
+     (offsetof(Type, last) + sizeof((Type *)0)->last - offsetof(Type, first)) / sizeof(uint4)}
+#define LAYOUT_OF_REALS(Type) {sizeof(Type), sizeof(Type) / sizeof(scalar4), 0}
+
+static const FlatLayout layouts[FLAT_COUNT] = {
+    [FLAT_HEADER] = LAYOUT(SceneHeader, picture, bounded_counts),
+#define SHAPE_LAYOUT(feature, Type, name, names) [FLAT_FIRST_SHAPE + KIND_##feature] = LAYOUT(Type, id, id),
+    SHAPE_LIST(SHAPE_LAYOUT)
+    [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
+    [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
+    // the widest; flat_nodes_make makes them as wide as the kernel's
+    [FLAT_NODES] = {BVH_WIDTH_LARGEST / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
+                    BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
+    [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
+    [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
+    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, image),
+    [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
+    [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
+    [FLAT_TEXELS] = LAYOUT(Texel, color, color),
+};
+// clang-format on
+
+static FlatArray array_make(FlatLayout layout, size_t count)
+{
+    size_t size = count * layout.size;
+    FlatArray array = {aligned_alloc(64, (size + 127) / 64 * 64), count, layout};
+    if (!array.items) fault("out of memory for %zu flat structs", count);
+    memset(array.items, 0, size);
+    return array;
+}
+
+FlatArray flat_array_make(size_t kind, size_t count)
+{
+    return array_make(layouts[kind], count);
+}
+
+FlatArray flat_nodes_make(size_t count, unsigned width)
+{
+    const FlatLayout widest = layouts[FLAT_NODES];
+    const unsigned parts = BVH_WIDTH_LARGEST / width;
+    return array_make(
+        (FlatLayout){widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts}, count);
+}
+
+void *flat_array_at(const FlatArray *array, size_t index)
+{
+    return (char *)array->items + index * array->layout.size;
+}
+
+// A shape's struct has its id in its first uint4, right behind its scalar4 members.
+uint32_t *flat_id(const FlatArray *array, size_t index)
+{
+    size_t offset = array->layout.scalar4_count * sizeof(scalar4);
+    return (uint32_t *)(void *)((char *)flat_array_at(array, index) + offset);
+}
+
+void compiled_scene_free(CompiledScene *compiled)
+{
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        free(compiled->arrays[kind].items);
+    free(compiled->textures);
+    *compiled = (CompiledScene){0};
+}
+
+size_t flat_array_size(const FlatArray *array, bool wide)
+{
+    const FlatLayout *layout = &array->layout;
+    size_t size =
+        wide ? layout->size : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+    return array->count * size;
+}
+
+void flat_array_write(const FlatArray *array, bool wide, void *target)
+{
+    const FlatLayout *layout = &array->layout;
+    if (wide) {
+        memcpy(target, array->items, flat_array_size(array, wide));
+        return;
+    }
+    char *out = target;
+    for (size_t i = 0; i < array->count; i++) {
+        const double *numbers = flat_array_at(array, i);
+        float *narrow = (float *)(void *)out;
+        for (size_t k = 0; k < 4 * layout->scalar4_count; k++)
+            narrow[k] = (float)numbers[k];
+        out += 4 * sizeof(float) * layout->scalar4_count;
+        memcpy(out, numbers + 4 * layout->scalar4_count, sizeof(uint4) * layout->uint4_count);
+        out += sizeof(uint4) * layout->uint4_count;
+    }
+}

@@ -1,0 +1,74 @@
+// What the kernels render: the scene's flat arrays, in double and relative to the eye.
+#pragma once
+
+#include "host/compile/features.h"
+#include "host/compile/flat_types.h"
+#include "host/scene/bounds.h"
+#include <stdbool.h>
+#include <stddef.h>
+
+// How a flat struct is laid out: its scalar4 members first, its uint4 members after them.
+typedef struct {
+    size_t size, scalar4_count, uint4_count;
+} FlatLayout;
+
+typedef struct {
+    void *items;
+    size_t count;
+    FlatLayout layout;
+} FlatArray;
+
+typedef enum {
+    FLAT_HEADER,
+    FLAT_FIRST_SHAPE,
+    FLAT_TRIANGLE_NORMALS = FLAT_FIRST_SHAPE + KIND_COUNT,
+    FLAT_TRIANGLE_UVS,
+    FLAT_NODES,
+    FLAT_CULL_SPHERES,
+    FLAT_OBJECTS,
+    FLAT_MATERIALS,
+    FLAT_LIGHTS,
+    FLAT_TEXTURE_LEVELS,
+    FLAT_TEXELS,
+    FLAT_COUNT
+} FlatKind;
+
+// A texture's full size, and its levels in FLAT_TEXTURE_LEVELS.
+typedef struct {
+    uint32_t width, height, first_level, level_count;
+} CompiledTexture;
+
+typedef struct {
+    FlatArray arrays[FLAT_COUNT];        // in the order of the kernels' arguments
+    FeatureSet features;                 // that the kernels need
+    double unit;                         // scene units per unit of length in the arrays, a power of two
+    double flatten_seconds, bvh_seconds; // to build the BVH; all else
+    // What the stages leave for later ones and for the header.
+    CompiledTexture *textures;           // of each of the scene's images
+    uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
+    Bounds bvh_bounds;                   // of these; 0 where there are none
+    uint32_t cull_sphere_count;          // of each common origin
+    Bounds contact;                      // where transparent and opaque primitives may touch
+} CompiledScene;
+
+void compiled_scene_free(CompiledScene *compiled); // and zeroes
+
+static inline Vector3 vector3_of(const scalar4 *v)
+{
+    return (Vector3){v->x, v->y, v->z};
+}
+
+static inline scalar4 scalar4_of(Vector3 v, double w)
+{
+    return (scalar4){v.x, v.y, v.z, w};
+}
+
+FlatArray flat_array_make(size_t kind, size_t count);    // zeroed
+FlatArray flat_nodes_make(size_t count, unsigned width); // of `width` children: a power of two, 4 to 16
+void *flat_array_at(const FlatArray *array, size_t index);
+// The object's id in a shape's struct.
+uint32_t *flat_id(const FlatArray *array, size_t index);
+
+// Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
+size_t flat_array_size(const FlatArray *array, bool wide);
+void flat_array_write(const FlatArray *array, bool wide, void *target);

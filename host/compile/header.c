@@ -1,0 +1,46 @@
+#include "host/compile/camera_basis.h"
+#include "host/compile/stages.h"
+#include <float.h>
+#include <string.h>
+
+// Kernels at `fast` need not know infinities.
+static scalar4 scalar4_within_floats(Vector3 v)
+{
+    return scalar4_of(vector_max(vector_min(v, vector_all(FLT_MAX)), vector_all(-FLT_MAX)), 0);
+}
+
+// The center, and the largest distance from it to a point inside, summed over the axes.
+static scalar4 center_and_reach(const Bounds *bounds)
+{
+    Vector3 half_low = vector_scale(bounds->min, 0.5), half_high = vector_scale(bounds->max, 0.5);
+    Vector3 reach = vector_subtract(half_high, half_low);
+    return scalar4_of(vector_add(half_low, half_high), reach.x + reach.y + reach.z);
+}
+
+void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
+{
+    const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
+    SceneHeader header = {
+        .background = scalar4_of(scene->background, 0),
+        .ambient = scalar4_of(scene->ambient, 0),
+        .forward = scalar4_of(basis.forward, 0),
+        .right = scalar4_of(basis.right, 0),
+        .up = scalar4_of(basis.up, 0),
+        .bounds = center_and_reach(&compiled->bvh_bounds),
+        .bounds_low = scalar4_of(compiled->bvh_bounds.min, 0),
+        .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),
+        .contact_low = scalar4_within_floats(compiled->contact.min),
+        .contact_high = scalar4_within_floats(compiled->contact.max),
+        .sample.x = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count),
+        .picture = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
+        .bounces.x = settings->bounce_count,
+        .cull_spheres.x = compiled->cull_sphere_count,
+    };
+    uint32_t counts[KIND_COUNT];
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        counts[kind] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + kind].count;
+    memcpy(header.counts, counts, sizeof counts);
+    memcpy(header.bounded_counts, compiled->bounded_counts, sizeof compiled->bounded_counts);
+    compiled->arrays[FLAT_HEADER] = flat_array_make(FLAT_HEADER, 1);
+    *(SceneHeader *)compiled->arrays[FLAT_HEADER].items = header;
+}

@@ -1,0 +1,31 @@
+#include "host/compile/stages.h"
+
+// 1 - cos of an angle in degrees, without cancellation.
+static double versine(double degrees)
+{
+    double half = sin(degrees * (M_PI / 360));
+    return 2 * half * half;
+}
+
+void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
+{
+    static const uint32_t kinds[] = {
+        [LIGHT_POINT] = LIGHT_KIND_POINT,
+        [LIGHT_DIRECTIONAL] = LIGHT_KIND_DIRECTIONAL,
+        [LIGHT_SPOT] = LIGHT_KIND_SPOT,
+    };
+    compiled->arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, scene->lights.count);
+    FlatLight *lights = compiled->arrays[FLAT_LIGHTS].items;
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        lights[i] = (FlatLight){.color = scalar4_of(light->color, 0), .kind.x = kinds[light->kind]};
+        if (light->kind != LIGHT_DIRECTIONAL)
+            lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
+        if (light->kind != LIGHT_POINT)
+            lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
+        if (light->kind == LIGHT_SPOT) {
+            double outer = versine(light->angle), inner = versine(light->angle - light->penumbra);
+            lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
+        }
+    }
+}

@@ -1,0 +1,66 @@
+#include "host/compile/camera_basis.h"
+#include "host/compile/stages.h"
+#include <float.h>
+
+bool size_fits(const Scene *scene, MessageList *messages)
+{
+    const size_t largest = (size_t)1 << 28; // bits that the BVH counts with
+    size_t count = scene_primitive_count(scene);
+    if (count <= largest) return true;
+    message_add(messages, MESSAGE_ERROR, "the scene has %zu objects and triangles, more than %zu", count,
+                largest);
+    return false;
+}
+
+bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                MessageList *messages)
+{
+    const double farthest = 1e18;
+    Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    if (settings->precision == PRECISION_DOUBLE) return true;
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        double distance = vector_largest(vector_subtract(light->position, eye));
+        if (light->kind == LIGHT_DIRECTIONAL || distance <= farthest) continue;
+        message_add(messages, MESSAGE_ERROR,
+                    "a light lies %.3g from the eye, farther than precision %s can square (%.3g): use a "
+                    "directional light or --precision double",
+                    distance * compiled->unit, precision_names[settings->precision],
+                    farthest * compiled->unit);
+        return false;
+    }
+    return true;
+}
+
+static bool vector_fits(Vector3 v, double largest)
+{
+    return fabs(v.x) <= largest && fabs(v.y) <= largest && fabs(v.z) <= largest;
+}
+
+static bool array_fits(const FlatArray *array, double largest)
+{
+    for (size_t i = 0; i < array->count; i++) {
+        const double *numbers = flat_array_at(array, i);
+        for (size_t k = 0; k < 4 * array->layout.scalar4_count; k++)
+            if (!(fabs(numbers[k]) <= largest)) return false;
+    }
+    return true;
+}
+
+bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                 MessageList *messages)
+{
+    bool wide = settings->precision == PRECISION_DOUBLE;
+    double largest = wide ? DBL_MAX : FLT_MAX;
+    CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
+    bool fits = vector_fits(scene->background, largest) && vector_fits(scene->ambient, largest) &&
+                vector_fits(basis.forward, largest) && vector_fits(basis.right, largest) &&
+                vector_fits(basis.up, largest);
+    for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)
+        fits = array_fits(&compiled->arrays[kind], largest);
+    if (fits) return true;
+    message_add(messages, MESSAGE_ERROR,
+                "a number of the scene does not fit precision %s: its magnitude is beyond %s",
+                precision_names[settings->precision], wide ? "1.8e308" : "3.4e38");
+    return false;
+}

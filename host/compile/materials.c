@@ -1,0 +1,35 @@
+#include "host/compile/stages.h"
+
+static uint4 optical_depth_of(double transmission)
+{
+    double log2_loss = transmission > 0 ? -log2(transmission) : INFINITY;
+    if (log2_loss >= 127) return (uint4){OPAQUE, 0, 0, 0};
+    uint64_t fine = (uint64_t)llround(ldexp(log2_loss, 48));
+    return (uint4){(uint32_t)llround(ldexp(log2_loss, 24)), (uint32_t)fine, (uint32_t)(fine >> 32), 0};
+}
+
+void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
+{
+    compiled->arrays[FLAT_MATERIALS] = flat_array_make(FLAT_MATERIALS, scene->materials.count);
+    FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *material = &scene->materials.items[i];
+        double size = material->checker_size;
+        Vector3 eye = rounding->eye;
+        materials[i] = (FlatMaterial){
+            .color = scalar4_of(material->checker ? material->checker_colors[0] : material->color,
+                                material->ambient),
+            .diffuse = scalar4_of(material->diffuse, material->specular),
+            .other_color = scalar4_of(material->checker_colors[1], material->shininess),
+            .reflection_transmission_ior = {material->reflection, material->transmission, material->ior, 0},
+            .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
+        };
+        if (material->checker)
+            materials[i].grid =
+                (scalar4){fmod(eye.x / size, 2), fmod(eye.y / size, 2), fmod(eye.z / size, 2), 1 / size};
+        if (material->image == 0) continue;
+        const CompiledTexture *texture = &compiled->textures[material->image - 1];
+        materials[i].image = (uint4){1 + texture->first_level, texture->level_count, 0, 0};
+        materials[i].reflection_transmission_ior.w = texture->width / material->image_size;
+    }
+}

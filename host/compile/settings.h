@@ -1,0 +1,28 @@
+// What a Scene is compiled for.
+#pragma once
+
+#include "host/compile/features.h"
+
+typedef enum {
+    PRECISION_FAST,
+    PRECISION_SINGLE,
+    PRECISION_STRICT,
+    PRECISION_DOUBLE,
+    PRECISION_COUNT
+} Precision;
+extern const char *const precision_names[PRECISION_COUNT];
+
+// Whether rays traverse a BVH. The image is the same either way.
+typedef enum { BVH_AUTO, BVH_ON, BVH_OFF, BVH_CHOICE_COUNT } BvhChoice;
+extern const char *const bvh_choice_names[BVH_CHOICE_COUNT];
+
+typedef struct {
+    uint32_t width, height; // of the whole image
+    uint32_t sample_count;  // per pixel, >= 1
+    uint32_t bounce_count;  // of a ray, at most
+    Precision precision;
+    uint32_t lanes; // of the kernel: 1, 4, 8, 16
+    BvhChoice bvh;
+    FeatureSet extra_features; // built in although the scene does not need them
+    bool shift_to_eye;         // positions are relative to the eye; else as they are
+} CompileSettings;

@@ -1,0 +1,49 @@
+// What the host knows of each shape: one row a shape, in one file of shapes/.
+#pragma once
+
+#include "host/compile/compiled_scene.h"
+#include "host/compile/flatten.h"
+
+typedef struct {
+    Vector3 center;
+    double radius; // infinite around what is unbounded
+} BoundingSphere;
+
+// An Object is the scene's, in double and in world coordinates; a primitive is the flat struct of
+// kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
+typedef struct {
+    int kind; // KIND_… of its primitives
+    // Offsets in Object, up to the first 0: of positions and of vectors between them; of lengths.
+    size_t vectors[7], lengths[3];
+    // Restores what transforms of its vectors break; NULL: nothing.
+    void (*restore)(Object *object);
+    // False where it is unbounded, and *bounds stays.
+    bool (*bounds)(const Scene *scene, const Object *object, Bounds *bounds);
+    // Adds its primitives (host/compile/flatten.h).
+    void (*flatten)(Flattening *flattening, const Object *object);
+
+    // As `bounds`; NULL: always unbounded.
+    bool (*primitive_bounds)(const void *primitive, Bounds *bounds);
+    // NULL: the bounding sphere of primitive_bounds.
+    BoundingSphere (*bounding_sphere)(const void *primitive);
+    // A point and the normal, not unit, of what lies in a plane; NULL: it does not.
+    void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
+    // The largest magnitude of an unbounded primitive's numbers, as distances from the origin.
+    double (*reach)(const void *primitive);
+
+    // Floating-point operations of a ray's test, counted by hand up to where a miss is certain, in the usual
+    // forms: the discriminant of a quadratic around the shape's center or axis, slabs for the box, the first
+    // barycentric coordinate of Möller and Trumbore's test for the triangle (Journal of Graphics Tools 2(1),
+    // 1997), and the coefficients of the torus' quartic.
+    double test_flops;
+} ShapeOps;
+
+// By ShapeKind, whose values but SHAPE_MESH are those of KIND_….
+extern const ShapeOps *const shape_ops[SHAPE_COUNT];
+
+// The bounds of a primitive; false where it is unbounded.
+bool primitive_bounds(size_t kind, const void *primitive, Bounds *bounds);
+BoundingSphere primitive_bounding_sphere(size_t kind, const void *primitive);
+
+// The sphere around a box, larger by a bound on the rounding errors here and in the box far from the eye.
+BoundingSphere box_bounding_sphere(const Bounds *box);

@@ -1,0 +1,39 @@
+#include "host/compile/shapes.h"
+
+static bool box_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene;
+    *bounds = (Bounds){object->as.box.min, object->as.box.max};
+    return true;
+}
+
+static void box_restore(Object *object)
+{
+    Vector3 a = object->as.box.min, b = object->as.box.max;
+    object->as.box.min = vector_min(a, b);
+    object->as.box.max = vector_max(a, b);
+}
+
+static void box_flatten(Flattening *flattening, const Object *object)
+{
+    const Box box = {.low = scalar4_of(point_from_eye(&flattening->rounding, object->as.box.min), 0),
+                     .high = scalar4_of(point_from_eye(&flattening->rounding, object->as.box.max), 0)};
+    primitive_add(flattening, KIND_BOXES, &box, object->material);
+}
+
+static bool box_primitive_bounds(const void *primitive, Bounds *bounds)
+{
+    const Box *box = primitive;
+    *bounds = (Bounds){vector3_of(&box->low), vector3_of(&box->high)};
+    return true;
+}
+
+const ShapeOps box_ops = {
+    .kind = KIND_BOXES,
+    .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)},
+    .restore = box_restore,
+    .bounds = box_bounds,
+    .flatten = box_flatten,
+    .primitive_bounds = box_primitive_bounds,
+    .test_flops = 22,
+};

@@ -1,0 +1,40 @@
+#include "host/compile/shapes.h"
+#include "host/compile/texture_mapping.h"
+
+static bool plane_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene, (void)object, (void)bounds;
+    return false;
+}
+
+static void plane_flatten(Flattening *flattening, const Object *object)
+{
+    const Vector3 normal = object->as.plane.normal;
+    Plane plane = {.point = scalar4_of(point_from_eye(&flattening->rounding, object->as.plane.point), 0),
+                   .normal = normal_and_inverse_length(&flattening->rounding, normal)};
+    surface_grid(flattening, object->material, normal, &plane.grid_u, &plane.grid_v);
+    primitive_add(flattening, KIND_PLANES, &plane, object->material);
+}
+
+static void plane_plane(const void *primitive, Vector3 *point, Vector3 *normal)
+{
+    const Plane *plane = primitive;
+    *point = vector3_of(&plane->point);
+    *normal = vector3_of(&plane->normal);
+}
+
+static double plane_reach(const void *primitive)
+{
+    const Plane *plane = primitive;
+    return fabs(vector_dot(vector_normalize(vector3_of(&plane->normal)), vector3_of(&plane->point)));
+}
+
+const ShapeOps plane_ops = {
+    .kind = KIND_PLANES,
+    .vectors = {offsetof(Object, as.plane.point), offsetof(Object, as.plane.normal)},
+    .bounds = plane_bounds,
+    .flatten = plane_flatten,
+    .plane = plane_plane,
+    .reach = plane_reach,
+    .test_flops = 14,
+};

@@ -1,0 +1,110 @@
+// Cylinders and cones.
+#include "host/compile/shapes.h"
+
+static Revolution revolution_make(const Rounding *rounding, Vector3 from, Vector3 whole_axis,
+                                  double radius_from, double radius_to, double infinite_slope, bool finite,
+                                  bool caps)
+{
+    Vector3 base = point_from_eye(rounding, from);
+    Vector3 axis = whole_axis;
+    if (finite) axis = vector_subtract(point_from_eye(rounding, vector_add(from, whole_axis)), base);
+    Vector3 scaled = vector_rounded(rounding, axis_scaled(axis));
+    double length = vector_length(scaled);
+    double radius = rounded(rounding, radius_from);
+    double slope = finite ? (rounded(rounding, radius_to) - radius) / vector_length(axis) : infinite_slope;
+    return (Revolution){
+        .base_radius = scalar4_of(base, radius * length),
+        .axis_slope = scalar4_of(scaled, slope),
+        .range = {finite ? vector_dot(axis, scaled) : 0, length, vector_dot(scaled, scaled), 0},
+        .id.y = (finite ? REVOLUTION_FINITE : 0u) | (finite && caps ? REVOLUTION_CAPPED : 0u),
+    };
+}
+
+static void cylinder_flatten(Flattening *flattening, const Object *object)
+{
+    const double radius = object->as.cylinder.radius;
+    Cylinder cylinder =
+        revolution_make(&flattening->rounding, object->as.cylinder.from, object->as.cylinder.axis, radius,
+                        radius, 0, object->as.cylinder.finite, object->as.cylinder.caps);
+    if (object->as.cylinder.only_inside) cylinder.id.y |= ONLY_INSIDE;
+    primitive_add(flattening, KIND_CYLINDERS, &cylinder, object->material);
+}
+
+static void cone_flatten(Flattening *flattening, const Object *object)
+{
+    const bool finite = object->as.cone.finite;
+    const double *radius = object->as.cone.radius;
+    Cone cone = revolution_make(&flattening->rounding, object->as.cone.from, object->as.cone.axis,
+                                finite ? radius[0] : 0, radius[1], object->as.cone.slope, finite,
+                                object->as.cone.caps);
+    if (object->as.cone.only_inside) cone.id.y |= ONLY_INSIDE;
+    primitive_add(flattening, KIND_CONES, &cone, object->material);
+}
+
+// Sides without caps reach as far as the discs that end them.
+static Bounds frustum_bounds(Vector3 from, Vector3 axis, double radius_from, double radius_to)
+{
+    return bounds_join(bounds_of_disc(from, axis, radius_from),
+                       bounds_of_disc(vector_add(from, axis), axis, radius_to));
+}
+
+static bool cylinder_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene;
+    const double radius = object->as.cylinder.radius;
+    if (!object->as.cylinder.finite) return false;
+    *bounds = frustum_bounds(object->as.cylinder.from, object->as.cylinder.axis, radius, radius);
+    return true;
+}
+
+static bool cone_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene;
+    const double *radius = object->as.cone.radius;
+    if (!object->as.cone.finite) return false;
+    *bounds = frustum_bounds(object->as.cone.from, object->as.cone.axis, radius[0], radius[1]);
+    return true;
+}
+
+static bool revolution_bounds(const void *primitive, Bounds *bounds)
+{
+    const Revolution *shape = primitive;
+    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
+    Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
+    double length = shape->range.y, radius = shape->base_radius.w / length;
+    double height = shape->range.x / shape->range.z; // in units of the stored axis
+    double end_radius = radius + shape->axis_slope.w * height * length;
+    Vector3 reach = circle_reach(vector_scale(axis, 1 / length));
+    *bounds = bounds_join(
+        bounds_around(base, vector_scale(reach, fabs(radius))),
+        bounds_around(vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius))));
+    return true;
+}
+
+static double revolution_reach(const void *primitive)
+{
+    const Revolution *shape = primitive;
+    return vector_largest(vector3_of(&shape->base_radius)) + shape->base_radius.w / shape->range.y;
+}
+
+const ShapeOps cylinder_ops = {
+    .kind = KIND_CYLINDERS,
+    .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
+    .lengths = {offsetof(Object, as.cylinder.radius)},
+    .bounds = cylinder_bounds,
+    .flatten = cylinder_flatten,
+    .primitive_bounds = revolution_bounds,
+    .reach = revolution_reach,
+    .test_flops = 40,
+};
+
+const ShapeOps cone_ops = {
+    .kind = KIND_CONES,
+    .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
+    .lengths = {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1])},
+    .bounds = cone_bounds,
+    .flatten = cone_flatten,
+    .primitive_bounds = revolution_bounds,
+    .reach = revolution_reach,
+    .test_flops = 50,
+};

@@ -1,0 +1,129 @@
+// Triangles, alone and in meshes.
+#include "host/compile/shapes.h"
+#include "host/compile/texture_mapping.h"
+
+// a b - c d to 1.5 ulp (Kahan's; Jeannerod, Louvet, Muller, Further analysis of Kahan's algorithm for the
+// accurate computation of 2x2 determinants, Mathematics of Computation 82, 2013).
+static double product_difference(double a, double b, double c, double d)
+{
+    double cd = c * d;
+    return fma(a, b, -cd) + fma(-c, d, cd);
+}
+
+static Vector3 cross_product(Vector3 a, Vector3 b)
+{
+    return (Vector3){product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),
+                     product_difference(a.x, b.y, a.y, b.x)};
+}
+
+static bool has_area(Vector3 a, Vector3 b, Vector3 c)
+{
+    return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
+}
+
+// One without area shrinks to a point, which no ray meets: the kernels rotate vertices, and what was a line
+// could then have an area. One that loses its area in rounding stays: it fills what its neighbors leave open.
+static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
+{
+    if (!has_area(a, b, c)) b = c = a;
+    Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
+            seen_c = point_from_eye(rounding, c);
+    Vector3 ab = vector_subtract(seen_b, seen_a), ac = vector_subtract(seen_c, seen_a);
+    if (rounding->wide) { // the products of floats fit double, those of doubles may not
+        ab = axis_scaled(ab);
+        ac = axis_scaled(ac);
+    }
+    Vector3 normal = vector_rounded(rounding, axis_scaled(cross_product(ab, ac)));
+    return (Triangle){
+        scalar4_of(seen_a, normal.x), scalar4_of(seen_b, normal.y), scalar4_of(seen_c, normal.z), {0}};
+}
+
+// What a triangle's id.y holds; a triangle with a vertex without a normal is flat.
+static uint32_t normals_add(Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
+{
+    if (vector_is_zero(a) || vector_is_zero(b) || vector_is_zero(c)) return 0;
+    TriangleNormals *normals = flattening->compiled->arrays[FLAT_TRIANGLE_NORMALS].items;
+    normals[flattening->normals_count++] =
+        (TriangleNormals){scalar4_of(a, 0), scalar4_of(b, 0), scalar4_of(c, 0)};
+    return (uint32_t)flattening->normals_count;
+}
+
+// What a triangle's id.z holds.
+static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const uint32_t *corners, uint32_t material)
+{
+    uint32_t image = flattening->scene->materials.items[material].image;
+    if (!mesh->uvs || image == 0) return 0;
+    TriangleUvs *uvs = flattening->compiled->arrays[FLAT_TRIANGLE_UVS].items;
+    uvs[flattening->uvs_count++] = triangle_uvs(mesh, corners, &flattening->compiled->textures[image - 1]);
+    return (uint32_t)flattening->uvs_count;
+}
+
+static void triangle_flatten(Flattening *flattening, const Object *object)
+{
+    const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
+    Triangle triangle = triangle_make(&flattening->rounding, vertices[0], vertices[1], vertices[2]);
+    if (object->as.triangle.smooth)
+        triangle.id.y = normals_add(flattening, vector_normalize(normals[0]), vector_normalize(normals[1]),
+                                    vector_normalize(normals[2]));
+    primitive_add(flattening, KIND_TRIANGLES, &triangle, object->material);
+}
+
+static void mesh_flatten(Flattening *flattening, const Object *object)
+{
+    const Mesh *mesh = &flattening->scene->meshes.items[object->as.mesh.index];
+    const Vector3 *vertices = mesh->vertices, *normals = mesh->normals;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        const uint32_t *corners = mesh->triangles[i];
+        const uint32_t material = mesh->materials ? mesh->materials[i] : object->material;
+        Triangle triangle = triangle_make(&flattening->rounding, vertices[corners[0]], vertices[corners[1]],
+                                          vertices[corners[2]]);
+        if (normals)
+            triangle.id.y =
+                normals_add(flattening, normals[corners[0]], normals[corners[1]], normals[corners[2]]);
+        triangle.id.z = uvs_add(flattening, mesh, corners, material);
+        primitive_add(flattening, KIND_TRIANGLES, &triangle, material);
+    }
+}
+
+static bool triangle_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene;
+    const Vector3 *vertices = object->as.triangle.vertices;
+    *bounds = bounds_of_triangle(vertices[0], vertices[1], vertices[2]);
+    return true;
+}
+
+static bool mesh_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+    *bounds = bounds_empty();
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        *bounds = bounds_join(*bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+    return true;
+}
+
+static bool triangle_primitive_bounds(const void *primitive, Bounds *bounds)
+{
+    const Triangle *triangle = primitive;
+    *bounds =
+        bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
+    return true;
+}
+
+const ShapeOps triangle_ops = {
+    .kind = KIND_TRIANGLES,
+    .vectors = {offsetof(Object, as.triangle.vertices[0]), offsetof(Object, as.triangle.vertices[1]),
+                offsetof(Object, as.triangle.vertices[2]), offsetof(Object, as.triangle.normals[0]),
+                offsetof(Object, as.triangle.normals[1]), offsetof(Object, as.triangle.normals[2])},
+    .bounds = triangle_bounds,
+    .flatten = triangle_flatten,
+    .primitive_bounds = triangle_primitive_bounds,
+    .test_flops = 23,
+};
+
+const ShapeOps mesh_ops = {
+    .kind = KIND_TRIANGLES,
+    .bounds = mesh_bounds,
+    .flatten = mesh_flatten,
+    .test_flops = 23,
+};

@@ -1,0 +1,47 @@
+// The stages of scene_compile, in their order. Each reads what earlier ones left in the CompiledScene.
+#pragma once
+
+#include "host/compile/compile.h"
+#include "host/compile/rounding.h"
+
+// limits.c: false with a message where the scene has more primitives than a BVH counts.
+bool size_fits(const Scene *scene, MessageList *messages);
+
+// units.c: scene units per unit of length on the device, a power of two; 1 for most scenes.
+double scene_unit(const Scene *scene, const CompileSettings *settings);
+
+// limits.c: false with a message where the square of a light's distance overflows the precision. The scene is
+// in the device's unit.
+bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                MessageList *messages);
+
+// textures.c: reads the scene's images, makes them linear (display values are sRGB; a scene of display colors
+// takes all values as they are) and halves them level by level: FLAT_TEXTURE_LEVELS, FLAT_TEXELS and
+// `textures`. False with a message, at the place in the scene file, where an image cannot be used.
+bool textures_load(CompiledScene *compiled, const Scene *scene, MessageList *messages);
+
+// objects.c, materials.c, lights.c: the arrays of each shape, FLAT_TRIANGLE_NORMALS, FLAT_TRIANGLE_UVS,
+// FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS.
+void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
+void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
+void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
+
+// limits.c: false with a message where a number overflows the precision.
+bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                 MessageList *messages);
+
+// bvh_flatten.c: builds the BVH (bvh.c), widens it for the kernel's lanes (bvh_widen.c) and fills FLAT_NODES;
+// orders each shape's array as the leaves have it, unbounded shapes last. Without a BVH, one empty node.
+void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
+
+// culling.c: FLAT_CULL_SPHERES, of the BVH and of each primitive outside it; none where they would be more
+// than a million. `wide`: the kernel's precision is double.
+void culling_fill(CompiledScene *compiled, bool wide);
+
+// contact.c: a box around all places where a transparent primitive may touch an opaque one; an empty one
+// where none does. Only hits in it are tested for an opaque surface in the same place
+// (kernels/shading/surface.h).
+Bounds contact_find(const CompiledScene *compiled);
+
+// header.c: FLAT_HEADER.
+void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);

@@ -1,0 +1,15 @@
+// Transforms of scenes whose effect on the image is known.
+#pragma once
+
+#include "host/scene/scene.h"
+
+// Multiplies every length; the image is the same, bit for bit where the factor is a power of two.
+void scene_scale(Scene *scene, double factor);
+// A scaled copy that shares what has no length with the scene, which must outlive it. Free with
+// scene_scaled_free.
+Scene scene_scaled(const Scene *scene, double factor);
+void scene_scaled_free(Scene *scaled);
+// Negates x, which mirrors the image. Neither this nor the next transforms meshes.
+void scene_mirror(Scene *scene);
+// x becomes y, y becomes z, z becomes x; the image changes by rounding only.
+void scene_turn_axes(Scene *scene);

@@ -1,0 +1,27 @@
+#include "host/compile/scene_bounds.h"
+#include "host/compile/stages.h"
+#include <stdlib.h>
+
+static double distance_largest(Vector3 from, Vector3 to)
+{
+    return vector_largest(vector_subtract(to, from));
+}
+
+// In float a torus of 1e12 units, or of 1e-12, is lost, as the third and fourth powers of lengths overflow or
+// underflow; other shapes are at 1e19 and 1e-19. So where the farthest point lies beyond 2^30, or within
+// 2^-30, the unit puts it and the smallest object on the two sides of 1. Powers of two are exact: the image
+// is that of the scene as it is.
+double scene_unit(const Scene *scene, const CompileSettings *settings)
+{
+    const int harmless = 30; // exponents up to there
+    Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    size_t unbounded_count;
+    Bounds bounds = scene_bounds(scene, &unbounded_count);
+    if (settings->precision == PRECISION_DOUBLE || bounds_is_empty(&bounds)) return 1;
+    int farthest, smallest;
+    frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
+    if (abs(farthest) <= harmless) return 1;
+    frexp(scene_smallest_size(scene), &smallest);
+    int middle = (farthest + smallest) / 2;
+    return farthest > 0 && middle < 0 ? 1 : ldexp(1, middle);
+}
