@@ -135,7 +135,7 @@ static void test_figures(void **state)
     assert_null(bench_peak_fraction(&row, &peak).why_not);
     assert_near(bench_peak_fraction(&row, &peak).value, 1500 * 50 / 0.030 / 1e8, 1e-9);
     assert_near(bench_bandwidth_fraction(&row, &peak), 0.1, 1e-9);
-    row.hierarchy = true;
+    row.traverses_bvh = true;
     assert_non_null(bench_peak_fraction(&row, &peak).why_not);
     bench_row_free(&row);
 }
@@ -179,7 +179,7 @@ static void test_baseline(void **state)
     BenchRow row = row_make();
     size_t errors;
     Baseline *baseline =
-        baseline_of("{\"schema\": 2, \"device\": {\"name\": \"d\"}, \"runs\": [" BASELINE_ROW(
+        baseline_of("{\"schema\": 3, \"device\": {\"name\": \"d\"}, \"runs\": [" BASELINE_ROW(
                         "other.yaml", "{\"median\": 1}") "," BASELINE_ROW("scenes/a \\\"b\\\".yaml",
                                                                           "{\"median\": 90}") "]}",
                     &errors);
@@ -205,16 +205,16 @@ static void test_broken_baselines(void **state)
                              "{\"schema\": 1, \"runs\": []}",
                              "{\"runs\": []}",
                              "\"",
-                             "{\"schema\": 2}",
-                             "{\"schema\": 2, \"runs\": 3}"};
+                             "{\"schema\": 3}",
+                             "{\"schema\": 3, \"runs\": 3}"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         size_t errors;
         assert_null(baseline_of(refused[i], &errors));
         assert_int_equal(errors, 1);
     }
     // rows that say nothing are never found
-    const char *empty[] = {"{\"schema\": 2, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
-                           "{\"schema\": 2, \"runs\": [" BASELINE_ROW("scenes/a \\\"b\\\".yaml",
+    const char *empty[] = {"{\"schema\": 3, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
+                           "{\"schema\": 3, \"runs\": [" BASELINE_ROW("scenes/a \\\"b\\\".yaml",
                                                                       "{\"status\": \"unavailable\"}") "]}"};
     for (size_t i = 0; i < 2; i++) {
         size_t errors;

@@ -31,7 +31,7 @@ class Bench(TestCase):
         for figure in *run["build_ms"].values(), run["peak_fraction"], run["bandwidth_fraction"]:
             self.assertFigure(figure)
         self.assertEqual(set(run["build_ms"]), {"cold", "cached"})
-        self.assertEqual(isinstance(run["peak_fraction"], dict), run["hierarchy"])
+        self.assertEqual(isinstance(run["peak_fraction"], dict), run["traverses_bvh"])
         rays = run["rays"]
         self.assertEqual(set(rays), {"camera", "camera_hits", "reflected", "refracted", "shadow"})
         self.assertEqual(rays["camera"], 32 * 24)
@@ -47,7 +47,7 @@ class Bench(TestCase):
         process = self.glint(f"bench sphere.yaml {TRIANGLES} {QUICK} --precision single,double --launches --json")
         self.assertEqual(process.stderr, "")
         report = json.loads(process.stdout)
-        self.assertEqual(report["schema"], 2)
+        self.assertEqual(report["schema"], 3)
         device = report["device"]
         self.assertTrue(device["name"] and device["driver"] and device["type"] and device["units"] > 0, device)
         for key in "gflops_float", "gflops_double", "gigabytes_per_s":
@@ -62,7 +62,7 @@ class Bench(TestCase):
             else:
                 self.assertEqual(run["precision"], "double")
                 self.assertIn("64-bit", run["reason"])
-        self.assertEqual([run["hierarchy"] for run in runs if run["precision"] == "single"], [False, True])
+        self.assertEqual([run["traverses_bvh"] for run in runs if run["precision"] == "single"], [False, True])
         self.assertEqual(len({run["kernel_hash"] for run in runs}), len(runs), "each kernel has a hash of its own")
         for scene in "sphere.yaml", TRIANGLES:
             counts = [run["rays"]["camera_hits"] for run in runs if run["scene"] == scene]

@@ -45,10 +45,10 @@ class Diff(TestCase):
 
     def test_json(self):
         report = self.json("diff plain.ppm spot.ppm --json", status=3)
-        self.assertEqual((report["schema"], report["size"], report["equal"]), (1, [8, 4], False))
+        self.assertEqual((report["schema"], report["size"], report["equal"]), (2, [8, 4], False))
         self.assertEqual((report["srgb8"]["off_by_1"], report["srgb8"]["off_by_2_or_more"]), (0, 3))
         self.assertEqual(set(report["srgb8"]), {"psnr", "off_by_1", "off_by_2_or_more"})
-        self.assertEqual((report["worst"]["x"], report["worst"]["y"], report["worst"]["picture"]), (5, 0, [0, 0, 0]))
+        self.assertEqual((report["worst"]["x"], report["worst"]["y"], report["worst"]["image"]), (5, 0, [0, 0, 0]))
         self.assertGreater(report["flip"]["max"], 0.05)
         self.assertEqual(report["flip"]["pixels_per_degree"], 67)
 

@@ -35,7 +35,7 @@ def expected_metrics(reference, image, is_display):
         "flip": {"mean": (flip_mean, 2e-5), "max": (flip_map.max(), 2e-4)},
         "nonfinite_pixels": {
             "reference": (int((~np.isfinite(reference)).any(axis=2).sum()), 0),
-            "picture": (int((~np.isfinite(image)).any(axis=2).sum()), 0),
+            "image": (int((~np.isfinite(image)).any(axis=2).sum()), 0),
         },
     }
 

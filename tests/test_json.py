@@ -1,12 +1,17 @@
 #!/usr/bin/env -S python3 -B
-"""Each command's JSON has the members that docs/json.md lists, and no others, of the types it says."""
-import itertools
+"""docs/json.md is what tests/json_reference.py makes of each command's JSON, whose members are of the types it says.
+
+--write writes the page.
+"""
 import json
 import re
+import sys
 import unittest
 
+import json_reference
 from glint import PLANET, ROOT, TestCase, main, need_device, read, write
 
+WRITES = "--write" in sys.argv
 RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
 # Scenes of spheres, one point light and reflection, which share their kernels.
 PLAIN = """\
@@ -22,31 +27,8 @@ SMALL = "--size 48x32"
 QUICK = "--lanes 1 --seconds 0.1"
 
 
-def alternatives(name):
-    """a.{b,c} stands for a.b and a.c."""
-    parts = [part[1:-1].split(",") if part.startswith("{") else [part] for part in re.split(r"(\{[^}]*\})", name)]
-    return ["".join(words) for words in itertools.product(*parts)]
-
-
-def listed_members(heading):
-    """From each member's path to the words of its type, and the number of the schema."""
-    document = read(ROOT / "docs/json.md")
-    section = re.search(rf"^## {re.escape(heading)}\n(.*?)(?=^## |\Z)", document, re.M | re.S).group(1)
-    members, schema, prefix = {}, None, ""
-    for line in section.splitlines():
-        if line.startswith("### "):
-            prefix = re.search(r"`(.*)`", line).group(1) + "."
-        if not line.startswith("| `"):
-            continue
-        names, words, meaning = (cell.strip() for cell in line.strip("|").split("|"))
-        names = re.findall(r"`([^`]*)`", names)
-        for name in names:
-            for path in alternatives(names[0] + name if name.startswith(".") else name):
-                assert prefix + path not in members, f"{prefix + path} is listed twice"
-                members[prefix + path] = words
-        if names == ["schema"]:
-            schema = int(meaning)
-    return members, schema
+PAGE = ROOT / "docs/json.md"
+SECTIONS = {}
 
 
 def is_absent_figure(value):
@@ -84,6 +66,16 @@ def is_of_type(value, words):
     return isinstance(value, int) and value >= 0 and bool(re.search("count|integer", words))
 
 
+def in_order(paths):
+    """A member's own members follow it."""
+    ordered = []
+    for path in paths:
+        family = [i for i, other in enumerate(ordered) if other == path.rpartition(".")[0] or
+                  other.startswith(path.rpartition(".")[0] + ".")]
+        ordered.insert(family[-1] + 1 if family else len(ordered), path)
+    return ordered
+
+
 class Json(TestCase):
     def setUp(self):
         super().setUp()
@@ -91,15 +83,17 @@ class Json(TestCase):
         write("strong.yaml", STRONG)
 
     def check_members(self, heading, *reports):
-        """The reports together print every member that is listed under the heading."""
-        listed, schema = listed_members(heading)
-        self.assertEqual({report["schema"] for report in reports}, {schema})
+        """The reports together print the members of the page's section, each of its type."""
+        schema, = {report["schema"] for report in reports}
         printed = [member for report in reports for member in members_of(report)]
-        self.assertEqual({path for path, _ in printed} - set(listed), set(), "printed, not listed")
-        missing = set(listed) - {path for path, _ in printed}
-        self.assertEqual({path for path in missing if path.split(".")[-1] not in RARE}, set(), "listed, not printed")
+        paths = list(dict.fromkeys(path for path, _ in printed if path.split(".")[-1] not in RARE))
         for path, value in printed:
-            self.assertTrue(not listed[path] or is_of_type(value, listed[path]), f"{path} is {value!r}, not {listed[path]}")
+            meaning = json_reference.meaning_of(path)
+            self.assertIsNotNone(meaning, f"{path} has no meaning")
+            self.assertTrue(is_of_type(value, meaning[1]), f"{path} is {value!r}, not {meaning[1]}")
+        SECTIONS[heading] = json_reference.section(heading, schema, in_order(paths))
+        if not WRITES:
+            self.assertIn(SECTIONS[heading], read(PAGE))
 
     def test_render(self):
         self.check_members("glint render --timing=json", self.json(
@@ -145,5 +139,12 @@ class Json(TestCase):
             self.json(f"accuracy planet.yaml {common} --precision single --reference saved/0-planet-reference.color.npy"))
 
 
+def write_page():
+    PAGE.write_text("\n".join([json_reference.INTRODUCTION, *(SECTIONS[heading] for heading in json_reference.NOTES)]))
+
+
 if __name__ == "__main__":
+    if WRITES:
+        sys.argv.remove("--write")
+        unittest.addModuleCleanup(write_page)
     main()

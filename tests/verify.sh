@@ -26,11 +26,11 @@ for lanes in 1 8; do
     report=$scratch/$lanes.json
     check "verify --lanes $lanes" "$GLINT" verify $cases --precision $precision --lanes $lanes --json
     mv "$scratch/check.log" "$report"
-    for member in '"schema": 2' '"oracle_bits": ' '"glint": "' '"platform_version": "' "\"lanes\": $lanes,"; do
+    for member in '"schema": 3' '"reference_bits": ' '"glint": "' '"platform_version": "' "\"lanes\": $lanes,"; do
         check "the JSON has $member" grep -qF "$member" "$report"
     done
     check 'not perturbed, it does not speak of it' test "$(grep -c '"perturb"' "$report")" = 0
-    check 'no case failed' test "$(grep -c '"held": *false' "$report")" = 0
+    check 'no case failed' test "$(grep -c '"passed": *false' "$report")" = 0
     grep '"hash"' "$report" >"$scratch/$lanes.hashes"
     check 'every case has a hash' test "$(wc -l <"$scratch/$lanes.hashes")" = "$(wc -w <<<"$cases")"
 done

@@ -189,7 +189,7 @@ static void results_json(Json *json, const BenchReport *report, const BenchRow *
     figure_json(json, "cached", 1e3, row->build_cached);
     json_end(json);
     rays_json(json, row);
-    json_boolean(json, "hierarchy", row->hierarchy);
+    json_boolean(json, "traverses_bvh", row->traverses_bvh);
     figure_json(json, "peak_fraction", 1, bench_peak_fraction(row, report->peak));
     json_number(json, "bandwidth_fraction", bench_bandwidth_fraction(row, report->peak));
     if (report->baseline) ratio_json(json, row_ratio(report, row), report->tolerance);
@@ -198,7 +198,7 @@ static void results_json(Json *json, const BenchReport *report, const BenchRow *
 void bench_print_json(const BenchReport *report)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 2);
+    json_integer(json, "schema", 3);
     json_text(json, "glint", glint_version());
     report_device_json(json, report);
     json_begin_array(json, "runs");

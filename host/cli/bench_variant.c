@@ -82,7 +82,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
     if (variant->renderer) {
         const RenderReport *report = renderer_report(variant->renderer);
         row->wide = report->wide;
-        row->hierarchy = (report->features & FEATURE_BVH) != 0;
+        row->traverses_bvh = (report->features & FEATURE_BVH) != 0;
         row->flops_per_ray = work_flops_per_ray(variant->scene);
         size_t bytes =
             (size_t)settings->width * settings->height * 3 * (row->wide ? sizeof(double) : sizeof(float));

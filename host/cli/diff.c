@@ -57,9 +57,9 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     const ImageMetrics *metrics = &comparison->metrics;
     const Image *reference = &comparison->reference;
     Json *json = json_open();
-    json_integer(json, "schema", 1);
+    json_integer(json, "schema", 2);
     json_text(json, "reference", options->reference_path);
-    json_text(json, "picture", options->test_path);
+    json_text(json, "image", options->test_path);
     size_json(json, reference->width, reference->height);
     json_integer(json, "channels", reference->channels);
     json_text(json, "kind", reference->display ? "display" : "linear");
@@ -67,7 +67,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_integer(json, "differing_values", (int64_t)metrics->differing_count);
     json_begin_object(json, "nonfinite_pixels");
     json_integer(json, "reference", (int64_t)metrics->nonfinite_reference);
-    json_integer(json, "picture", (int64_t)metrics->nonfinite_test);
+    json_integer(json, "image", (int64_t)metrics->nonfinite_test);
     json_end(json);
     json_begin_object(json, "linear");
     json_integer(json, "values", (int64_t)metrics->linear.count);
@@ -94,7 +94,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_integer(json, "x", metrics->worst_x);
     json_integer(json, "y", metrics->worst_y);
     values_json(json, "reference", worst_values(comparison, reference), reference->channels);
-    values_json(json, "picture", worst_values(comparison, &comparison->test), reference->channels);
+    values_json(json, "image", worst_values(comparison, &comparison->test), reference->channels);
     json_end(json);
     if (options->heatmap_path) {
         json_begin_object(json, "heatmap");

@@ -163,7 +163,7 @@ static void result_add_json(Json *json, const VerifyResult *result, double secon
     json_begin_object(json, NULL);
     json_text(json, "name", result->name);
     json_text(json, "title", result->title);
-    json_boolean(json, "held", verify_holds(result));
+    json_boolean(json, "passed", verify_holds(result));
     json_integer(json, "rays", (int64_t)result->ray_count);
     json_integer(json, "wrong", (int64_t)result->wrong);
     json_integer(json, "leaks", (int64_t)result->leaks);
@@ -231,7 +231,7 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
         json_integer(json, "lanes", prober.lanes);
         hash_json(json, "trace_kernel", prober.trace_kernel);
         hash_json(json, "render_kernel", prober.render_kernel);
-        json_integer(json, "held", (int64_t)report.held);
+        json_integer(json, "passed", (int64_t)report.held);
         json_integer(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
         json_end(json);
@@ -247,9 +247,9 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
 // What the results are of.
 static void origin_add_json(Json *json, const Device *device, const CommonOptions *common)
 {
-    json_integer(json, "schema", 2);
+    json_integer(json, "schema", 3);
     json_text(json, "glint", glint_version());
-    json_integer(json, "oracle_bits", verify_oracle_bits());
+    json_integer(json, "reference_bits", verify_oracle_bits());
     json_begin_object(json, "device");
     device_json(json, device);
     json_end(json);

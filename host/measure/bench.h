@@ -51,7 +51,7 @@ typedef struct {
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
     uint64_t rays[BENCH_RAY_KINDS];
-    bool wide, hierarchy; // computes in double; rays went through a hierarchy
+    bool wide, traverses_bvh; // computes in double; rays traversed a BVH
     double flops_per_ray; // as work.h counts
     double picture_bytes;
 } BenchRow;

@@ -1,0 +1,265 @@
+"""docs/json.md, made of what the commands print and of the meanings below.
+
+A meaning belongs to a member's path, or to the end of it; the longest that fits counts. "type; words", where the words may
+be missing. Types: text, hash, boolean, count (an integer, 0 or more), integer, number, object, figure, or several.
+"""
+import re
+
+INTRODUCTION = """\
+# JSON
+
+What the commands print with `--json`, and `glint render` with `--timing=json`. `tests/test_json.py --write` writes this page from
+the commands' output.
+
+- Standard output has one object and nothing else; messages and progress go to standard error.
+- `schema` is the version of a command's members. It is raised when a member changes its name or meaning or goes; members may be added
+  without that.
+- `a[]` is an element of the array `a`; `a.{b,c}` stands for `a.b` and `a.c`.
+- A *count* is an integer, 0 or more, a *hash* a text of 16 hexadecimal digits. `_ms` are milliseconds, `_bytes` bytes, `_mhz` megahertz.
+  Numbers that are not finite are `null`, such as the PSNR of equal images.
+- A *figure* may be unavailable: an object with `status`, which is `"unavailable"`, and `reason` stands in its place.
+- A member is always there unless its row says when.
+"""
+NOTES = {
+    "glint render --timing=json": "Printed once the image is written.",
+    "glint check": "",
+    "glint devices": "Exit status 1 if there is no device.",
+    "glint diff": "Not printed if the images cannot be compared (exit status 1).",
+    "glint bench": "A row that cannot be measured has only the members up to `size`, `status` and `reason`.",
+    "glint accuracy": "[accuracy.md](accuracy.md) defines the figures. A reference's row ends with `saved`, an unavailable one with "
+                      "`reason`. The HTML report embeds the same object.",
+    "glint verify": "[verify.md](verify.md) lists the cases. Exit status 3 if any failed.",
+}
+MEANINGS = {
+    "schema": "integer",
+    "glint": "text; the program's version",
+    "device": "object; as in `glint devices`",
+    "device.{name,platform,platform_version,driver,type}": "text",
+    "device.{units,clock_mhz}": "count",
+    "perturb": "object; only with `--perturb`",
+    "perturb.{seed,scale}": "integer",
+    "scene": "text; its path",
+    "size": "integer; width and height in pixels",
+    "samples": "integer; per pixel",
+    "precision": "text; `fast`, `single`, `strict` or `double`",
+    "lanes": "integer; 1, 4, 8 or 16 rays per work-item",
+    "bvh": "text; as requested: `auto`, `on` or `off`",
+    "kernel_hash": "hash; of the kernel's text",
+    "parse_ms": "number; reading the scene",
+    "flatten_ms": "number; flattening it to arrays",
+    "upload_ms": "number; copying them to the device",
+    "encode_ms": "number; encoding and writing the files",
+    "bvh_ms": "number or null; building the BVH; null without one",
+    "build_ms": "number; building the kernels or loading them from the cache",
+    "build_from_cache": "boolean; all came from the cache",
+    "{launches[],read_backs[]}": "object; in order",
+    "{launches[],read_backs[]}.name": "text; kernel, or `read-back`",
+    "{launches[],read_backs[]}.event_ms": "number or null or figure; by the device's clock, where it is trusted",
+    "{launches[],read_backs[]}.host_ms": "number; by the host's clock",
+    "{launches[],read_backs[]}.doubt": "text; why the device's clock is not trusted",
+    # check
+    "valid": "boolean; the scene was read and its textures exist; otherwise only the messages follow",
+    "objects": "count; a mesh is one",
+    "shapes": "object; objects per shape",
+    "shapes.*": "count",
+    "mesh_triangles": "count; of all meshes",
+    "unbounded": "count; objects outside `bounds`",
+    "{lights,materials,pixels}": "count",
+    "bounds": "object or null; of all bounded objects; null if there are none",
+    "bounds.{min,max}": "number; x, y, z",
+    "features": "text; kernel features the scene needs (kernels/features.h)",
+    "{warnings[],errors[]}": "object; in order",
+    "{warnings[],errors[]}.file": "text or null",
+    "{warnings[],errors[]}.{line,column}": "count; from 1; 0 if unknown; columns count characters",
+    "{warnings[],errors[]}.text": "text",
+    # devices
+    "{platforms,platforms_without_device}": "count",
+    "devices[]": "object; of all platforms",
+    "devices[].index": "count; for `--device`",
+    "devices[].twin": "count; 0 for the first device of its platform and name",
+    "devices[].default": "boolean; used without `--device`",
+    "devices[].usable": "boolean; kernels can be built and run",
+    "devices[].unusable_because": "text or null",
+    "devices[].{name,vendor,platform,platform_version,version,driver}": "text; from OpenCL",
+    "devices[].type": "text; `cpu`, `gpu`, `accelerator` or `other`",
+    "devices[].units": "count; compute units",
+    "devices[].clock_mhz": "count; the driver's maximum; 0 if unknown",
+    "devices[].lanes": "integer; the default",
+    "devices[].{native_float_width,native_double_width}": "count; of vectors",
+    "devices[].{fp64,denormals,fma}": "boolean; double precision, subnormal numbers, fma in hardware",
+    "devices[].{correctly_rounded_divide_sqrt,compiler}": "boolean",
+    "devices[].{memory_bytes,largest_buffer_bytes,local_memory_bytes}": "count",
+    "devices[].largest_work_group": "count; work-items",
+    "devices[].timer_resolution_seconds": "number; of events",
+    # diff
+    "reference": "text; path",
+    "image": "text; path",
+    "channels": "integer; 3 for colors, 1 for gray",
+    "kind": "text; `display` (PNG, JPEG, PPM) or `linear` (EXR, NPY)",
+    "equal": "boolean; all bits agree",
+    "differing_values": "count; of width x height x channels",
+    "nonfinite_pixels": "object",
+    "nonfinite_pixels.{reference,image}": "count; pixels with a NaN or infinity",
+    "linear": "object; differences in linear light where both are finite",
+    "linear.values": "count; compared",
+    "linear.{max_abs,rmse,p99_9,rel_mse}": "number; relMSE divides each square by that of the reference plus 0.01",
+    "bias": "number; signed mean",
+    "psnr": "number or null; decibels",
+    "srgb8": "object; 8-bit sRGB values, of colors and of gray display values",
+    "srgb8.{off_by_1,off_by_2_or_more}": "count; values",
+    "flip": "object; only with `srgb8`",
+    "flip.{mean,max}": "number; perceived difference, 0 to 1",
+    "flip.pixels_per_degree": "integer",
+    "worst": "object; the largest difference",
+    "worst.{x,y}": "count; from the top left",
+    "worst.{reference,image}": "number or null; the values there, per channel",
+    "heatmap": "object; only with `--heatmap`",
+    "heatmap.file": "text; path",
+    "heatmap.{white,black}": "number; the differences shown white and black",
+    # bench
+    "device.peak": "object; measured",
+    "device.peak.{gflops_float,gflops_double}": "figure; an fma is 2 operations",
+    "device.peak.gigabytes_per_s": "number; read and written",
+    "clock": "text; `event` (the device's) or `host`",
+    "clock_doubt": "text; why the device's clock is not trusted",
+    "runs[]": "object; a row",
+    "status": "text; `unavailable`; only if the row cannot be measured",
+    "reason": "text; why; only if not measured",
+    "frame_ms": "object; from the first command to pixels on the host",
+    "kernel_ms": "object; sum of the launches, by `clock`",
+    "{frame_ms,kernel_ms}.{min,median,max}": "number",
+    "{frame_ms,kernel_ms}.quartile_range": "number; upper less lower quartile",
+    "{frame_ms,kernel_ms}.runs": "count",
+    "runs[].build_ms": "object; each with the first launch",
+    "runs[].build_ms.{cold,cached}": "figure",
+    "rays": "object; per image",
+    "rays.{camera,camera_hits,reflected,refracted,shadow}": "count",
+    "mrays_per_s": "number; 10^6 rays of all kinds per second of the median of `kernel_ms`",
+    "traverses_bvh": "boolean",
+    "peak_fraction": "figure; least arithmetic of the rays over `device.peak`; unavailable with a BVH",
+    "bandwidth_fraction": "number; the same for the image's bytes",
+    "ratio": "figure; new over old; only with `--compare`; unavailable for rows missing in the baseline",
+    "ratio.{frame,kernel}": "number; of medians",
+    "ratio.slower": "boolean; above `--tolerance`",
+    "runs[].launches[]": "object; of the last run; only with `--launches`",
+    # accuracy
+    "scenes[]": "object; in order",
+    "bounces": "count; limit per ray",
+    "scenes[].reference": "object",
+    "scenes[].reference.kind": "text; `render`, or `file` with `--reference`",
+    "scenes[].reference.file": "text; only of a file; otherwise the next five",
+    "{nonfinite,negative}": "count; pixels with such a channel",
+    "saved": "text; prefix of its .npy files; only with `--save`",
+    "edges": "figure; pixels at edges; unavailable for a file",
+    "edges.{silhouette,path}": "count",
+    "edges.shadow": "count; per light",
+    "variants[]": "object; a row",
+    "variants[].status": "text; `measured`, `reference` or `unavailable`",
+    "crossed_out": "boolean",
+    "why": "text; the reasons",
+    "errors": "object",
+    "errors.{object,shadow,path}": "figure; unavailable against a file",
+    "errors.{object,shadow,path}.{edge,away}": "count; pixels (shadow: bits), at edges and away from them",
+    "errors.{shading,t,normal}": "figure; unavailable against a file or without common pixels",
+    "errors.{shading,t,normal}.pixels": "count; compared",
+    "errors.shading.{max,rmse,p99_9}": "number; linear light",
+    "errors.t.{relative,ulps}": "object; relative, and in ulp of the row's precision",
+    "errors.t.{relative,ulps}.{max,p99_9}": "number",
+    "errors.normal.{max,p99_9}": "number; radians",
+    "errors.image": "object; linear light",
+    "errors.image.{rmse,rel_mse,flip_mean,flip_max}": "number",
+    "errors.image.srgb_psnr": "number or null; decibels",
+    "errors.image.{off_by_1,off_by_more}": "count; 8-bit values",
+    "variants[].worst": "object; the pixel with the largest error of each kind, away from edges if there is one",
+    "variants[].worst.{object,shadow,path,shading,t,normal,image}": "object or null",
+    "variants[].worst.*.{x,y}": "count; from the top left",
+    "variants[].worst.*.away": "boolean; from edges",
+    "variants[].worst.shadow.light": "count; index",
+    "variants[].worst.*.error": "number or null; of color; relative for `t`, radians for `normal`",
+    "variants[].worst.*.{reference,variant}": "number or null; ids, shadow bits, path hashes, distances or channel values",
+    "variants[].worst.*.{reference_color,variant_color}": "number or null; linear RGB",
+    "pareto": "object; per kind: no other row is as good and faster",
+    "pareto.*": "boolean; only where available",
+    "picks[]": "object; the fastest row within each budget",
+    "picks[].budget": "number",
+    "picks[].measure": "text; `shading`, or `image` against a file",
+    "picks[].variant": "count or null; index; null if none is within it",
+    "picks[].error": "number or null; only with a row",
+    "picks[].frame_ms": "number; median; only with a row",
+    "picks[].text": "text; as a sentence",
+    # verify
+    "reference_bits": "integer; significand of the exact reference",
+    "precisions[]": "object",
+    "tier": "text; `A`, `B`, `C` or `D`",
+    "{trace_kernel,render_kernel}": "hash; zeros if not needed",
+    "{passed,failed}": "count; cases",
+    "seconds": "number",
+    "cases[]": "object; in order",
+    "cases[].{name,title}": "text",
+    "cases[].passed": "boolean; the counts from `wrong` to `differing` are 0",
+    "cases[].rays": "count; rays and pixels",
+    "wrong": "count; wrong hits, misses or objects, errors beyond their bound",
+    "leaks": "count; misses of closed surfaces",
+    "unsound": "count; not finite, behind the origin, normals not unit",
+    "{off,turned}": "count; points and normals off the surface's by more than their bounds",
+    "differing": "count; answers whose bits must not differ",
+    "{surface_part,normal_part}": "number; the largest errors over their bounds",
+    "cases[].{worst,bound}": "number or null; the error closest to its bound; null without a measure",
+    "unit": "text; of both, if there are any",
+    "hash": "hash; of all answers' bits: equal at `strict` on every device",
+}
+
+
+def alternatives(name):
+    """a.{b,c} stands for a.b and a.c."""
+    if not (group := re.search(r"\{([^}]*)\}", name)):
+        return [name]
+    return [way for word in group[1].split(",") for way in alternatives(name[:group.start()] + word + name[group.end():])]
+
+
+PATTERNS = {way: (name, *(meaning + "; ").split("; ", 1))
+            for name, meaning in MEANINGS.items() for way in alternatives(name)}
+
+
+def meaning_of(path):
+    """The rule, type and words of a member; None if there are none."""
+    parts = path.split(".")
+    for start in range(len(parts)):
+        end = parts[start:]
+        for at in [None, *range(len(end))]:  # a name, then one part left open
+            way = ".".join("*" if i == at else part for i, part in enumerate(end))
+            if way in PATTERNS:
+                return PATTERNS[way]
+    return None
+
+
+def braced(words):
+    return words[0] if len(words) == 1 else "{" + ",".join(words) + "}"
+
+
+def merged(rows):
+    """Rows of one meaning whose paths differ in one part become one row with alternatives."""
+    kept = []
+    for rule, parts, kind, words in rows:
+        for row in kept:
+            differing = [i for i, (a, b) in enumerate(zip(row[1], parts)) if b[0] not in a]
+            if row[0] == rule and len(row[1]) == len(parts) and len(differing) <= 1 and rule != "schema":
+                for i in differing:
+                    row[1][i].extend(parts[i])
+                break
+        else:
+            kept.append((rule, parts, kind, words))
+    return kept
+
+
+def section(heading, schema, paths):
+    """The table of a command's members, in the order printed."""
+    rows = []
+    for path in paths:
+        rule, kind, words = meaning_of(path)
+        if rule == "schema":
+            words = str(schema)
+        rows.append((rule, [[part] for part in path.split(".")], kind, words.removesuffix("; ")))
+    note = NOTES[heading] + "\n\n" if NOTES[heading] else ""
+    table = "".join(f"| `{'.'.join(map(braced, parts))}` | {kind} | {words} |\n" for _, parts, kind, words in merged(rows))
+    return f"## {heading}\n\n{note}| member | type | meaning |\n|---|---|---|\n{table}"
