@@ -42,7 +42,8 @@ void accuracy_variant_name(Text *text, const AccuracyScene *scene, const Accurac
         text_appendf(text, " with %u %s", variant->samples, variant->samples == 1 ? "sample" : "samples");
 }
 
-const char *accuracy_crossed_words(const AccuracyVariant *variant, size_t index)
+// A reason why it is crossed out: `index` counts from 0; NULL after the last.
+static const char *crossed_words(const AccuracyVariant *variant, size_t index)
 {
     static const struct {
         unsigned fault;
@@ -63,7 +64,8 @@ static double frame_ms(const AccuracyVariant *variant)
     return 1e3 * series_summarize(&variant->row->times.frame).median;
 }
 
-void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
+// "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06".
+static void pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
 {
     const AccuracyPick *picked = &scene->picks[pick];
     text_appendf(text, "for an error of at most %g: ", accuracy_budgets[pick]);
@@ -118,7 +120,7 @@ static void crossed_print(const AccuracyVariant *variant, FILE *stream)
     if (variant->crossed_out == 0) return;
     fputs("            crossed out:", stream);
     const char *words;
-    for (size_t i = 0; (words = accuracy_crossed_words(variant, i)); i++)
+    for (size_t i = 0; (words = crossed_words(variant, i)); i++)
         fprintf(stream, "%s %s", i > 0 ? "," : "", words);
     if (variant->crossed_out & (CROSSED_NONFINITE | CROSSED_NEGATIVE))
         fprintf(stream, " (%zu not finite, %zu negative)", variant->errors.nonfinite,
@@ -189,7 +191,7 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
         kernels_print(scene, stream);
         for (size_t k = 0; k < BUDGET_COUNT; k++) {
             Text sentence = {0};
-            accuracy_pick_sentence(&sentence, scene, k);
+            pick_sentence(&sentence, scene, k);
             fprintf(stream, "  %s\n", text_c(&sentence));
             text_free(&sentence);
         }
@@ -352,7 +354,7 @@ static void measured_json(Json *json, const AccuracyVariant *variant)
     json_boolean(json, "crossed_out", variant->crossed_out != 0);
     json_begin_array(json, "why");
     const char *words;
-    for (size_t i = 0; (words = accuracy_crossed_words(variant, i)); i++)
+    for (size_t i = 0; (words = crossed_words(variant, i)); i++)
         json_text(json, NULL, words);
     json_end(json);
     errors_json(json, &variant->errors);
@@ -408,7 +410,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
         json_number(json, "frame_ms", frame_ms(variant));
     }
     Text sentence = {0};
-    accuracy_pick_sentence(&sentence, scene, index);
+    pick_sentence(&sentence, scene, index);
     json_text(json, "text", text_c(&sentence));
     text_free(&sentence);
     json_end(json);

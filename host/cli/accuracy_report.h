@@ -24,7 +24,3 @@ void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scen
 // The variant's precision, and those of lanes, BVH choice and samples that distinguish it from others of its
 // scene.
 void accuracy_variant_name(Text *text, const AccuracyScene *scene, const AccuracyVariant *variant);
-// A reason why it is crossed out: `index` counts from 0; NULL after the last.
-const char *accuracy_crossed_words(const AccuracyVariant *variant, size_t index);
-// "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06".
-void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick);
