@@ -94,22 +94,16 @@ static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t
     return traced;
 }
 
-typedef struct {
-    float *next;
-    size_t row_length;
-} ProbeFilm;
-
-static inline bool probe_keep_band(void *context, const Band *band, double fraction_done)
+static inline bool probe_keep_band(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
-    ProbeFilm *film = context;
-    size_t count = band->row_count * film->row_length;
-    memcpy(film->next, band->colors, count * sizeof *film->next);
-    film->next += count;
+    float *colors = context;
+    memcpy(colors + 3 * (size_t)band->first_row * band->width, band->color,
+           film_layer_size(band, LAYER_COLOR));
     return true;
 }
 
-// The whole picture, one sample a pixel, as glint renders it: built for what the scene needs, seen from the
+// The whole image, one sample per pixel, as glint renders it: built for what the scene needs, seen from the
 // eye.
 static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t height, Precision precision,
                                 float *colors)
@@ -123,9 +117,7 @@ static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t hei
                                      .shift_to_eye = true};
     Renderer *renderer = probe_renderer(scene, &settings);
     if (renderer == NULL) return false;
-    ProbeFilm film = {.row_length = 3 * (size_t)width};
-    film.next = colors;
-    bool whole = renderer_render(renderer, 0, probe_keep_band, &film);
+    bool whole = renderer_render(renderer, 0, probe_keep_band, colors);
     renderer_close(renderer);
     return whole;
 }

@@ -1,5 +1,6 @@
 // The errors of pictures made by hand, in which the count of each kind is known, and what follows from errors
 // and times. tests/test_accuracy.py checks the same figures of rendered images against an independent implementation.
+#include "host/base/memory.h"
 #include "host/measure/accuracy.h"
 
 #include <float.h>
@@ -18,13 +19,6 @@ static void assert_near(double value, double expected, double tolerance)
     if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g", value, expected);
 }
 
-static void *array_of(size_t count, size_t size)
-{
-    void *array = calloc(count, size);
-    assert_non_null(array);
-    return array;
-}
-
 static size_t at(size_t x, size_t y)
 {
     return y * WIDTH + x;
@@ -32,34 +26,24 @@ static size_t at(size_t x, size_t y)
 
 // Object 0 in the left half, 1 in the right one, nothing from column NOTHING_FROM on; the lower half lies in
 // the shadow of light 0. Gray 0.5, 8 away, seen along z.
-static PictureLayers layers_make(void)
+static Film film_make(void)
 {
-    PictureLayers layers = {
-        .width = WIDTH,
-        .height = HEIGHT,
-        .light_count = LIGHTS,
-        .color = array_of(PIXELS, 3 * sizeof(double)),
-        .t = array_of(PIXELS, sizeof(double)),
-        .normal = array_of(PIXELS, 3 * sizeof(double)),
-        .object = array_of(PIXELS, sizeof(uint32_t)),
-        .shadow = array_of(PIXELS, LIGHTS * sizeof(uint32_t)),
-        .path = array_of(PIXELS, sizeof(uint32_t)),
-    };
+    Film film = film_allocate(WIDTH, HEIGHT, LIGHTS, ACCURACY_AOVS);
     for (size_t i = 0; i < PIXELS; i++) {
         size_t x = i % WIDTH, y = i / WIDTH;
         bool nothing = x >= NOTHING_FROM;
         for (size_t k = 0; k < 3; k++)
-            layers.color[3 * i + k] = 0.5;
-        layers.t[i] = nothing ? (double)INFINITY : 8;
-        layers.normal[3 * i + 2] = nothing ? 0 : 1;
-        layers.object[i] = nothing ? UINT32_MAX : x < WIDTH / 2 ? 0 : 1;
-        layers.shadow[LIGHTS * i] = y >= HEIGHT / 2 && !nothing;
-        layers.path[i] = layers.object[i] + 77;
+            film.color[3 * i + k] = 0.5;
+        film.t[i] = nothing ? (double)INFINITY : 8;
+        film.normal[3 * i + 2] = nothing ? 0 : 1;
+        film.object[i] = nothing ? UINT32_MAX : x < WIDTH / 2 ? 0 : 1;
+        film.shadow[LIGHTS * i] = y >= HEIGHT / 2 && !nothing;
+        film.path[i] = film.object[i] + 77;
     }
-    return layers;
+    return film;
 }
 
-static AccuracyErrors compare(const PictureLayers *reference, const PictureLayers *variant)
+static AccuracyErrors compare(const Film *reference, const Film *variant)
 {
     AccuracyEdges edges;
     AccuracyErrors errors;
@@ -72,9 +56,9 @@ static AccuracyErrors compare(const PictureLayers *reference, const PictureLayer
 static void test_edges(void **state)
 {
     (void)state;
-    PictureLayers layers = layers_make();
+    Film film = film_make();
     AccuracyEdges edges;
-    accuracy_edges_find(&edges, &layers);
+    accuracy_edges_find(&edges, &film);
     // columns 4 to 7 and 8 to 11
     assert_int_equal(edges.silhouette_pixels, 8 * HEIGHT);
     assert_int_equal(edges.path_pixels, 8 * HEIGHT);
@@ -90,19 +74,19 @@ static void test_edges(void **state)
     accuracy_edges_free(&edges);
 
     // a lone pixel in a corner: itself and its two neighbors differ, and what is around these three
-    memset(layers.object, 0, PIXELS * sizeof *layers.object);
-    layers.object[0] = 5;
-    accuracy_edges_find(&edges, &layers);
+    memset(film.object, 0, PIXELS * sizeof *film.object);
+    film.object[0] = 5;
+    accuracy_edges_find(&edges, &film);
     assert_int_equal(edges.silhouette_pixels, 8);
     assert_true(edges.silhouette[at(2, 1)] && edges.silhouette[at(1, 2)] && !edges.silhouette[at(2, 2)]);
     accuracy_edges_free(&edges);
-    layers_free(&layers);
+    film_free(&film);
 }
 
 static void test_equal(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(accuracy_faults(&errors), 0);
     assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT);
@@ -112,14 +96,14 @@ static void test_equal(void **state)
     assert_true(errors.t_relative.largest == 0 && errors.normal.largest == 0);
     for (size_t kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
         assert_false(errors.worst[kind].found);
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_wrong_objects(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     variant.object[at(5, 0)] = 1;
     variant.object[at(7, 6)] = UINT32_MAX;
     variant.color[3 * at(5, 0)] = 0.9;
@@ -149,14 +133,14 @@ static void test_wrong_objects(void **state)
     assert_int_equal(accuracy_faults(&errors), CROSSED_OBJECT);
     assert_true(worst->x == 1 && worst->y == 1 && worst->away && worst->variant == (double)UINT32_MAX);
     assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_wrong_shadows(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     variant.shadow[LIGHTS * at(0, 3)] = 1; // at light 0's edge
     variant.color[3 * at(0, 3)] = 0;
     AccuracyErrors errors = compare(&reference, &variant);
@@ -175,14 +159,14 @@ static void test_wrong_shadows(void **state)
     assert_int_equal(accuracy_faults(&errors), CROSSED_SHADOW);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];
     assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_wrong_paths(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     variant.path[at(6, 1)] = 1;
     variant.path[at(1, 1)] = 2;
     variant.path[at(2, 1)] = 2;
@@ -193,14 +177,14 @@ static void test_wrong_paths(void **state)
     assert_int_equal(accuracy_faults(&errors), 0);
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 3);
     assert_true(errors.shading.largest == 0 && errors.worst[ACCURACY_PATH].x == 2);
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_shading(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     variant.color[3 * at(0, 0)] += 0.25;
     variant.color[3 * at(3, 4) + 2] -= 0.125;
     variant.color[3 * at(11, 4)] += 0.375; // the background is no shading
@@ -215,14 +199,14 @@ static void test_shading(void **state)
     assert_true(worst[ACCURACY_SHADING].x == 0 && worst[ACCURACY_SHADING].variant == 0.75);
     assert_true(worst[ACCURACY_IMAGE].x == 11 && worst[ACCURACY_IMAGE].y == 4);
     assert_int_equal(errors.display.off_by_more, 3);
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_distances_and_normals(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     variant.t[at(2, 2)] = 8 + 3 * 8 * (double)FLT_EPSILON;
     // 10 degrees about y, and a tiny angle that the cosine cannot show
     const double angle = acos(-1) / 18, tiny = 1e-12;
@@ -246,14 +230,14 @@ static void test_distances_and_normals(void **state)
     normal[0] = (double)NAN;
     errors = compare(&reference, &variant);
     assert_true(isinf(errors.t_relative.largest) && isinf(errors.normal.largest));
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_unsound_pixels(void **state)
 {
     (void)state;
-    PictureLayers reference = layers_make(), variant = layers_make();
+    Film reference = film_make(), variant = film_make();
     variant.color[3 * at(3, 3)] = (double)NAN;
     variant.color[3 * at(3, 3) + 1] = -1; // counts for both
     variant.color[3 * at(4, 3) + 2] = -(double)INFINITY;
@@ -265,15 +249,15 @@ static void test_unsound_pixels(void **state)
     assert_int_equal(errors.image.count, 3 * PIXELS - 2);
     assert_true(isfinite(errors.image.rmse) && isfinite(errors.display.flip_mean));
     assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);
-    layers_free(&reference);
-    layers_free(&variant);
+    film_free(&reference);
+    film_free(&variant);
 }
 
 static void test_colors_only(void **state)
 {
     (void)state;
-    PictureLayers variant = layers_make(), source = layers_make();
-    PictureLayers reference = {.width = WIDTH, .height = HEIGHT, .color = source.color};
+    Film variant = film_make(), source = film_make();
+    Film reference = {.width = WIDTH, .height = HEIGHT, .color = source.color};
     variant.color[3 * at(3, 3)] = 0.75;
     AccuracyVariant compared = {.errors = compare(&reference, &variant)};
     assert_non_null(compared.errors.why_colors_only);
@@ -281,8 +265,8 @@ static void test_colors_only(void **state)
     assert_non_null(accuracy_figure(&compared, ACCURACY_SHADING).why_not);
     assert_near(accuracy_figure(&compared, ACCURACY_IMAGE).value, 0.25 / sqrt(3.0 * PIXELS), 1e-16);
     assert_null(accuracy_figure(&compared, ACCURACY_FLIP).why_not);
-    layers_free(&source);
-    layers_free(&variant);
+    film_free(&source);
+    film_free(&variant);
 }
 
 enum { VARIANTS = 5 };
@@ -296,7 +280,7 @@ static void test_judgement(void **state)
         size_t leaks;
     } given[VARIANTS] = {{1, 1e-5, 3}, {2, 1e-3, 0}, {3, 1e-5, 0}, {4, 1e-4, 0}, {9, 0, 0}};
     BenchRow rows[VARIANTS] = {0};
-    AccuracyScene scene = {.variants = array_of(VARIANTS, sizeof(AccuracyVariant)),
+    AccuracyScene scene = {.variants = memory_allocate_zeroed(VARIANTS, sizeof(AccuracyVariant)),
                            .variant_count = VARIANTS};
     for (size_t i = 0; i < VARIANTS; i++) {
         series_add(&rows[i].times.frame, given[i].seconds);

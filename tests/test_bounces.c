@@ -1,5 +1,5 @@
 // Reflection, refraction, total reflection and light through glass: small pictures against the reference.
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"
 #include "tests/scene_reading.h"
@@ -154,13 +154,13 @@ static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Tri
 static void compare(const Trial *trial, const Scene *scene, const Color *expected, Precision precision)
 {
     if (!probe_has(precision)) return;
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, precision);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
     settings.bounce_count = trial->bounce_count;
-    Frame frame = frame_render(&probe_compute, scene, &settings, 0);
+    Film film = film_render(&probe_compute, scene, &settings, 0);
     const double u = unit_roundoff(precision);
     size_t wrong = 0, open = 0;
     for (unsigned i = 0; i < WIDTH * HEIGHT; i++) {
-        Color seen = {frame.colors[3 * i], frame.colors[3 * i + 1], frame.colors[3 * i + 2]};
+        Color seen = {film.color[3 * i], film.color[3 * i + 1], film.color[3 * i + 2]};
         double error = largest_difference(seen, expected[i]);
         if (error <= PLAIN_ERROR * u) continue;
         ReferenceRay ray = reference_camera_ray(&scene->camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
@@ -174,7 +174,7 @@ static void compare(const Trial *trial, const Scene *scene, const Color *expecte
                 trial->name, precision_names[precision], i % WIDTH, i / WIDTH, error, excuse, seen.x, seen.y,
                 seen.z, expected[i].x, expected[i].y, expected[i].z);
     }
-    frame_free(&frame);
+    film_free(&film);
     assert_int_equal(wrong, 0);
     assert_true(open < OPEN_AT_MOST);
 }

@@ -2,7 +2,7 @@
 // behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
 #include "host/base/array.h"
 #include "host/compile/transform.h"
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/specimen.h"
 #include <math.h>
@@ -23,7 +23,7 @@ enum {
 typedef struct {
     const Scene *scene;
     RenderSettings settings;
-    Frame frame;
+    Film film;
     const char *name;
 } Case;
 
@@ -106,34 +106,34 @@ static Scene random_scene(uint64_t seed)
     return scene;
 }
 
-static Frame picture(const Scene *scene, const RenderSettings *settings)
+static Film picture(const Scene *scene, const RenderSettings *settings)
 {
-    return frame_render(&probe_compute, scene, settings, AOVS);
+    return film_render(&probe_compute, scene, settings, AOVS);
 }
 
 // Of kernels for which those of what lies behind the picture are not worth their building.
-static Frame picture_alone(const Scene *scene, const RenderSettings *settings)
+static Film picture_alone(const Scene *scene, const RenderSettings *settings)
 {
-    return frame_render(&probe_compute, scene, settings, 0);
+    return film_render(&probe_compute, scene, settings, 0);
 }
 
-static void same_and_freed(const Case *c, Frame *frame, const char *what)
+static void same_and_freed(const Case *c, Film *film, const char *what)
 {
     char name[96];
     snprintf(name, sizeof name, "%s, %s", c->name, what);
-    frame_assert_same(frame, &c->frame, name);
-    frame_free(frame);
+    film_assert_same(film, &c->film, name);
+    film_free(film);
 }
 
-static size_t objects_seen(const Frame *frame)
+static size_t objects_seen(const Film *film)
 {
     bool seen[OBJECTS] = {false};
     size_t count = 0;
-    for (size_t i = 0; i < (size_t)frame->width * frame->height; i++) {
-        if (frame->object[i] == UINT32_MAX) continue;
-        assert_true(frame->object[i] < OBJECTS);
-        count += !seen[frame->object[i]];
-        seen[frame->object[i]] = true;
+    for (size_t i = 0; i < (size_t)film->width * film->height; i++) {
+        if (film->object[i] == UINT32_MAX) continue;
+        assert_true(film->object[i] < OBJECTS);
+        count += !seen[film->object[i]];
+        seen[film->object[i]] = true;
     }
     return count;
 }
@@ -141,14 +141,14 @@ static size_t objects_seen(const Frame *frame)
 static void runs_bands_and_hierarchy_change_nothing(const Case *c)
 {
     RenderSettings settings = c->settings;
-    Frame again = picture(c->scene, &settings);
+    Film again = picture(c->scene, &settings);
     same_and_freed(c, &again, "again");
     settings.band_rows = 5;
-    Frame bands = picture(c->scene, &settings);
+    Film bands = picture(c->scene, &settings);
     same_and_freed(c, &bands, "bands of 5 rows");
     settings = c->settings;
     settings.bvh = BVH_OFF;
-    Frame listed = picture_alone(c->scene, &settings);
+    Film listed = picture_alone(c->scene, &settings);
     same_and_freed(c, &listed, "without a hierarchy");
 }
 
@@ -162,8 +162,8 @@ static void lanes_change_nothing(const Case *c)
         if (settings.precision != PRECISION_SINGLE && settings.lanes > 1) break;
         char what[32];
         snprintf(what, sizeof what, "%u lanes", settings.lanes);
-        Frame frame = picture_alone(c->scene, &settings);
-        same_and_freed(c, &frame, what);
+        Film film = picture_alone(c->scene, &settings);
+        same_and_freed(c, &film, what);
     }
 }
 
@@ -173,15 +173,15 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         Scene scene = random_scene(seed);
         scene_scale(&scene, ldexp(1, exponents[i]));
-        Frame frame = picture(&scene, &c->settings);
+        Film film = picture(&scene, &c->settings);
         for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++) {
-            frame.t[k] = ldexp(frame.t[k], -exponents[i]);
+            film.t[k] = ldexp(film.t[k], -exponents[i]);
             for (size_t axis = 0; axis < 3; axis++)
-                frame.position[3 * k + axis] = ldexp(frame.position[3 * k + axis], -exponents[i]);
+                film.position[3 * k + axis] = ldexp(film.position[3 * k + axis], -exponents[i]);
         }
         char what[32];
         snprintf(what, sizeof what, "scaled by 2^%d", exponents[i]);
-        same_and_freed(c, &frame, what);
+        same_and_freed(c, &film, what);
         scene_free(&scene);
     }
 }
@@ -215,19 +215,19 @@ static void mirror_flips_the_picture(const Case *checkered, uint64_t seed)
     Scene given = unchecked_scene(seed), scene = unchecked_scene(seed);
     scene_mirror(&scene);
     Case c = *checkered;
-    c.frame = picture(&given, &c.settings);
-    Frame frame = picture(&scene, &c.settings);
-    double *vectors[] = {frame.colors, frame.normal, frame.position, frame.ray};
+    c.film = picture(&given, &c.settings);
+    Film film = picture(&scene, &c.settings);
+    double *vectors[] = {film.color, film.normal, film.position, film.ray};
     for (size_t i = 0; i < 4; i++) {
         columns_flip(vectors[i], 3 * sizeof(double));
         for (size_t k = 0; k < (size_t)WIDTH * HEIGHT && i > 0; k++)
             vectors[i][3 * k] = -vectors[i][3 * k];
     }
-    columns_flip(frame.t, sizeof *frame.t);
-    columns_flip(frame.object, sizeof *frame.object);
-    columns_flip(frame.shadow, frame.light_count * sizeof *frame.shadow);
-    same_and_freed(&c, &frame, "mirrored");
-    frame_free(&c.frame);
+    columns_flip(film.t, sizeof *film.t);
+    columns_flip(film.object, sizeof *film.object);
+    columns_flip(film.shadow, film.light_count * sizeof *film.shadow);
+    same_and_freed(&c, &film, "mirrored");
+    film_free(&c.film);
     scene_free(&scene);
     scene_free(&given);
 }
@@ -248,10 +248,10 @@ static void order_changes_ids_alone(const Case *c, uint64_t seed)
         }
         for (size_t i = 0; i < OBJECTS; i++)
             scene.objects.items[i] = given.objects.items[from[i]];
-        Frame frame = picture(&scene, &c->settings);
+        Film film = picture(&scene, &c->settings);
         for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++)
-            if (frame.object[i] != UINT32_MAX) frame.object[i] = from[frame.object[i]];
-        same_and_freed(c, &frame, permutation == 0 ? "objects in reverse" : "objects shuffled");
+            if (film.object[i] != UINT32_MAX) film.object[i] = from[film.object[i]];
+        same_and_freed(c, &film, permutation == 0 ? "objects in reverse" : "objects shuffled");
         scene_free(&scene);
         scene_free(&given);
     }
@@ -264,13 +264,13 @@ static void precision_holds(Precision precision)
         Scene scene = random_scene(seed);
         char name[48];
         snprintf(name, sizeof name, "%s, seed %u", precision_names[precision], (unsigned)seed);
-        Case c = {.scene = &scene, .settings = frame_settings(WIDTH, HEIGHT, precision), .name = name};
+        Case c = {.scene = &scene, .settings = film_settings(WIDTH, HEIGHT, precision), .name = name};
         c.settings.bvh = BVH_ON;
         c.settings.extra_features = features_of(&scene); // also where a changed scene needs fewer
         assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_IMAGES, FEATURE_ALL);
-        c.frame = picture(&scene, &c.settings);
-        assert_int_equal(frame_count_faulty(&c.frame), 0);
-        assert_true(objects_seen(&c.frame) >= OBJECTS / 3);
+        c.film = picture(&scene, &c.settings);
+        assert_int_equal(film_count_faulty(&c.film), 0);
+        assert_true(objects_seen(&c.film) >= OBJECTS / 3);
 
         runs_bands_and_hierarchy_change_nothing(&c);
         // the compiler rearranges relaxed arithmetic for each width anew
@@ -278,7 +278,7 @@ static void precision_holds(Precision precision)
         scale_changes_lengths_alone(&c, seed);
         mirror_flips_the_picture(&c, seed);
         order_changes_ids_alone(&c, seed);
-        frame_free(&c.frame);
+        film_free(&c.film);
         scene_free(&scene);
     }
 }

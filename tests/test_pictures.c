@@ -3,7 +3,7 @@
 #include "host/base/text.h"
 #include "host/compile/camera_basis.h"
 #include "host/import/load.h"
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <float.h>
@@ -34,13 +34,13 @@ static char place[160];
         if (!(condition)) fail_msg("%s: not so: %s (line %d)", place, #condition, __LINE__);                 \
     } while (0)
 
-static Frame render(const Scene *scene, uint32_t width, uint32_t height, Precision precision, unsigned aovs)
+static Film render(const Scene *scene, uint32_t width, uint32_t height, Precision precision, unsigned aovs)
 {
-    RenderSettings settings = frame_settings(width, height, precision);
+    RenderSettings settings = film_settings(width, height, precision);
     settings.extra_features = FEATURE_ALL; // one build for all of this file's scenes
-    Frame frame = frame_render(&probe_compute, scene, &settings, aovs);
-    check(frame_count_faulty(&frame) == 0);
-    return frame;
+    Film film = film_render(&probe_compute, scene, &settings, aovs);
+    check(film_count_faulty(&film) == 0);
+    return film;
 }
 
 // Runs a check at every precision the device has.
@@ -59,9 +59,9 @@ static bool near(double value, double expected, double tolerance)
 }
 
 // The world's place behind a pixel.
-static Vector3 frame_place(const Frame *frame, const Scene *scene, size_t pixel)
+static Vector3 film_place(const Film *film, const Scene *scene, size_t pixel)
 {
-    const double *p = frame->position + 3 * pixel;
+    const double *p = film->position + 3 * pixel;
     return vector_add((Vector3){p[0], p[1], p[2]}, scene->camera.position);
 }
 
@@ -73,23 +73,23 @@ static void background_and_ambient_at(Precision precision)
                  "background: [0.125, 0.25, 2]\nambient: [0.5, 0.25, 1]\n"
                  "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {color: [0.5, 1, 0.25], "
                  "ambient: 0.75}}}]\n");
-    Frame frame = render(&scene, 31, 31, precision, AOV_OBJECT | AOV_T);
+    Film film = render(&scene, 31, 31, precision, AOV_OBJECT | AOV_T);
     size_t seen = 0;
     for (size_t i = 0; i < (size_t)31 * 31; i++) {
-        const double *color = frame.colors + 3 * i;
-        if (frame.object[i] == UINT32_MAX) {
-            check(isinf(frame.t[i]));
+        const double *color = film.color + 3 * i;
+        if (film.object[i] == UINT32_MAX) {
+            check(isinf(film.t[i]));
             check(color[0] == 0.125 && color[1] == 0.25 && color[2] == 2);
         } else {
             seen++;
-            check(frame.object[i] == 0);
+            check(film.object[i] == 0);
             check(color[0] == 0.5 * 0.75 * 0.5 && color[1] == 0.25 * 0.75 && color[2] == 0.75 * 0.25);
         }
     }
     // the sphere's outline has the half-angle asin(1/4): a circle of radius 15.5 tan(asin(1/4)) pixels
     double radius = 15.5 * 0.25 / sqrt(15.0 / 16);
     check(near((double)seen, M_PI * radius * radius, 4));
-    frame_free(&frame);
+    film_free(&film);
     scene_free(&scene);
 }
 
@@ -107,27 +107,27 @@ static void light_above_plane_at(Precision precision)
                  "lights: [{point: {position: [0, 4, 0], color: [1, 0.5, 0.25], intensity: 0.5}}]\n"
                  "objects: [{plane: {point: [0, 0, 0], normal: [0, 3, 0], material: {color: [0.5, 1, 0.5], "
                  "diffuse: [0.5, 0.25, 1]}}}]\n");
-    Frame frame = render(&scene, 33, 33, precision, AOV_POSITION);
+    Film film = render(&scene, 33, 33, precision, AOV_POSITION);
     double tolerance = precision == PRECISION_FAST ? 1e-5 : precision == PRECISION_DOUBLE ? 1e-14 : 3e-7;
     for (size_t i = 0; i < (size_t)33 * 33; i++) {
-        Vector3 p = frame_place(&frame, &scene, i);
+        Vector3 p = film_place(&film, &scene, i);
         // one pixel spans 4/33 on the plane
         check(near(fabs(p.x), fabs((double)(i % 33) - 16) * 4 / 33, 1e-5));
         check(near(p.y, 0, 1e-6));
         double facing = 4 / sqrt(16 + p.x * p.x + p.z * p.z);
-        check(near(frame.colors[3 * i], 0.125 * facing, tolerance));
-        check(near(frame.colors[3 * i + 1], 0.0625 * facing, tolerance));
-        check(near(frame.colors[3 * i + 2], 0.0625 * facing, tolerance));
+        check(near(film.color[3 * i], 0.125 * facing, tolerance));
+        check(near(film.color[3 * i + 1], 0.0625 * facing, tolerance));
+        check(near(film.color[3 * i + 2], 0.0625 * facing, tolerance));
     }
     size_t middle = 16 * 33 + 16;
-    if (precision != PRECISION_FAST) check(frame.colors[3 * middle] == 0.125);
-    frame_free(&frame);
+    if (precision != PRECISION_FAST) check(film.color[3 * middle] == 0.125);
+    film_free(&film);
 
     scene.materials.items[scene.objects.items[0].material].specular = 0.75;
-    Frame shiny = render(&scene, 33, 33, precision, 0);
-    check(near(shiny.colors[3 * middle], 0.125 + 0.5 * 0.75, tolerance));
-    check(near(shiny.colors[3 * middle + 1], 0.0625 + 0.25 * 0.75, tolerance));
-    frame_free(&shiny);
+    Film shiny = render(&scene, 33, 33, precision, 0);
+    check(near(shiny.color[3 * middle], 0.125 + 0.5 * 0.75, tolerance));
+    check(near(shiny.color[3 * middle + 1], 0.0625 + 0.25 * 0.75, tolerance));
+    film_free(&shiny);
     scene_free(&scene);
 }
 
@@ -145,15 +145,15 @@ static void contact_shadow_at(Precision precision)
                            "lights: [{point: {position: [0, 10, 0]}}]\n"
                            "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                            "  - sphere: {center: [0, 1, 0], radius: 1}\n");
-    Frame frame = render(&scene, 480, 360, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW);
+    Film film = render(&scene, 480, 360, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW);
     const double edge = 10 / sqrt(80.0);
     size_t dark = 0, bright = 0;
     for (size_t i = 0; i < (size_t)480 * 360; i++) {
-        if (frame.object[i] == UINT32_MAX) continue;
-        Vector3 p = frame_place(&frame, &scene, i);
-        bool lit = frame.shadow[i] == 0;
-        check(lit == (frame.colors[3 * i] > 0));
-        if (frame.object[i] == 0) {
+        if (film.object[i] == UINT32_MAX) continue;
+        Vector3 p = film_place(&film, &scene, i);
+        bool lit = film.shadow[i] == 0;
+        check(lit == (film.color[3 * i] > 0));
+        if (film.object[i] == 0) {
             double distance = hypot(p.x, p.z);
             if (distance < edge * (1 - 1e-5)) check(!lit);
             if (distance > edge * (1 + 1e-5)) check(lit);
@@ -165,7 +165,7 @@ static void contact_shadow_at(Precision precision)
         *(lit ? &bright : &dark) += 1;
     }
     check(dark > 1000 && bright > 10000);
-    frame_free(&frame);
+    film_free(&film);
     scene_free(&scene);
 }
 
@@ -185,24 +185,24 @@ static void spot_cone_at(Precision precision)
                  "objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}}]\n");
     const double outer = 5 * tan(M_PI / 6), inner = 5 * tan(M_PI / 9);
     const double versine_outer = 1 - cos(M_PI / 6), versine_inner = 1 - cos(M_PI / 9);
-    Frame soft = render(&scene, 160, 160, precision, AOV_POSITION);
+    Film soft = render(&scene, 160, 160, precision, AOV_POSITION);
     scene.lights.items[0].penumbra = 0;
-    Frame hard = render(&scene, 160, 160, precision, AOV_POSITION);
+    Film hard = render(&scene, 160, 160, precision, AOV_POSITION);
     size_t between = 0;
     for (size_t i = 0; i < (size_t)160 * 160; i++) {
-        Vector3 p = frame_place(&soft, &scene, i);
+        Vector3 p = film_place(&soft, &scene, i);
         double distance = hypot(p.x, p.z), facing = 5 / hypot(5, distance);
         double x = (versine_outer - (1 - facing)) / (versine_outer - versine_inner);
         double strength = x <= 0 ? 0 : x >= 1 ? 1 : x * x * (3 - 2 * x);
-        check(near(soft.colors[3 * i], facing * strength, 2e-5));
-        if (distance < inner * (1 - 1e-5)) check(near(soft.colors[3 * i], facing, 1e-5));
-        if (distance < outer * (1 - 1e-5)) check(near(hard.colors[3 * i], facing, 1e-5));
-        if (distance > outer * (1 + 1e-5)) check(soft.colors[3 * i] == 0 && hard.colors[3 * i] == 0);
+        check(near(soft.color[3 * i], facing * strength, 2e-5));
+        if (distance < inner * (1 - 1e-5)) check(near(soft.color[3 * i], facing, 1e-5));
+        if (distance < outer * (1 - 1e-5)) check(near(hard.color[3 * i], facing, 1e-5));
+        if (distance > outer * (1 + 1e-5)) check(soft.color[3 * i] == 0 && hard.color[3 * i] == 0);
         between += strength > 0 && strength < 1;
     }
     check(between > 1000);
-    frame_free(&soft);
-    frame_free(&hard);
+    film_free(&soft);
+    film_free(&hard);
     scene_free(&scene);
 }
 
@@ -212,10 +212,10 @@ static void spot_cone(void **state)
     at_each_precision(spot_cone_at);
 }
 
-// What Phong's term is at the surface that the frame says lies behind a pixel.
-static long double highlight_of(const Frame *frame, const Scene *scene, size_t pixel, double shininess)
+// What Phong's term is at the surface that the film says lies behind a pixel.
+static long double highlight_of(const Film *film, const Scene *scene, size_t pixel, double shininess)
 {
-    const double *p = frame->position + 3 * pixel, *n = frame->normal + 3 * pixel;
+    const double *p = film->position + 3 * pixel, *n = film->normal + 3 * pixel;
     Vector3 eye = scene->camera.position, light = scene->lights.items[0].position;
     long double to_light[3] = {light.x - eye.x - p[0], light.y - eye.y - p[1], light.z - eye.z - p[2]};
     long double to_eye[3] = {-p[0], -p[1], -p[2]};
@@ -258,19 +258,19 @@ static void highlight_at(Precision precision)
                            : precision == PRECISION_STRICT                        ? 1e-4
                            : precision == PRECISION_SINGLE && exponents[e] <= 1e4 ? 2e-3
                                                                                   : 2;
-        Frame frame = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
+        Film film = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
         double brightest = 0;
         for (size_t i = 0; i < (size_t)201 * 201; i++) {
-            double value = frame.colors[3 * i];
+            double value = film.color[3 * i];
             check(value >= 0 && value <= 1 + 0x1p-20);
             brightest = fmax(brightest, value);
-            if (frame.object[i] == UINT32_MAX) continue;
-            double expected = (double)highlight_of(&frame, &scene, i, exponents[e]);
+            if (film.object[i] == UINT32_MAX) continue;
+            double expected = (double)highlight_of(&film, &scene, i, exponents[e]);
             // where the light only grazes, its own sign is a matter of rounding
             if (exponents[e] >= 1 || value != 0) check(near(value, expected, tolerance));
         }
         if (precision != PRECISION_FAST) check(brightest > 1 - 1e-3);
-        frame_free(&frame);
+        film_free(&film);
     }
     scene_free(&scene);
 }
@@ -306,15 +306,15 @@ static void tilted_plane_at(Precision precision)
             double angle = elevations[k] * M_PI / 180;
             scene.lights.items[0].direction =
                 vector_add(vector_scale(n, -sin(angle)), vector_scale(e, -cos(angle)));
-            Frame frame = render(&scene, 128, 128, precision, AOV_SHADOW | AOV_OBJECT);
+            Film film = render(&scene, 128, 128, precision, AOV_SHADOW | AOV_OBJECT);
             for (size_t pixel = 0; pixel < (size_t)128 * 128; pixel++) {
-                check(frame.object[pixel] == 0);
-                check(frame.shadow[pixel] == 0);
-                check(frame.colors[3 * pixel] == frame.colors[0]);
+                check(film.object[pixel] == 0);
+                check(film.shadow[pixel] == 0);
+                check(film.color[3 * pixel] == film.color[0]);
             }
-            check(frame.colors[0] > 0);
-            check(near(frame.colors[0], 0.75 * sin(angle), precision == PRECISION_DOUBLE ? 1e-15 : 2e-7));
-            frame_free(&frame);
+            check(film.color[0] > 0);
+            check(near(film.color[0], 0.75 * sin(angle), precision == PRECISION_DOUBLE ? 1e-15 : 2e-7));
+            film_free(&film);
         }
     }
     scene_free(&scene);
@@ -346,13 +346,13 @@ static void inside_at(Precision precision)
                      shapes[i]);
         Scene scene = scene_of(text_c(&text));
         text_free(&text);
-        Frame frame = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
+        Film film = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
         for (size_t pixel = 0; pixel < (size_t)96 * 96; pixel++) {
-            check(frame.object[pixel] == 0);
-            check(frame.shadow[pixel] == 0);
-            check(frame.colors[3 * pixel] > 0);
+            check(film.object[pixel] == 0);
+            check(film.shadow[pixel] == 0);
+            check(film.color[3 * pixel] > 0);
         }
-        frame_free(&frame);
+        film_free(&film);
         scene_free(&scene);
     }
 }
@@ -390,18 +390,18 @@ static void ground_horizon_at(Precision precision)
     const uint32_t side = 256;
     for (size_t k = 0; k < sizeof grounds / sizeof *grounds; k++) {
         Scene scene = scene_of(grounds[k].view);
-        Frame frame = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
+        Film film = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
         for (uint32_t column = 0; column < side; column++) {
             uint32_t horizon = 0, exact = 0;
-            while (horizon < side && frame.object[horizon * side + column] == UINT32_MAX)
+            while (horizon < side && film.object[horizon * side + column] == UINT32_MAX)
                 horizon++;
-            while (exact < side && !meets_ground(frame.ray + 3 * (exact * side + column), grounds[k].slope))
+            while (exact < side && !meets_ground(film.ray + 3 * (exact * side + column), grounds[k].slope))
                 exact++;
             check(near(horizon, exact, 1));
             for (uint32_t row = horizon; row < side; row++)
-                check(frame.object[row * side + column] == 0);
+                check(film.object[row * side + column] == 0);
         }
-        frame_free(&frame);
+        film_free(&film);
         scene_free(&scene);
     }
 }
@@ -441,7 +441,7 @@ static void degenerate_cameras(void **state)
         {"huge up", {0, 0, 3}, {0, 1e300, 0}},
         {"tiny up", {0, 0, 3}, {0, 1e-300, 0}},
     };
-    Frame unrolled = {0};
+    Film unrolled = {0};
     for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
         snprintf(place, sizeof place, "%s", cameras[i].name);
         Scene scene =
@@ -451,18 +451,18 @@ static void degenerate_cameras(void **state)
         scene.camera.look_at = cameras[i].look_at;
         scene.camera.up = cameras[i].up;
         check(basis_error(&scene.camera) <= 1e-6);
-        Frame frame = render(&scene, 41, 31, PRECISION_SINGLE, AOV_OBJECT);
+        Film film = render(&scene, 41, 31, PRECISION_SINGLE, AOV_OBJECT);
         for (size_t pixel = 0; pixel < (size_t)41 * 31; pixel++)
-            check(frame.object[pixel] == 0);
+            check(film.object[pixel] == 0);
         // one fallback for the three that leave the roll open
         if (i == 0)
-            unrolled = frame;
+            unrolled = film;
         else if (i <= 2)
-            frame_assert_same(&frame, &unrolled, place);
-        if (i > 0) frame_free(&frame);
+            film_assert_same(&film, &unrolled, place);
+        if (i > 0) film_free(&film);
         scene_free(&scene);
     }
-    frame_free(&unrolled);
+    film_free(&unrolled);
 }
 
 // R8: a single pixel looks along the view; extreme fields of view stay finite.
@@ -475,14 +475,14 @@ static void single_pixel_and_extreme_fields(void **state)
     for (size_t i = 0; i < 3; i++) {
         snprintf(place, sizeof place, "fov %g", fields[i]);
         scene.camera.half_tangent = tan(fields[i] * M_PI / 360);
-        Frame frame = render(&scene, 1, 1, PRECISION_SINGLE, AOV_OBJECT | AOV_T);
-        check(frame.object[0] == 0 && frame.colors[0] == 1);
-        check(near(frame.t[0], sqrt(54) - 0.001, 1e-5));
-        frame_free(&frame);
-        Frame wide = render(&scene, 51, 33, PRECISION_SINGLE, AOV_OBJECT);
+        Film film = render(&scene, 1, 1, PRECISION_SINGLE, AOV_OBJECT | AOV_T);
+        check(film.object[0] == 0 && film.color[0] == 1);
+        check(near(film.t[0], sqrt(54) - 0.001, 1e-5));
+        film_free(&film);
+        Film wide = render(&scene, 51, 33, PRECISION_SINGLE, AOV_OBJECT);
         check(wide.object[16 * 51 + 25] == 0);
         check((wide.object[0] == 0) == (fields[i] == 1e-3));
-        frame_free(&wide);
+        film_free(&wide);
     }
     scene_free(&scene);
 }
@@ -491,7 +491,7 @@ static void single_pixel_and_extreme_fields(void **state)
 static void distance_from_origin_changes_nothing(void **state)
 {
     (void)state;
-    Frame frames[2];
+    Film films[2];
     for (size_t i = 0; i < 2; i++) {
         double far = i == 0 ? 0 : 0x1p23;
         snprintf(place, sizeof place, "moved by %g", far);
@@ -505,12 +505,12 @@ static void distance_from_origin_changes_nothing(void **state)
                      far + 0.25, far + 0.25, far + 2, far + 0.5, far);
         Scene scene = scene_of(text_c(&text));
         text_free(&text);
-        frames[i] = render(&scene, 64, 48, PRECISION_SINGLE, AOV_T | AOV_SHADOW | AOV_OBJECT);
+        films[i] = render(&scene, 64, 48, PRECISION_SINGLE, AOV_T | AOV_SHADOW | AOV_OBJECT);
         scene_free(&scene);
     }
-    frame_assert_same(&frames[1], &frames[0], "2^23 from the origin");
-    frame_free(&frames[0]);
-    frame_free(&frames[1]);
+    film_assert_same(&films[1], &films[0], "2^23 from the origin");
+    film_free(&films[0]);
+    film_free(&films[1]);
 }
 
 int main(void)

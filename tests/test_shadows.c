@@ -1,5 +1,5 @@
 // Shadows on which a faster search, or a surface much larger than what lies on it, once went wrong.
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"
 #include "tests/scene_reading.h"
@@ -24,21 +24,21 @@ static void takes_a_veils_light_once(void **state)
                      "  - box: {min: [-8, -1, -8], max: [8, 0, 8]}\n"
                      "  - disc: {center: [0, 2, 0], normal: [0, 1, 0], radius: 0.5, material: veil}\n"
                      "  - disc: {center: [0, 6, 0], normal: [0, 1, 0], radius: 0.001, material: veil}\n");
-    RenderSettings settings = frame_settings(101, 101, PRECISION_STRICT);
+    RenderSettings settings = film_settings(101, 101, PRECISION_STRICT);
     settings.lanes = 1;
     settings.bvh = BVH_OFF;
-    Frame expected = frame_render(&probe_compute, &scene, &settings, 0);
+    Film expected = film_render(&probe_compute, &scene, &settings, 0);
     static const uint32_t lanes[] = {1, 4, 8, 16};
     for (size_t i = 0; i < sizeof lanes / sizeof *lanes; i++) {
         settings.lanes = lanes[i];
         for (BvhChoice bvh = BVH_ON; bvh <= BVH_OFF; bvh++) {
             settings.bvh = bvh;
-            Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
-            frame_assert_same(&frame, &expected, bvh_choice_names[bvh]);
-            frame_free(&frame);
+            Film film = film_render(&probe_compute, &scene, &settings, 0);
+            film_assert_same(&film, &expected, bvh_choice_names[bvh]);
+            film_free(&film);
         }
     }
-    frame_free(&expected);
+    film_free(&expected);
     scene_free(&scene);
 }
 
@@ -54,17 +54,17 @@ static void darkens_an_eclipse_in_meters(void **state)
                         "  - sphere: {center: [1.496e11, 0, 0], radius: 2e7}\n"
                         "  - sphere: {center: [1.4998e11, 0, 0], radius: 1e7}\n");
     for (Precision precision = PRECISION_FAST; precision <= PRECISION_STRICT; precision++) {
-        RenderSettings settings = frame_settings(64, 64, precision);
-        Frame frame = frame_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
+        RenderSettings settings = film_settings(64, 64, precision);
+        Film film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
         size_t seen = 0, lit = 0;
-        for (size_t i = 0; i < (size_t)frame.width * frame.height; i++) {
-            if (frame.object[i] == UINT32_MAX) continue;
+        for (size_t i = 0; i < (size_t)film.width * film.height; i++) {
+            if (film.object[i] == UINT32_MAX) continue;
             seen++;
-            lit += frame.shadow[i] == 0;
+            lit += film.shadow[i] == 0;
         }
         assert_true(seen > 500);
         assert_int_equal(lit, 0);
-        frame_free(&frame);
+        film_free(&film);
     }
     scene_free(&scene);
 }
@@ -73,23 +73,23 @@ static void darkens_an_eclipse_in_meters(void **state)
 static void hold_to_reference(const Scene *scene, const RenderSettings *settings, double error,
                               const char *what)
 {
-    Frame frame = frame_render(&probe_compute, scene, settings, AOV_T | AOV_SHADOW);
+    Film film = film_render(&probe_compute, scene, settings, AOV_T | AOV_SHADOW);
     unsigned open = 0, dark = 0;
-    for (unsigned i = 0; i < frame.width * frame.height; i++) {
-        unsigned x = i % frame.width, y = i / frame.width;
-        ReferenceRay ray = reference_camera_ray(&scene->camera, frame.width, frame.height, x, y);
+    for (unsigned i = 0; i < film.width * film.height; i++) {
+        unsigned x = i % film.width, y = i / film.width;
+        ReferenceRay ray = reference_camera_ray(&scene->camera, film.width, film.height, x, y);
         ReferenceColor expected = reference_color(scene, &ray);
-        bool at_edge = isfinite(frame.t[i]) && expected.margin <= 0x1p-16 * frame.t[i];
-        double seen = frame.colors[3 * (size_t)i];
+        bool at_edge = isfinite(film.t[i]) && expected.margin <= 0x1p-16 * film.t[i];
+        double seen = film.color[3 * (size_t)i];
         if (!at_edge && fabs(seen - expected.color.x) > error)
             fail_msg("%s, %s, seed %u: pixel %u,%u is %g, not %g", what, precision_names[settings->precision],
                      settings->perturb_seed, x, y, seen, expected.color.x);
         open += at_edge;
-        dark += !at_edge && frame.shadow[3 * (size_t)i] == 1;
+        dark += !at_edge && film.shadow[3 * (size_t)i] == 1;
     }
-    assert_in_range(open, 0, frame.width * frame.height / 10);
+    assert_in_range(open, 0, film.width * film.height / 10);
     assert_true(dark > 20);
-    frame_free(&frame);
+    film_free(&film);
 }
 
 // Ground whose numbers are a million times as large as what lies on it: a float of them counts in halves.
@@ -141,7 +141,7 @@ static void keeps_small_shadows_on(const Ground *ground)
     text_free(&text);
     for (Precision precision = ground->from; precision < PRECISION_COUNT; precision++) {
         if (!probe_has(precision)) continue;
-        RenderSettings settings = frame_settings(128, 96, precision);
+        RenderSettings settings = film_settings(128, 96, precision);
         hold_to_reference(&scene, &settings, ground->error, ground->name);
         settings.perturb_seed = 1;
         if (precision == PRECISION_SINGLE) hold_to_reference(&scene, &settings, ground->error, ground->name);

@@ -2,7 +2,7 @@
 // Procedural Databases 3.14, README, Database analysis): all classical ray tracers should be within 10%.
 // Skipped where the scenes are not there.
 #include "host/compile/flat_types.h"
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 
@@ -31,7 +31,7 @@ static const struct {
     {"tree", {169836, 0, 0, 1097419}},
 };
 
-static bool take_band(void *context, const Band *band, double fraction_done)
+static bool take_band(void *context, const Film *band, double fraction_done)
 {
     (void)context;
     (void)band;
@@ -59,7 +59,7 @@ static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
     text_free(&path);
     glass_reflect(&scene);
     scene.camera.half_tangent *= 513.0 / 512;
-    RenderSettings settings = frame_settings(513, 513, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(513, 513, PRECISION_SINGLE);
     settings.bounce_count = 4;
     settings.counting = true;
     Renderer *renderer = probe_renderer(&scene, &settings);

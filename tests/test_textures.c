@@ -1,7 +1,7 @@
 // Pictures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
 #include "host/image/image.h"
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
@@ -77,13 +77,13 @@ static Scene scene_make(const char *camera, const char *object)
 static void check_seen(const char *camera, const char *object, double red, double green, double blue)
 {
     Scene scene = scene_make(camera, object);
-    RenderSettings settings = frame_settings(1, 1, PRECISION_STRICT);
-    Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
+    RenderSettings settings = film_settings(1, 1, PRECISION_STRICT);
+    Film film = film_render(&probe_compute, &scene, &settings, 0);
     const double expected[3] = {red, green, blue};
     for (size_t i = 0; i < 3; i++)
-        if (!(fabs(frame.colors[i] - expected[i]) < 2e-7))
-            fail_msg("%s: channel %zu is %.9g, not %.9g", camera, i, frame.colors[i], expected[i]);
-    frame_free(&frame);
+        if (!(fabs(film.color[i] - expected[i]) < 2e-7))
+            fail_msg("%s: channel %zu is %.9g, not %.9g", camera, i, film.color[i], expected[i]);
+    film_free(&film);
     scene_free(&scene);
 }
 
@@ -192,26 +192,26 @@ static void check_places(const char *camera, const char *object, PictureMap map,
     Scene scene = scene_make(camera, object);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!probe_has(precision)) continue;
-        RenderSettings settings = frame_settings(WIDTH, HEIGHT, precision);
-        Frame frame = frame_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_POSITION | AOV_OBJECT);
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+        Film film = film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_POSITION | AOV_OBJECT);
         double allowed = precision == PRECISION_DOUBLE ? 0x1p-48 : 0x1p-19, largest = 0;
         size_t seen = 0;
         for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
-            if (frame.object[i] == UINT32_MAX) continue;
-            Vector3 normal = vector_at(frame.normal, i), from_eye = vector_at(frame.position, i);
+            if (film.object[i] == UINT32_MAX) continue;
+            Vector3 normal = vector_at(film.normal, i), from_eye = vector_at(film.position, i);
             if (vector_dot(normal, from_eye) > -0.3 * vector_length(from_eye))
                 continue; // foreshortened texels
             double u, v;
             map(vector_add(from_eye, scene.camera.position), normal, &u, &v);
             for (size_t channel = 0; channel < 3; channel++)
-                largest = fmax(largest, fabs(frame.colors[3 * i + channel] -
+                largest = fmax(largest, fabs(film.color[3 * i + channel] -
                                              picture_between(&picture, u, v, repeats_upward, channel)));
             seen++;
         }
         assert_in_range(seen, WIDTH * HEIGHT / 4, WIDTH * HEIGHT);
         if (!(largest <= allowed))
             fail_msg("%s, %s: off by %g, more than %g", object, precision_names[precision], largest, allowed);
-        frame_free(&frame);
+        film_free(&film);
     }
     scene_free(&scene);
 }
@@ -304,19 +304,19 @@ static void every_build_gives_the_same_bits(void **state)
     static const uint32_t lane_counts[] = {1, 4, 8, 16};
     Scene scene = scene_of_file("scenes/globe.yaml");
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
-        RenderSettings settings = frame_settings(71, 41, precision);
+        RenderSettings settings = film_settings(71, 41, precision);
         settings.lanes = 1;
-        Frame expected = frame_render(&probe_compute, &scene, &settings, 0);
-        assert_int_equal(frame_count_faulty(&expected), 0);
+        Film expected = film_render(&probe_compute, &scene, &settings, 0);
+        assert_int_equal(film_count_faulty(&expected), 0);
         for (size_t i = 0; i < 4; i++) {
             settings.lanes = lane_counts[i];
             settings.bvh = BVH_ON;
             settings.extra_features = i == 3 ? FEATURE_ALL : 0;
-            Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
-            frame_assert_same(&frame, &expected, precision_names[precision]);
-            frame_free(&frame);
+            Film film = film_render(&probe_compute, &scene, &settings, 0);
+            film_assert_same(&film, &expected, precision_names[precision]);
+            film_free(&film);
         }
-        frame_free(&expected);
+        film_free(&expected);
     }
     scene_free(&scene);
 }
@@ -350,11 +350,11 @@ static void jpeg_is_read(void **state)
     for (size_t i = 0; i < 3; i++)
         linear[i] = pow(((double)pixels[i] / 255 + 0.055) / 1.055, 2.4);
     Scene scene = scene_make(FROM(0, 0, 5), BALL);
-    RenderSettings settings = frame_settings(1, 1, PRECISION_SINGLE);
-    Frame frame = frame_render(&probe_compute, &scene, &settings, 0);
+    RenderSettings settings = film_settings(1, 1, PRECISION_SINGLE);
+    Film film = film_render(&probe_compute, &scene, &settings, 0);
     for (size_t i = 0; i < 3; i++)
-        assert_true(fabs(frame.colors[i] - linear[i]) < 0.015);
-    frame_free(&frame);
+        assert_true(fabs(film.color[i] - linear[i]) < 0.015);
+    film_free(&film);
     scene_free(&scene);
 
     assert_int_equal(truncate(picture_path, 20), 0);
@@ -392,7 +392,7 @@ static void scene_faults_are_told(void **state)
 static void check_refused(const char *expected)
 {
     Scene scene = scene_make(FROM(0, 0, 5), BALL);
-    RenderSettings settings = frame_settings(4, 4, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(4, 4, PRECISION_SINGLE);
     MessageList messages = {0};
     assert_null(renderer_open(&probe_compute, &scene, &settings, &messages));
     assert_int_equal(messages.count, 1);

@@ -2,7 +2,7 @@
 // repeated run; and what must change it in a known way: the scene's scale, its mirror image.
 #include "host/compile/transform.h"
 #include "host/import/load.h"
-#include "tests/frame.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
@@ -35,15 +35,15 @@ static int variants_close(void **state)
 }
 
 // A picture with the settings' features as they are.
-static Frame picture(const Scene *scene, const RenderSettings *settings)
+static Film picture(const Scene *scene, const RenderSettings *settings)
 {
-    return frame_render(&probe_compute, scene, settings, 0);
+    return film_render(&probe_compute, scene, settings, 0);
 }
 
-static void same_and_freed(Frame *frame, const Frame *expected, const char *what)
+static void same_and_freed(Film *film, const Film *expected, const char *what)
 {
-    frame_assert_same(frame, expected, what);
-    frame_free(frame);
+    film_assert_same(film, expected, what);
+    film_free(film);
 }
 
 static void scene_has_every_feature(void **state)
@@ -57,20 +57,20 @@ static void lanes_agree(void **state)
 {
     (void)state;
     for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
-        Frame expected = {0};
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        Film expected = {0};
         for (size_t i = 0; i < LANE_CHOICES; i++) {
             settings.lanes = lane_counts[i];
             char what[64];
             snprintf(what, sizeof what, "%s, %u lanes", precision_names[settings.precision], settings.lanes);
-            Frame frame = picture(&every_shape, &settings);
-            assert_int_equal(frame_count_faulty(&frame), 0);
+            Film film = picture(&every_shape, &settings);
+            assert_int_equal(film_count_faulty(&film), 0);
             if (i == 0)
-                expected = frame;
+                expected = film;
             else
-                same_and_freed(&frame, &expected, what);
+                same_and_freed(&film, &expected, what);
         }
-        frame_free(&expected);
+        film_free(&expected);
     }
 }
 
@@ -79,14 +79,14 @@ static void lanes_agree_behind_the_picture(void **state)
     (void)state;
     const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
     for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
         settings.lanes = 1;
-        Frame expected = frame_render(&probe_compute, &every_shape, &settings, aovs);
-        assert_int_equal(frame_count_faulty(&expected), 0);
+        Film expected = film_render(&probe_compute, &every_shape, &settings, aovs);
+        assert_int_equal(film_count_faulty(&expected), 0);
         settings.lanes = 16;
-        Frame frame = frame_render(&probe_compute, &every_shape, &settings, aovs);
-        same_and_freed(&frame, &expected, "1 and 16 lanes");
-        frame_free(&expected);
+        Film film = film_render(&probe_compute, &every_shape, &settings, aovs);
+        same_and_freed(&film, &expected, "1 and 16 lanes");
+        film_free(&expected);
     }
 }
 
@@ -158,18 +158,18 @@ static void features_alone_and_all_together_agree(void **state)
 {
     (void)state;
     FeatureSet seen = 0;
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     for (size_t i = 0; i < sizeof feature_scenes / sizeof *feature_scenes; i++) {
         Scene scene = scene_with_warnings(feature_scenes[i].text);
         assert_int_equal(features_of(&scene), feature_scenes[i].features);
         seen |= feature_scenes[i].features;
 
         settings.extra_features = 0;
-        Frame specialised = picture(&scene, &settings);
+        Film specialised = picture(&scene, &settings);
         settings.extra_features = FEATURE_ALL;
-        Frame general = picture(&scene, &settings);
+        Film general = picture(&scene, &settings);
         same_and_freed(&specialised, &general, feature_scenes[i].text);
-        frame_free(&general);
+        film_free(&general);
         scene_free(&scene);
     }
     assert_int_equal(seen | FEATURE_BVH, FEATURE_ALL); // no scene needs a hierarchy; it has a test of its own
@@ -177,11 +177,11 @@ static void features_alone_and_all_together_agree(void **state)
     // No scene needs checkers alone: built in without need, on an empty scene.
     Scene empty = scene_with_warnings(SCENE_HEAD);
     settings.extra_features = FEATURE_CHECKERS;
-    Frame checkers = picture(&empty, &settings);
+    Film checkers = picture(&empty, &settings);
     settings.extra_features = FEATURE_ALL;
-    Frame general = picture(&empty, &settings);
+    Film general = picture(&empty, &settings);
     same_and_freed(&checkers, &general, "checkers alone");
-    frame_free(&general);
+    film_free(&general);
     scene_free(&empty);
 }
 
@@ -189,13 +189,13 @@ static void hierarchy_changes_nothing(void **state)
 {
     (void)state;
     for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
         settings.bvh = BVH_OFF;
-        Frame expected = picture(&every_shape, &settings);
+        Film expected = picture(&every_shape, &settings);
         settings.bvh = BVH_ON;
-        Frame frame = picture(&every_shape, &settings);
-        same_and_freed(&frame, &expected, "through a hierarchy");
-        frame_free(&expected);
+        Film film = picture(&every_shape, &settings);
+        same_and_freed(&film, &expected, "through a hierarchy");
+        film_free(&expected);
     }
 }
 
@@ -203,46 +203,46 @@ static void bands_agree(void **state)
 {
     (void)state;
     static const uint32_t band_rows[] = {1, 7, 32};
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Frame expected = picture(&every_shape, &settings);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    Film expected = picture(&every_shape, &settings);
     for (size_t i = 0; i < 3; i++) {
         settings.band_rows = band_rows[i];
         char what[32];
         snprintf(what, sizeof what, "bands of %u rows", band_rows[i]);
-        Frame frame = picture(&every_shape, &settings);
-        same_and_freed(&frame, &expected, what);
+        Film film = picture(&every_shape, &settings);
+        same_and_freed(&film, &expected, what);
     }
     settings.band_rows = 0;
     settings.band_seconds = 1e-9;
-    Frame shortest = picture(&every_shape, &settings);
+    Film shortest = picture(&every_shape, &settings);
     same_and_freed(&shortest, &expected, "the shortest bands by time");
-    frame_free(&expected);
+    film_free(&expected);
 }
 
 // With bands as short as they get, each sample of a pixel has a launch of its own.
 static void launches_of_samples_agree(void **state)
 {
     (void)state;
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Frame one = picture(&every_shape, &settings);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    Film one = picture(&every_shape, &settings);
     settings.sample_count = 5;
     settings.band_seconds = 100;
-    Frame expected = picture(&every_shape, &settings);
+    Film expected = picture(&every_shape, &settings);
     settings.band_seconds = 1e-9;
-    Frame apart = picture(&every_shape, &settings);
+    Film apart = picture(&every_shape, &settings);
     same_and_freed(&apart, &expected, "5 samples in launches apart");
     settings.band_rows = 7;
     settings.lanes = 1;
-    Frame scalar = picture(&every_shape, &settings);
+    Film scalar = picture(&every_shape, &settings);
     same_and_freed(&scalar, &expected, "5 samples, bands of 7 rows, 1 lane");
 
     // The samples do something, and no more than soften edges.
     double difference = 0;
     for (size_t i = 0; i < (size_t)3 * WIDTH * HEIGHT; i++)
-        difference += fabs(one.colors[i] - expected.colors[i]) / (3 * WIDTH * HEIGHT);
+        difference += fabs(one.color[i] - expected.color[i]) / (3 * WIDTH * HEIGHT);
     assert_true(difference > 1e-4 && difference < 0.1);
-    frame_free(&one);
-    frame_free(&expected);
+    film_free(&one);
+    film_free(&expected);
 }
 
 static void regions_are_cuts_of_the_whole(void **state)
@@ -252,8 +252,8 @@ static void regions_are_cuts_of_the_whole(void **state)
         {0, 0, 1, 1},      {WIDTH - 1, HEIGHT - 1, 1, 1}, {3, 5, 37, 19}, {WIDTH - 18, 0, 18, HEIGHT},
         {0, 13, WIDTH, 1},
     };
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Frame whole = picture(&every_shape, &settings);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    Film whole = picture(&every_shape, &settings);
     for (size_t i = 0; i < sizeof regions / sizeof *regions; i++) {
         const uint32_t *r = regions[i];
         settings.region_x = r[0];
@@ -262,23 +262,23 @@ static void regions_are_cuts_of_the_whole(void **state)
         settings.region_height = r[3];
         char what[64];
         snprintf(what, sizeof what, "region %u,%u,%u,%u", r[0], r[1], r[2], r[3]);
-        Frame part = picture(&every_shape, &settings), expected = frame_cut(&whole, r[0], r[1], r[2], r[3]);
+        Film part = picture(&every_shape, &settings), expected = film_cut(&whole, r[0], r[1], r[2], r[3]);
         same_and_freed(&part, &expected, what);
-        frame_free(&expected);
+        film_free(&expected);
     }
-    frame_free(&whole);
+    film_free(&whole);
 }
 
 static void runs_repeat(void **state)
 {
     (void)state;
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_FAST);
-    Frame first = picture(&every_shape, &settings);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_FAST);
+    Film first = picture(&every_shape, &settings);
     for (unsigned run = 0; run < 5; run++) {
-        Frame frame = picture(&every_shape, &settings);
-        same_and_freed(&frame, &first, "repeated at fast");
+        Film film = picture(&every_shape, &settings);
+        same_and_freed(&film, &first, "repeated at fast");
     }
-    frame_free(&first);
+    film_free(&first);
 }
 
 // HARDCASES R6: nothing in the kernels has a length of its own; beyond what its squares can take a scene is
@@ -288,19 +288,19 @@ static void scale_changes_nothing(void **state)
     (void)state;
     static const int exponents[] = {-90, -40, -20, -10, -3, 3, 10, 20, 40, 90};
     for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = frame_settings(WIDTH, HEIGHT, exact_precisions[p]);
-        Frame expected = picture(&every_shape, &settings);
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
+        Film expected = picture(&every_shape, &settings);
         for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
             Scene scene = scene_of_file("tests/scenes/every_shape.yaml");
             scene_scale(&scene, ldexp(1, exponents[i]));
             char what[64];
             snprintf(what, sizeof what, "%s, scaled by 2^%d", precision_names[settings.precision],
                      exponents[i]);
-            Frame frame = picture(&scene, &settings);
-            same_and_freed(&frame, &expected, what);
+            Film film = picture(&scene, &settings);
+            same_and_freed(&film, &expected, what);
             scene_free(&scene);
         }
-        frame_free(&expected);
+        film_free(&expected);
     }
 }
 
@@ -312,14 +312,14 @@ static void mirror_gives_the_mirrored_picture(void **state)
     scene_mirror(&mirrored);
     for (size_t p = 0; p < 2; p++) {
         for (uint32_t width = WIDTH; width <= WIDTH + 1; width++) {
-            RenderSettings settings = frame_settings(width, HEIGHT, exact_precisions[p]);
-            Frame frame = picture(&every_shape, &settings), flipped = frame_flipped(&frame);
-            Frame mirror = picture(&mirrored, &settings);
+            RenderSettings settings = film_settings(width, HEIGHT, exact_precisions[p]);
+            Film film = picture(&every_shape, &settings), flipped = film_flipped(&film);
+            Film mirror = picture(&mirrored, &settings);
             char what[64];
             snprintf(what, sizeof what, "%s, mirrored, %u wide", precision_names[settings.precision], width);
             same_and_freed(&mirror, &flipped, what);
-            frame_free(&flipped);
-            frame_free(&frame);
+            film_free(&flipped);
+            film_free(&film);
         }
     }
     scene_free(&mirrored);
@@ -337,10 +337,10 @@ static void order_of_objects_changes_nothing(void **state)
         *a = *b;
         *b = first;
     }
-    RenderSettings settings = frame_settings(WIDTH, HEIGHT, PRECISION_STRICT);
-    Frame expected = picture(&every_shape, &settings), frame = picture(&reversed, &settings);
-    same_and_freed(&frame, &expected, "objects in reverse");
-    frame_free(&expected);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_STRICT);
+    Film expected = picture(&every_shape, &settings), film = picture(&reversed, &settings);
+    same_and_freed(&film, &expected, "objects in reverse");
+    film_free(&expected);
     scene_free(&reversed);
 }
 

@@ -42,7 +42,7 @@ static double processor_seconds(void)
     return seconds;
 }
 
-static bool band_drop(void *context, const Band *band, double fraction_done)
+static bool band_drop(void *context, const Film *band, double fraction_done)
 {
     (void)context, (void)band, (void)fraction_done;
     return true;

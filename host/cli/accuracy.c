@@ -5,7 +5,7 @@
 #include "host/cli/accuracy_page.h"
 #include "host/cli/accuracy_report.h"
 #include "host/cli/commands.h"
-#include "host/cli/layers.h"
+#include "host/cli/image_output.h"
 #include "host/cli/page.h"
 #include "host/cli/variants.h"
 #include "host/image/image.h"
@@ -52,7 +52,7 @@ typedef struct {
     AccuracyOptions options;
     OpenDevice open;
     VariantSet set;
-    PictureLayers reference; // of the current scene; of the only one if it is from a file
+    Film reference; // of the current scene; of the only one if it is from a file
     AccuracyScene *scenes;
     OutputFile page; // opened before measuring, so that it fails early
     MessageList messages;
@@ -113,8 +113,11 @@ static bool reference_read(Accuracy *accuracy)
         message_add(&accuracy->messages, MESSAGE_ERROR,
                     "the reference '%s' has %ux%u pixels, the images have %ux%u", path, image.width,
                     image.height, settings->width, settings->height);
-    accuracy->reference =
-        (PictureLayers){.width = image.width, .height = image.height, .wide = true, .color = colors};
+    accuracy->reference = (Film){.width = image.width,
+                                 .height = image.height,
+                                 .wide = true,
+                                 .real_size = sizeof *colors,
+                                 .color = colors};
     image_free(&image);
     return !fault && fits;
 }
@@ -133,7 +136,7 @@ static int reference_render(Accuracy *accuracy, AccuracyScene *scene, const Vari
     Renderer *renderer =
         renderer_open(&accuracy->open.compute, variants[0].scene, &settings, &accuracy->messages);
     if (!renderer) return EXIT_USER;
-    bool whole = layers_render(&accuracy->reference, renderer, &settings, scene->light_count);
+    bool whole = renderer_render_film(renderer, ACCURACY_AOVS, &accuracy->reference);
     scene->reference.precision = precision_names[settings.precision];
     scene->reference.bvh = bvh_choice_names[settings.bvh];
     scene->reference.lanes = renderer_report(renderer)->lanes;
@@ -162,14 +165,13 @@ static AccuracyReport report_of(const Accuracy *accuracy)
     };
 }
 
-static bool layers_keep(Accuracy *accuracy, size_t scene, const AccuracyVariant *variant,
-                        const PictureLayers *layers)
+static bool film_keep(Accuracy *accuracy, size_t scene, const AccuracyVariant *variant, const Film *film)
 {
     if (!accuracy->options.folder) return true;
     const AccuracyReport report = report_of(accuracy);
     Text prefix = {0};
     accuracy_saved_prefix(&prefix, &report, scene, variant);
-    bool saved = layers_save(layers, text_c(&prefix), &accuracy->messages);
+    bool saved = film_save(film, text_c(&prefix), &accuracy->messages);
     text_free(&prefix);
     return saved;
 }
@@ -182,17 +184,16 @@ static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVaria
         compared->status = ACCURACY_UNAVAILABLE;
         return EXIT_DONE;
     }
-    PictureLayers layers;
-    if (!layers_render(&layers, variant->renderer, &variant->settings, scene->light_count))
-        return EXIT_INTERRUPTED;
-    compared->image = layers_narrow_color(&layers);
+    Film film;
+    if (!renderer_render_film(variant->renderer, ACCURACY_AOVS, &film)) return EXIT_INTERRUPTED;
+    compared->image = film_narrow_color(&film);
     if (is_reference(scene, compared))
         compared->status = ACCURACY_REFERENCE;
     else
-        accuracy_compare(&compared->errors, &accuracy->reference, &scene->edges, &layers,
+        accuracy_compare(&compared->errors, &accuracy->reference, &scene->edges, &film,
                          scene->display_values);
-    bool saved = layers_keep(accuracy, scene_index, compared, &layers);
-    layers_free(&layers);
+    bool saved = film_keep(accuracy, scene_index, compared, &film);
+    film_free(&film);
     return saved ? EXIT_DONE : EXIT_USER;
 }
 
@@ -203,14 +204,14 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
     const Variant *variants = &accuracy->set.variants[first];
     int status = scene->reference.file ? EXIT_DONE : reference_render(accuracy, scene, variants);
     if (status != EXIT_DONE) return status;
-    const PictureLayers *reference = &accuracy->reference;
+    const Film *reference = &accuracy->reference;
     accuracy_count_unsound(reference, &scene->reference.nonfinite, &scene->reference.negative);
     accuracy_edges_find(&scene->edges, reference);
-    scene->reference.image = layers_narrow_color(reference);
-    if (!layers_keep(accuracy, scene_index, NULL, reference)) status = EXIT_USER;
+    scene->reference.image = film_narrow_color(reference);
+    if (!film_keep(accuracy, scene_index, NULL, reference)) status = EXIT_USER;
     for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++)
         status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);
-    layers_free(&accuracy->reference);
+    film_free(&accuracy->reference);
     if (status == EXIT_DONE) accuracy_judge(scene);
     return status;
 }
@@ -307,7 +308,7 @@ static void accuracy_close(Accuracy *accuracy)
     for (size_t i = 0; accuracy->scenes && i < accuracy->set.scene_count; i++)
         accuracy_scene_free(&accuracy->scenes[i]);
     free(accuracy->scenes);
-    layers_free(&accuracy->reference);
+    film_free(&accuracy->reference);
     output_abandon(&accuracy->page);
     variant_set_close(&accuracy->set);
     messages_print(&accuracy->messages, NULL);

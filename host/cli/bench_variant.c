@@ -2,16 +2,15 @@
 
 #include "host/base/clock.h"
 #include "host/base/memory.h"
-#include "host/cli/progress.h"
 #include "host/measure/work.h"
 #include <string.h>
 
 enum { BUILD_TEST_SIDE = 64 };
 
-static bool picture_stop(void *context, const Band *band, double fraction_done)
+static bool band_skip(void *context, const Film *band, double fraction_done)
 {
     (void)context, (void)band, (void)fraction_done;
-    return !progress_interrupted();
+    return true;
 }
 
 // From the start of the build to the end of the first launch: drivers may finish the build there.
@@ -36,7 +35,7 @@ static bool build_try(Compute *compute, const Variant *variant, bool no_cache, d
     if (settings.region_height > BUILD_TEST_SIDE) settings.region_height = BUILD_TEST_SIDE;
     Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
     if (!renderer) return false;
-    renderer_render(renderer, 0, picture_stop, NULL);
+    renderer_render(renderer, 0, band_skip, NULL);
     *seconds = build_length(renderer_report(renderer));
     *from_cache = renderer_report(renderer)->build_from_cache;
     renderer_close(renderer);
@@ -63,7 +62,7 @@ static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, 
     settings.counting = true;
     Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
     if (!renderer) return false;
-    renderer_render(renderer, 0, picture_stop, NULL);
+    renderer_render(renderer, 0, band_skip, NULL);
     // both in the order of RAYS_… (kernels/types.h)
     memcpy(row->rays, renderer_report(renderer)->rays, sizeof row->rays);
     renderer_close(renderer);
@@ -95,34 +94,28 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
 
 enum { LINE_BYTES = 64 };
 
-typedef struct {
-    size_t row_bytes;
-    double end_seconds;
-} RunContext;
-
 // Reads one value per cache line, as an encoder would: a driver may leave the pixels on the device until
 // then.
-static bool band_read(void *context, const Band *band, double fraction_done)
+static bool band_read(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
-    RunContext *run = context;
-    const volatile unsigned char *bytes = band->colors;
-    for (size_t i = 0; i < band->row_count * run->row_bytes; i += LINE_BYTES)
+    double *end_seconds = context;
+    const volatile unsigned char *bytes = band->layers[LAYER_COLOR];
+    for (size_t i = 0; i < film_layer_size(band, LAYER_COLOR); i += LINE_BYTES)
         (void)bytes[i];
-    run->end_seconds = clock_seconds();
-    return !progress_interrupted();
+    *end_seconds = clock_seconds();
+    return true;
 }
 
 bool variant_run(Variant *variant, BenchTimes *times)
 {
     renderer_report_restart(variant->renderer);
     const RenderReport *report = renderer_report(variant->renderer);
-    size_t scalar = report->wide ? sizeof(double) : sizeof(float);
-    RunContext run = {variant->settings.region_width * 3 * scalar, 0};
-    if (!renderer_render(variant->renderer, 0, band_read, &run)) return false;
+    double end_seconds = 0;
+    if (!renderer_render(variant->renderer, 0, band_read, &end_seconds)) return false;
     for (size_t i = 0; times && i < report->launches.count; i++)
         bench_add_launch(times, &report->launches.items[i].time);
-    if (times) bench_end_run(times, run.end_seconds - report->launches.items[0].time.host_start_seconds);
+    if (times) bench_end_run(times, end_seconds - report->launches.items[0].time.host_start_seconds);
     return true;
 }
 

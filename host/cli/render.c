@@ -1,9 +1,9 @@
-// glint render: a scene file becomes a picture.
+// glint render: a scene file becomes an image.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/cli/commands.h"
+#include "host/cli/image_output.h"
 #include "host/cli/options.h"
-#include "host/cli/picture.h"
 #include "host/cli/progress.h"
 #include "host/cli/timing.h"
 #include <errno.h>
@@ -41,25 +41,26 @@ static const struct option long_options[] = {
     {0},
 };
 
+#define HELP_LAYER(NAME, name, type, components, note) "                          " #name ": " note "\n"
+
 static const char help_text[] =
     "usage: glint render SCENE [OPTIONS]\n\n"
     "  -o, --output FILE     .png, .ppm, .exr or .npy (default: the scene's name with .png)\n"
-    "      --size WxH        of the picture (default: the scene's own, else 1280 wide)\n"
+    "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
-    "      --region X,Y,W,H  render these pixels of the picture only\n"
-    "      --aov LIST        more files beside the picture: t, normal, position, object, shadow, ray, "
-    "path,\n"
-    "                        color\n"
-    "      --timing[=json]   tell the time of every stage and launch\n"
-    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
-    "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
-    "      --quiet           no progress\n" //
+    "      --region X,Y,W,H  render these pixels of the image only\n"
+    "      --aov LIST        more files beside the image, IMAGE.NAME.npy for each NAME of the list:\n" //
+    LAYER_LIST(
+        HELP_LAYER) "      --timing[=json]   report the time of every stage and launch\n"
+                    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
+                    "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
+                    "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
     const char *scene;
-    PictureOptions picture;
+    ImageOutputOptions output;
     uint32_t width, height; // 0: not given
     uint32_t sample_count, bounce_count;
     uint32_t region[4]; // x, y, width, height
@@ -94,7 +95,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     if (option_common(&options->common, option, value, &valid)) return valid;
     switch (option) {
     case 'o':
-        options->picture.path = value;
+        options->output.path = value;
         return true;
     case OPTION_SIZE:
         return option_size("size", value, &options->width, &options->height);
@@ -104,17 +105,17 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         options->has_region = true;
         return region_read(value, options->region);
     case OPTION_AOV:
-        return option_set("aov", value, picture_aov_names, PICTURE_AOV_COUNT, &options->picture.aovs);
+        return option_set("aov", value, layer_names, LAYER_COUNT, &options->output.aovs);
     case OPTION_TIMING:
         return timing_style_read(value, &options->timing);
     case OPTION_TRANSFER:
         if (!option_choice("transfer", value, transfers, 2, &choice)) return false;
-        options->picture.transfer = choice == 0 ? TRANSFER_SRGB : TRANSFER_NONE;
+        options->output.transfer = choice == 0 ? TRANSFER_SRGB : TRANSFER_NONE;
         options->has_transfer = true;
         return true;
     case OPTION_BITS:
         if (!option_choice("bits", value, (const char *const[]){"8", "16"}, 2, &choice)) return false;
-        options->picture.bits = choice == 0 ? 8 : 16;
+        options->output.bits = choice == 0 ? 8 : 16;
         return true;
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_LARGEST, &options->bounce_count);
@@ -131,7 +132,7 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
     *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
                                .sample_count = 1,
                                .bounce_count = BOUNCES_DEFAULT,
-                               .picture.bits = 8};
+                               .output.bits = 8};
     int option;
     while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
         if (option == 'h') return option_help(help_text);
@@ -152,7 +153,7 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
     }
     const uint32_t *region = options->region;
     if (region[0] + region[2] > options->width || region[1] + region[3] > options->height) {
-        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the picture of %ux%u pixels\n",
+        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the image of %ux%u pixels\n",
                 region[0], region[1], region[2], region[3], options->width, options->height);
         return false;
     }
@@ -169,16 +170,16 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
 }
 
 typedef struct {
-    Picture *picture;
+    ImageOutput *output;
     Progress *progress;
     MessageList *messages;
 } BandContext;
 
-static bool band_take(void *context, const Band *band, double fraction_done)
+static bool band_take(void *context, const Film *band, double fraction_done)
 {
     BandContext *take = context;
     if (progress_interrupted()) return false;
-    bool written = picture_write(take->picture, band, take->messages);
+    bool written = image_output_write(take->output, band, take->messages);
     progress_show(take->progress, fraction_done);
     return written;
 }
@@ -188,8 +189,8 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     RenderSettings settings;
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
     if (!options->has_transfer)
-        options->picture.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
-    options->picture.apart = options->timing != TIMING_NONE;
+        options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    options->output.apart = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     if (!renderer) {
@@ -198,22 +199,22 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     }
     Progress progress;
     progress_open(&progress, options->quiet);
-    Picture *picture =
-        picture_open(&options->picture, options->scene, scene, &settings, renderer, compute->device);
-    BandContext context = {picture, &progress, &messages};
-    bool whole = renderer_render(renderer, picture_renderer_aovs(&options->picture), band_take, &context);
+    ImageOutput *output =
+        image_output_open(&options->output, options->scene, scene, &settings, renderer, compute->device);
+    BandContext context = {output, &progress, &messages};
+    bool whole = renderer_render(renderer, options->output.aovs, band_take, &context);
     double encode_seconds = 0;
     if (whole)
-        whole = picture_commit(picture, &messages, &encode_seconds);
+        whole = image_output_commit(output, &messages, &encode_seconds);
     else
-        picture_abandon(picture);
+        image_output_abandon(output);
     progress_close(&progress);
     bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
     messages_print(&messages, NULL);
     int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
     if (status == EXIT_INTERRUPTED && compute_ok(compute))
         fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
-                options->picture.path);
+                options->output.path);
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderer_report(renderer), compute->device, &settings,
                      &(HostTimes){parse_seconds, encode_seconds});
@@ -226,15 +227,15 @@ int command_render(int argument_count, char **arguments)
     RenderOptions options;
     int status = options_read(&options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    char *default_path = picture_default_path(options.scene);
-    if (!options.picture.path) options.picture.path = default_path;
+    char *default_path = image_output_default_path(options.scene);
+    if (!options.output.path) options.output.path = default_path;
 
     Scene scene = {0};
     OpenDevice open;
     double start = clock_seconds();
     status = EXIT_USER;
-    if (picture_path_known(options.picture.path) && scene_open(&scene, options.scene, &options.common) &&
-        picture_spares_scene(&options.picture, &scene, options.scene)) {
+    if (image_output_path_known(options.output.path) && scene_open(&scene, options.scene, &options.common) &&
+        image_output_spares_scene(&options.output, &scene, options.scene)) {
         double parse_seconds = clock_seconds() - start;
         if (device_open(&open, options.common.device)) {
             status = scene_render(&options, &scene, &open.compute, parse_seconds);

@@ -92,6 +92,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
     RenderSettings settings = settings_whole(&options->common, width, height);
     settings.bounce_count = options->bounce_count;
     settings.shift_to_eye = true;
+    settings.stop = progress_interrupted;
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
         for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)

@@ -5,7 +5,6 @@
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
-#include "host/cli/layers.h"
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
@@ -106,13 +105,17 @@ static void prober_close(void *opened)
     free(scene);
 }
 
-static void prober_render(void *context, const Scene *scene, bool hierarchy, PictureLayers *picture)
+static Film prober_render(void *context, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height)
 {
     Prober *prober = context;
-    Renderer *renderer = scene_open_renderer(prober, scene, hierarchy, picture->width, picture->height);
-    if (renderer && layers_take(picture, renderer))
+    Renderer *renderer = scene_open_renderer(prober, scene, hierarchy, width, height);
+    Film film;
+    if (renderer && renderer_render_film(renderer, AOVS_ALL, &film))
         prober->render_kernel = renderer_report(renderer)->kernel_hash;
+    else
+        film = film_allocate(width, height, (uint32_t)scene->lights.count, AOVS_ALL);
     renderer_close(renderer);
+    return film;
 }
 
 static void prober_camera_axes(const Camera *camera, Vector3 axes[3])

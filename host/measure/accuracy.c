@@ -44,10 +44,10 @@ static size_t edges_mark(const ValueMap *map, bool *edges)
     return count;
 }
 
-void accuracy_edges_find(AccuracyEdges *edges, const PictureLayers *reference)
+void accuracy_edges_find(AccuracyEdges *edges, const Film *reference)
 {
     *edges = (AccuracyEdges){0};
-    const size_t pixels = layers_pixel_count(reference);
+    const size_t pixels = film_pixel_count(reference);
     ValueMap map = {reference->object, reference->width, reference->height, 1, 0};
     if (reference->object) {
         edges->silhouette = memory_allocate_zeroed(pixels, sizeof(bool));
@@ -77,18 +77,18 @@ void accuracy_edges_free(AccuracyEdges *edges)
     *edges = (AccuracyEdges){0};
 }
 
-void accuracy_count_unsound(const PictureLayers *layers, size_t *nonfinite, size_t *negative)
+void accuracy_count_unsound(const Film *film, size_t *nonfinite, size_t *negative)
 {
     *nonfinite = *negative = 0;
-    for (size_t i = 0; i < layers_pixel_count(layers); i++) {
-        const double *color = layers->color + 3 * i;
+    for (size_t i = 0; i < film_pixel_count(film); i++) {
+        const double *color = film->color + 3 * i;
         *nonfinite += !isfinite(color[0]) || !isfinite(color[1]) || !isfinite(color[2]);
         *negative += color[0] < 0 || color[1] < 0 || color[2] < 0;
     }
 }
 
 typedef struct {
-    const PictureLayers *reference, *variant;
+    const Film *reference, *variant;
     const AccuracyEdges *edges;
     AccuracyErrors *errors;
     // pixels that are compared further
@@ -248,16 +248,15 @@ static void pixel_compare(const Comparison *comparison, size_t pixel)
     color_offer(comparison, ACCURACY_SHADING, pixel);
 }
 
-static ImageMetrics display_compare(const PictureLayers *reference, const PictureLayers *variant,
-                                    bool display_values)
+static ImageMetrics display_compare(const Film *reference, const Film *variant, bool display_values)
 {
-    const PictureLayers *const layers[] = {reference, variant};
+    const Film *const films[] = {reference, variant};
     Image images[2];
     for (size_t i = 0; i < 2; i++)
-        images[i] = (Image){.width = layers[i]->width,
-                            .height = layers[i]->height,
+        images[i] = (Image){.width = films[i]->width,
+                            .height = films[i]->height,
                             .channels = 3,
-                            .values = layers_narrow_color(layers[i]),
+                            .values = film_narrow_color(films[i]),
                             .display = display_values};
     ImageMetrics metrics = image_metrics(&images[0], &images[1]);
     image_free(&images[0]);
@@ -265,13 +264,13 @@ static ImageMetrics display_compare(const PictureLayers *reference, const Pictur
     return metrics;
 }
 
-void accuracy_compare(AccuracyErrors *errors, const PictureLayers *reference, const AccuracyEdges *edges,
-                      const PictureLayers *variant, bool display_values)
+void accuracy_compare(AccuracyErrors *errors, const Film *reference, const AccuracyEdges *edges,
+                      const Film *variant, bool display_values)
 {
     *errors = (AccuracyErrors){0};
     if (!reference->object) errors->why_colors_only = "the reference has colors only";
     accuracy_count_unsound(variant, &errors->nonfinite, &errors->negative);
-    const size_t pixels = layers_pixel_count(reference);
+    const size_t pixels = film_pixel_count(reference);
     Comparison comparison = {
         .reference = reference,
         .variant = variant,

@@ -5,19 +5,22 @@
 
 #include "host/measure/bench.h"
 #include "host/measure/image_metrics.h"
-#include "host/render/layers.h"
+#include "host/render/film.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 // Where a rounding decides what a pixel shows: the pixels whose value differs from one of their 4 neighbors',
-// and those around them. NULL where the layers lack the values.
+// and those around them. NULL where the film lacks the AOV.
 typedef struct {
-    bool *silhouette, *shadow, *path;                           // shadow: for each light, as in the layers
+    bool *silhouette, *shadow, *path;                           // shadow: for each light, as in the film
     size_t silhouette_pixels, *shadow_edge_pixels, path_pixels; // shadow: for each light
 } AccuracyEdges;
 
-void accuracy_edges_find(AccuracyEdges *edges, const PictureLayers *reference);
+// The AOVs that are compared.
+enum { ACCURACY_AOVS = AOV_T | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW | AOV_PATH };
+
+void accuracy_edges_find(AccuracyEdges *edges, const Film *reference);
 void accuracy_edges_free(AccuracyEdges *edges); // and zeroes
 
 // The kinds of error, each with one figure that is plotted.
@@ -75,10 +78,10 @@ typedef struct {
 
 // `variant` and `reference` are of one size, and of one number of lights. `display_values`: colors are for a
 // screen as they are, without the sRGB curve.
-void accuracy_compare(AccuracyErrors *errors, const PictureLayers *reference, const AccuracyEdges *edges,
-                      const PictureLayers *variant, bool display_values);
+void accuracy_compare(AccuracyErrors *errors, const Film *reference, const AccuracyEdges *edges,
+                      const Film *variant, bool display_values);
 // Pixels with a channel that is not finite, and with one below 0.
-void accuracy_count_unsound(const PictureLayers *layers, size_t *nonfinite, size_t *negative);
+void accuracy_count_unsound(const Film *film, size_t *nonfinite, size_t *negative);
 
 typedef enum {
     ACCURACY_MEASURED,

@@ -39,20 +39,21 @@ static size_t group_side(const Renderer *renderer)
     return renderer->report.lanes > 1 && on_cpu ? 1 : 8;
 }
 
-// The buffers that a band is rendered into, sized for `rows`.
+// What a band is rendered into, on the device.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, ray_counts, colors, losses, ray, t, normal, position, object, shadow, path;
-} Film;
+    cl_mem offsets, ray_counts, losses, layers[LAYER_COUNT];
+} BandBuffers;
 
-static size_t film_pixels(const Renderer *renderer, uint32_t rows)
+// The film of these rows, without its layers.
+static Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count)
 {
-    return (size_t)renderer->settings.region_width * rows;
-}
-
-static size_t film_shadow_size(const Renderer *renderer, uint32_t rows)
-{
-    return film_pixels(renderer, rows) * renderer->light_count * sizeof(uint32_t);
+    return (Film){.width = renderer->settings.region_width,
+                  .height = row_count,
+                  .light_count = (uint32_t)renderer->light_count,
+                  .first_row = first_row,
+                  .wide = renderer->report.wide,
+                  .real_size = renderer_scalar_size(renderer)};
 }
 
 static cl_mem film_buffer(Renderer *renderer, size_t size)
@@ -60,36 +61,39 @@ static cl_mem film_buffer(Renderer *renderer, size_t size)
     return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
 }
 
-static void film_open(Film *film, Renderer *renderer, unsigned aovs, uint32_t rows)
+static bool layer_in(unsigned layers, Layer layer)
 {
-    const RenderSettings *settings = &renderer->settings;
-    size_t scalar = renderer_scalar_size(renderer), pixels = film_pixels(renderer, rows);
-    film->rows = rows;
-    film->colors = film_buffer(renderer, pixels * 3 * scalar);
-    film->losses = film_buffer(renderer, pixels * 3 * scalar);
-    if (aovs & ~(unsigned)AOV_PATH) {
-        film->ray = film_buffer(renderer, pixels * 3 * scalar);
-        film->t = film_buffer(renderer, pixels * scalar);
-        film->normal = film_buffer(renderer, pixels * 3 * scalar);
-        film->position = film_buffer(renderer, pixels * 3 * scalar);
-        film->object = film_buffer(renderer, pixels * sizeof(uint32_t));
-        film->shadow = film_buffer(renderer, aovs & AOV_SHADOW ? film_shadow_size(renderer, rows) : 0);
+    return layers >> layer & 1;
+}
+
+static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, uint32_t rows)
+{
+    const uint32_t sample_count = renderer->settings.sample_count;
+    const Film film = film_of_rows(renderer, 0, rows);
+    // a kernel fills all of its layers, but computes shadows only where they are asked for
+    unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & AOVS_OF_PATH);
+    buffers->rows = rows;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        bool empty = layer == LAYER_SHADOW && !(aovs & AOV_SHADOW);
+        if (layer_in(filled, layer))
+            buffers->layers[layer] = film_buffer(renderer, empty ? 0 : film_layer_size(&film, layer));
     }
-    if (aovs & AOV_PATH) film->path = film_buffer(renderer, pixels * sizeof(uint32_t));
-    film->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
-    void *offsets = sample_pattern(settings->sample_count, renderer->report.wide);
-    film->offsets =
-        buffer_create(renderer->compute, 2 * settings->sample_count * scalar, offsets, CL_MEM_READ_ONLY);
+    buffers->losses = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
+    buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
+    void *offsets = sample_pattern(sample_count, renderer->report.wide);
+    buffers->offsets =
+        buffer_create(renderer->compute, 2 * sample_count * film.real_size, offsets, CL_MEM_READ_ONLY);
     free(offsets);
 }
 
-static void film_close(Film *film)
+static void buffers_close(BandBuffers *buffers)
 {
-    cl_mem buffers[] = {film->offsets, film->ray_counts, film->colors, film->losses, film->ray, film->t,
-                        film->normal,  film->position,   film->object, film->shadow, film->path};
-    for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
-        buffer_release(buffers[i]);
-    *film = (Film){0};
+    buffer_release(buffers->offsets);
+    buffer_release(buffers->ray_counts);
+    buffer_release(buffers->losses);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        buffer_release(buffers->layers[layer]);
+    *buffers = (BandBuffers){0};
 }
 
 typedef struct {
@@ -116,112 +120,83 @@ static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint a
 
 _Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");
 
-static void ray_counts_clear(Renderer *renderer, const Film *film)
+static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
 {
     const uint32_t zeros[RAYS_COUNT] = {0};
-    buffer_write(renderer->compute, film->ray_counts, sizeof zeros, zeros);
+    buffer_write(renderer->compute, buffers->ray_counts, sizeof zeros, zeros);
 }
 
-static void ray_counts_add(Renderer *renderer, const Film *film)
+static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
 {
     uint32_t counts[RAYS_COUNT] = {0};
-    buffer_read(renderer->compute, film->ray_counts, sizeof counts, counts);
+    buffer_read(renderer->compute, buffers->ray_counts, sizeof counts, counts);
     for (size_t i = 0; i < RAYS_COUNT; i++)
         renderer->report.rays[i] += counts[i];
 }
 
 // One launch for samples first..last-1; returns its seconds, the event's where it can be trusted.
-static double band_render(Renderer *renderer, const Film *film, BandRows rows, uint32_t first, uint32_t last)
+static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRows rows, uint32_t first,
+                          uint32_t last)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &film->offsets);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->colors);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &film->losses);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &buffers->offsets);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->losses);
     band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &film->ray_counts);
-    if (renderer->settings.counting) ray_counts_clear(renderer, film);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &buffers->ray_counts);
+    if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
     LaunchTime time = band_launch(renderer, KERNEL_RENDER, rows);
-    if (renderer->settings.counting) ray_counts_add(renderer, film);
+    if (renderer->settings.counting) ray_counts_add(renderer, buffers);
     return time.trusted ? time.event_seconds : time.host_seconds;
 }
 
-static void band_aovs(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows)
+// Has a kernel fill its layers, whose buffers follow the band in its arguments.
+static void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
+                      unsigned aovs, BandRows rows)
 {
-    cl_kernel kernel = renderer_kernel(renderer, KERNEL_AOV);
+    cl_kernel kernel = renderer_kernel(renderer, kind);
     band_set_place(renderer, kernel, FLAT_COUNT, rows);
-    const cl_mem *buffers[] = {&film->ray,      &film->t,      &film->normal,
-                               &film->position, &film->object, &film->shadow};
-    for (cl_uint i = 0; i < 6; i++)
-        kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1 + i, sizeof(cl_mem), buffers[i]);
+    cl_uint argument = FLAT_COUNT + 1;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (layer_in(layers, layer))
+            kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->layers[layer]);
     cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 7, sizeof shadow_count, &shadow_count);
-    band_launch(renderer, KERNEL_AOV, rows);
+    if (layers & AOV_SHADOW)
+        kernel_argument(renderer->compute, kernel, argument, sizeof shadow_count, &shadow_count);
+    band_launch(renderer, kind, rows);
 }
 
-static void band_paths(Renderer *renderer, const Film *film, BandRows rows)
+// Lengths of the device in the scene's unit. They are so already where that is 1, as at `double` it always
+// is; else the caller frees a copy.
+static void *lengths_restored(const Renderer *renderer, void *lengths, size_t count)
 {
-    cl_kernel kernel = renderer_kernel(renderer, KERNEL_PATH);
-    band_set_place(renderer, kernel, FLAT_COUNT, rows);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &film->path);
-    band_launch(renderer, KERNEL_PATH, rows);
-}
-
-// Lengths of the device in the scene's own, in memory of the caller's, or NULL where they are so already, as
-// at `double` they always are.
-static float *lengths_restored(const Renderer *renderer, const void *lengths, size_t count)
-{
-    if (renderer->unit == 1 || !lengths) return NULL;
+    if (renderer->unit == 1) return lengths;
     float *restored = memory_allocate(count, sizeof *restored);
     for (size_t i = 0; i < count; i++)
         restored[i] = ((const float *)lengths)[i] * (float)renderer->unit;
     return restored;
 }
 
-static bool band_deliver(Renderer *renderer, const Film *film, unsigned aovs, BandRows rows, BandSink sink,
-                         void *context)
+static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigned aovs, BandRows rows,
+                         BandSink sink, void *context)
 {
-    const RenderSettings *settings = &renderer->settings;
-    size_t scalar = renderer_scalar_size(renderer), pixels = film_pixels(renderer, rows.row_count);
-    const struct {
-        unsigned aov; // 0: the color, always there
-        cl_mem buffer;
-        size_t size;
-    } parts[] = {
-        {0, film->colors, pixels * 3 * scalar},
-        {AOV_T, film->t, pixels * scalar},
-        {AOV_NORMAL, film->normal, pixels * 3 * scalar},
-        {AOV_POSITION, film->position, pixels * 3 * scalar},
-        {AOV_OBJECT, film->object, pixels * sizeof(uint32_t)},
-        {AOV_SHADOW, film->shadow, film_shadow_size(renderer, rows.row_count)},
-        {AOV_RAY, film->ray, pixels * 3 * scalar},
-        {AOV_PATH, film->path, pixels * sizeof(uint32_t)},
-    };
-    enum { PART_COUNT = sizeof parts / sizeof *parts };
-    const void *mapped[PART_COUNT] = {NULL};
-    for (size_t i = 0; i < PART_COUNT; i++)
-        if ((parts[i].aov == 0 || (aovs & parts[i].aov)) && parts[i].size > 0)
-            mapped[i] = renderer_map(renderer, parts[i].buffer, parts[i].size);
-    float *t = lengths_restored(renderer, mapped[1], pixels),
-          *position = lengths_restored(renderer, mapped[3], 3 * pixels);
-    // in the order of the parts
-    Band band = {.first_row = rows.first_row,
-                 .row_count = rows.row_count,
-                 .colors = mapped[0],
-                 .t = t ? t : mapped[1],
-                 .normal = mapped[2],
-                 .position = position ? position : mapped[3],
-                 .object = mapped[4],
-                 .shadow = mapped[5],
-                 .ray = mapped[6],
-                 .path = mapped[7]};
-    double done = (double)(rows.first_row + rows.row_count) / settings->region_height;
+    Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
+    void *mapped[LAYER_COUNT] = {NULL};
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        size_t size = film_layer_size(&band, layer);
+        if (!layer_in(aovs | AOV_COLOR, layer) || size == 0) continue;
+        band.layers[layer] = mapped[layer] = renderer_map(renderer, buffers->layers[layer], size);
+        if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
+            band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
+    }
+    double done = (double)(rows.first_row + rows.row_count) / renderer->settings.region_height;
     bool go_on = compute_ok(renderer->compute) && sink(context, &band, done);
-    free(t);
-    free(position);
-    for (size_t i = 0; i < PART_COUNT; i++)
-        renderer_unmap(renderer, parts[i].buffer, mapped[i]);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
+        renderer_unmap(renderer, buffers->layers[layer], mapped[layer]);
+    }
     return go_on;
 }
 
@@ -252,12 +227,13 @@ static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t m
     return rows < most ? (uint32_t)rows : most;
 }
 
-static uint32_t film_rows_largest(const Renderer *renderer, unsigned aovs)
+static uint32_t rows_largest(const Renderer *renderer, unsigned aovs)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows;
-    size_t row_bytes = film_pixels(renderer, 1) * 3 * renderer_scalar_size(renderer);
-    if (aovs & AOV_SHADOW) row_bytes += film_shadow_size(renderer, 1);
+    const Film row = film_of_rows(renderer, 0, 1);
+    size_t row_bytes = film_layer_size(&row, LAYER_COLOR);
+    if (aovs & AOV_SHADOW) row_bytes += film_layer_size(&row, LAYER_SHADOW);
     size_t rows = BAND_BYTES_LARGEST / row_bytes;
     size_t step = rows_step(renderer);
     rows = rows < step ? step : rows - rows % step;
@@ -268,30 +244,48 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
 {
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
-    Film film = {0};
-    film_open(&film, renderer, aovs, film_rows_largest(renderer, aovs));
+    BandBuffers buffers = {0};
+    buffers_open(&buffers, renderer, aovs, rows_largest(renderer, aovs));
     Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
     bool go_on = compute_ok(compute);
     BandRows rows = {0};
     while (go_on && rows.first_row < settings->region_height) {
         uint32_t left = settings->region_height - rows.first_row;
-        rows.row_count = band_rows(renderer, &pace, left < film.rows ? left : film.rows);
-        uint64_t pixels = film_pixels(renderer, rows.row_count);
+        rows.row_count = band_rows(renderer, &pace, left < buffers.rows ? left : buffers.rows);
+        uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
         pace_begin_band(&pace);
         for (uint32_t first = 0; go_on && first < settings->sample_count;) {
             uint32_t samples = pace_launch_samples(&pace, pixels, settings->sample_count - first);
-            double seconds = band_render(renderer, &film, rows, first, first + samples);
+            double seconds = band_render(renderer, &buffers, rows, first, first + samples);
             pace_note_launch(&pace, pixels, samples, seconds);
             first += samples;
             go_on = compute_ok(compute) && !(settings->stop && settings->stop());
         }
         if (!go_on) break;
-        // one ray a pixel, as the band's first launch had
-        if (aovs & ~(unsigned)AOV_PATH) band_aovs(renderer, &film, aovs, rows);
-        if (aovs & AOV_PATH) band_paths(renderer, &film, rows);
-        go_on = band_deliver(renderer, &film, aovs, rows, sink, context);
+        // one ray per pixel, as the band's first launch had
+        if (aovs & AOVS_OF_HIT) band_fill(renderer, KERNEL_AOV, AOVS_OF_HIT, &buffers, aovs, rows);
+        if (aovs & AOVS_OF_PATH) band_fill(renderer, KERNEL_PATH, AOVS_OF_PATH, &buffers, aovs, rows);
+        go_on = band_deliver(renderer, &buffers, aovs, rows, sink, context);
         rows.first_row += rows.row_count;
     }
-    film_close(&film);
+    buffers_close(&buffers);
     return go_on && compute_ok(compute);
+}
+
+static bool film_take_band(void *film, const Film *band, double fraction_done)
+{
+    (void)fraction_done;
+    film_copy_band(film, band);
+    return true;
+}
+
+bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
+{
+    const RenderSettings *settings = &renderer->settings;
+    *film =
+        film_allocate(settings->region_width, settings->region_height, (uint32_t)renderer->light_count, aovs);
+    film->wide = renderer->report.wide;
+    bool whole = renderer_render(renderer, aovs, film_take_band, film);
+    if (!whole) film_free(film);
+    return whole;
 }

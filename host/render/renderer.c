@@ -206,14 +206,14 @@ LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensio
     return time;
 }
 
-const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
+void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
 {
     Compute *compute = renderer->compute;
     if (!compute_ok(compute)) return NULL;
     double start = clock_seconds();
     cl_event event = NULL;
     cl_int status;
-    const void *mapped =
+    void *mapped =
         clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size, 0, NULL, &event, &status);
     if (!compute_check_object(compute, mapped, status, "clEnqueueMapBuffer")) {
         if (event) clReleaseEvent(event);

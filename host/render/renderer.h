@@ -4,21 +4,11 @@
 
 #include "host/compile/settings.h"
 #include "host/opencl/compute.h"
+#include "host/render/film.h"
 #include "host/render/trace.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
 #include <stdint.h>
-
-// What a picture can hold beside its color; a set of bits.
-enum {
-    AOV_T = 1,
-    AOV_NORMAL = 2,
-    AOV_POSITION = 4,
-    AOV_OBJECT = 8,
-    AOV_SHADOW = 16,
-    AOV_RAY = 32,
-    AOV_PATH = 64
-};
 
 typedef struct {
     uint32_t width, height;                                   // of the whole picture
@@ -51,25 +41,15 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
                         MessageList *messages);
 void renderer_close(Renderer *renderer);
 
-// Rows of the region, from the top. Values are float, or double at `double` (RenderReport.wide).
-typedef struct {
-    uint32_t first_row, row_count;
-    const void *colors; // 3 per pixel, linear
-    // NULL where not asked for; at the pixel's center
-    const void *t;                 // 1 per pixel; infinity where nothing was hit
-    const void *normal, *position; // 3 per pixel, 0 where nothing was hit; relative to the eye
-    const uint32_t *object;        // 1 per pixel; UINT32_MAX where nothing was hit
-    const uint32_t *shadow;        // 1 per light and pixel: 1 where the light does not reach what was hit
-    const void *ray;               // 3 per pixel: the direction, unit but for rounding, from the eye
-    const uint32_t *path;          // 1 per pixel: the signature of what the ray met (kernels/types.h)
-} Band;
+// Called for each band from the top, whose layers are valid until it returns; returns false to stop.
+typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
 
-// Called for each band from the top; returns false to stop (a user's interrupt).
-typedef bool (*BandSink)(void *context, const Band *band, double fraction_done);
-
-// Renders the region in bands of about band_seconds each. False: the device failed (compute_ok says so), else
-// `stop` or the sink ended it. A failed device delivers no further band.
+// Renders the color and the AOVs of the set in bands of about band_seconds each. False: the device failed
+// (compute_ok says so), else settings.stop or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
+// The same into one film in double, which film_free frees. False: the device failed, or settings.stop ended
+// it; there is nothing to free.
+bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 
 // Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders. False: the
 // device failed, and `hits` are undefined.

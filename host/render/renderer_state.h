@@ -36,5 +36,5 @@ LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensio
 
 // Maps a buffer for the host to read, noting the time; NULL: the device failed. Released with renderer_unmap,
 // which accepts NULL.
-const void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
+void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

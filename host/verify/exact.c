@@ -70,7 +70,7 @@ LongVector exact_from_eye(const VerifyRun *run, Vector3 point, Vector3 eye)
                         verify_rounded(run, point.z - eye.z)};
 }
 
-LongVector exact_pixel_ray(const PictureLayers *picture, size_t pixel)
+LongVector exact_pixel_ray(const Film *picture, size_t pixel)
 {
     return long_vector(verify_vector(&picture->ray[3 * pixel]));
 }

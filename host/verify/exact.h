@@ -21,7 +21,7 @@ LongVector long_unit(LongVector a);
 
 // A point as the kernels have it: from the eye, rounded once.
 LongVector exact_from_eye(const VerifyRun *run, Vector3 point, Vector3 eye);
-LongVector exact_pixel_ray(const PictureLayers *picture, size_t pixel);
+LongVector exact_pixel_ray(const Film *picture, size_t pixel);
 
 // What a ray from the origin meets.
 typedef struct {

@@ -35,10 +35,10 @@ void verify_nested_spheres(VerifyRun *run)
         scene.objects.items[1].as.sphere.radius = scale * ratio;
         const Vector3 eye = {1.5 * scale, 2 * scale, 2.5 * scale}, center = {0, 0, 0};
         scene.camera = verify_camera(eye, center, 40);
-        PictureLayers picture = verify_render(run, &scene, false, 192, 192);
+        Film picture = verify_render(run, &scene, false, 192, 192);
         Long coat = verify_rounded(run, scale * ratio);
         size_t seen = 0;
-        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             ExactHit exact =
                 exact_sphere(exact_from_eye(run, center, eye), coat, exact_pixel_ray(&picture, i));
             if (picture.object[i] != 1) {
@@ -50,7 +50,7 @@ void verify_nested_spheres(VerifyRun *run)
             run->result->wrong += picture.path[i] != expected;
         }
         run->result->wrong += seen == 0;
-        layers_free(&picture);
+        film_free(&picture);
         scene_free(&scene);
     }
 }
@@ -76,7 +76,7 @@ static const char *const matched[] = {
     "  - box: {min: [-0.9, -0.8, -0.7], max: [0.7, 0.8, 0.9], material: glass}\n"};
 
 // How far a pixel's tile is from the next, in pixels.
-static double edge_distance(const PictureLayers *empty, size_t pixel)
+static double edge_distance(const Film *empty, size_t pixel)
 {
     const double *d = &empty->ray[3 * pixel];
     double nearest = INFINITY, step = 2 * tan(15 * (M_PI / 180)) * 10 / empty->height;
@@ -145,22 +145,22 @@ static void judge_straight_rays(VerifyRun *run, const char *object, unsigned see
 void verify_matched_glass(VerifyRun *run)
 {
     Scene without = matched_scene("");
-    PictureLayers empty = verify_render(run, &without, false, 256, 256);
+    Film empty = verify_render(run, &without, false, 256, 256);
     scene_free(&without);
     for (unsigned k = 0; k < sizeof matched / sizeof *matched; k++) {
         Scene scene = matched_scene(matched[k]);
-        PictureLayers picture = verify_render(run, &scene, false, 256, 256);
+        Film picture = verify_render(run, &scene, false, 256, 256);
         scene_free(&scene);
         size_t through = 0;
-        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             through += picture.object[i] == 1;
             if (edge_distance(&empty, i) < 1e-3) continue;
             for (size_t c = 3 * i; c < 3 * i + 3; c++)
                 verify_note(run, fabs(picture.color[c] - empty.color[c]), 1e-5, "of 1");
         }
         run->result->wrong += through == 0;
-        layers_free(&picture);
+        film_free(&picture);
         judge_straight_rays(run, matched[k], 71 + k);
     }
-    layers_free(&empty);
+    film_free(&empty);
 }

@@ -40,12 +40,12 @@ void verify_highlights(VerifyRun *run)
             scene.camera.look_at = highlight_middle(eye, vector_scale(direction, -1));
             scene.camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
         }
-        PictureLayers picture = verify_render(run, &scene, false, 96, 96);
+        Film picture = verify_render(run, &scene, false, 96, 96);
         LongVector to_light = {-verify_rounded(run, direction.x), -verify_rounded(run, direction.y),
                                -verify_rounded(run, direction.z)};
         size_t seen = 0;
         double brightest = 0;
-        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             double value = picture.color[3 * i];
             run->result->wrong += value < 0 || value > 1 + 0x1p-20;
             seen += picture.object[i] == 0;
@@ -60,7 +60,7 @@ void verify_highlights(VerifyRun *run)
         }
         // closely, the highlight's middle lies in the picture's
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);
-        layers_free(&picture);
+        film_free(&picture);
         scene_free(&scene);
     }
 }

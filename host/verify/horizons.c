@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 // The first row, from the bottom, whose pixel of the column hits nothing; counts what is hit above it.
-static uint32_t column_horizon(VerifyRun *run, const PictureLayers *picture, uint32_t column)
+static uint32_t column_horizon(VerifyRun *run, const Film *picture, uint32_t column)
 {
     uint32_t row = picture->height;
     while (row > 0 && verify_pixel_found(picture, (size_t)(row - 1) * picture->width + column))
@@ -26,7 +26,7 @@ void verify_ground_horizon(VerifyRun *run)
     const Vector3 eye = {0, 1, 0};
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
-        PictureLayers picture = verify_render(run, &scene, false, 128, 512);
+        Film picture = verify_render(run, &scene, false, 128, 512);
         LongVector center = exact_from_eye(run, scene.objects.items[0].as.sphere.center, eye);
         for (uint32_t column = 0; column < picture.width; column++) {
             uint32_t horizon = column_horizon(run, &picture, column), exact = picture.height;
@@ -41,7 +41,7 @@ void verify_ground_horizon(VerifyRun *run)
             }
             verify_note(run, fabs((double)horizon - (double)exact), 1, "rows");
         }
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }
@@ -54,10 +54,10 @@ void verify_plane_horizon(VerifyRun *run)
     const Vector3 eye = {0, 1.7, 0}, ahead = {0, 1.7, 1};
     scene.camera = verify_camera(eye, ahead, 60);
     for (uint32_t height = 511; height <= 512; height++) {
-        PictureLayers picture = verify_render(run, &scene, false, 512, height);
+        Film picture = verify_render(run, &scene, false, 512, height);
         for (uint32_t column = 0; column < picture.width; column++)
             run->result->wrong += column_horizon(run, &picture, column) != (height + 1) / 2;
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }

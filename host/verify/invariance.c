@@ -53,25 +53,25 @@ static Scene every_shape_scene(void)
 }
 
 // Counts the objects of a scene that no pixel shows: two empty pictures would be alike.
-static void demand_every_object(VerifyRun *run, const Scene *scene, const PictureLayers *picture)
+static void demand_every_object(VerifyRun *run, const Scene *scene, const Film *picture)
 {
     for (size_t object = 0; object < scene->objects.count; object++) {
         size_t pixel = 0;
-        while (pixel < layers_pixel_count(picture) && picture->object[pixel] != object)
+        while (pixel < film_pixel_count(picture) && picture->object[pixel] != object)
             pixel++;
-        run->result->wrong += pixel == layers_pixel_count(picture);
+        run->result->wrong += pixel == film_pixel_count(picture);
     }
 }
 
 typedef struct {
-    const PictureLayers *picture;
+    const Film *picture;
     double scale; // of lengths
     bool mirrored;
 } View;
 
-static bool pixels_agree(const PictureLayers *a, size_t i, const View *view, size_t k)
+static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
 {
-    const PictureLayers *b = view->picture;
+    const Film *b = view->picture;
     double side = view->mirrored ? -1 : 1, scale = view->scale;
     bool same = a->object[i] == b->object[k] && a->path[i] == b->path[k];
     same &= b->t[k] == a->t[i] * scale;
@@ -88,9 +88,9 @@ static bool pixels_agree(const PictureLayers *a, size_t i, const View *view, siz
 }
 
 // Counts the pixels of two pictures that are not each other's, bit for bit but for the sign of a zero.
-static void compare(VerifyRun *run, const PictureLayers *a, const View *view)
+static void compare(VerifyRun *run, const Film *a, const View *view)
 {
-    for (size_t i = 0; i < layers_pixel_count(a); i++) {
+    for (size_t i = 0; i < film_pixel_count(a); i++) {
         size_t column = i % a->width, other = view->mirrored ? i + a->width - 1 - 2 * column : i;
         run->result->differing += !pixels_agree(a, i, view, other);
     }
@@ -100,19 +100,19 @@ void verify_scaled_scenes(VerifyRun *run)
 {
     static const int exponents[] = {-20, -10, -3, 3, 10, 20};
     Scene scene = every_shape_scene();
-    PictureLayers picture = verify_render(run, &scene, false, 160, 120);
+    Film picture = verify_render(run, &scene, false, 160, 120);
     demand_every_object(run, &scene, &picture);
     scene_free(&scene);
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         double scale = ldexp(1, exponents[i]);
         Scene scaled = every_shape_scene();
         scene_scale(&scaled, scale);
-        PictureLayers other = verify_render(run, &scaled, i % 2, 160, 120);
+        Film other = verify_render(run, &scaled, i % 2, 160, 120);
         compare(run, &picture, &(View){&other, scale, false});
-        layers_free(&other);
+        film_free(&other);
         scene_free(&scaled);
     }
-    layers_free(&picture);
+    film_free(&picture);
 }
 
 // Whether a ray, or one turned by a few roundings, meets the object.
@@ -138,7 +138,7 @@ static bool meets_nearby(VerifyRun *run, void *opened, const double direction[3]
     return false;
 }
 
-static bool shadow_edge_beside(const PictureLayers *picture, size_t pixel, size_t light)
+static bool shadow_edge_beside(const Film *picture, size_t pixel, size_t light)
 {
     size_t column = pixel % picture->width, row = pixel / picture->width;
     uint32_t here = picture->shadow[pixel * picture->light_count + light];
@@ -150,10 +150,9 @@ static bool shadow_edge_beside(const PictureLayers *picture, size_t pixel, size_
 
 // The scene with its axes exchanged. An object may differ where the other one is met within a few roundings
 // of the ray, a shadow at its edge; where neither does, colors are the same within 1e-5.
-static void judge_turned(VerifyRun *run, void *opened, const PictureLayers *picture,
-                         const PictureLayers *turned)
+static void judge_turned(VerifyRun *run, void *opened, const Film *picture, const Film *turned)
 {
-    for (size_t i = 0; i < layers_pixel_count(picture); i++) {
+    for (size_t i = 0; i < film_pixel_count(picture); i++) {
         bool same = picture->object[i] == turned->object[i];
         if (!same) run->result->wrong += !meets_nearby(run, opened, &picture->ray[3 * i], turned->object[i]);
         for (size_t light = 0; light < picture->light_count && same; light++) {
@@ -196,27 +195,27 @@ void verify_mirrored_scenes(VerifyRun *run)
     for (uint32_t width = 511; width <= 512; width++) {
         Scene scene = unchecked_scene(), mirrored = unchecked_scene();
         scene_mirror(&mirrored);
-        PictureLayers picture = verify_render(run, &scene, false, width, 128);
+        Film picture = verify_render(run, &scene, false, width, 128);
         demand_every_object(run, &scene, &picture);
-        PictureLayers other = verify_render(run, &mirrored, false, width, 128);
+        Film other = verify_render(run, &mirrored, false, width, 128);
         compare(run, &picture, &(View){&other, 1, true});
-        layers_free(&picture);
-        layers_free(&other);
+        film_free(&picture);
+        film_free(&other);
         scene_free(&scene);
         scene_free(&mirrored);
     }
     Scene scene = plain_scene(), turned = plain_scene();
-    PictureLayers picture = verify_render(run, &scene, false, 256, 192);
+    Film picture = verify_render(run, &scene, false, 256, 192);
     demand_every_object(run, &scene, &picture);
     void *opened = run->renderer->open(run->renderer->context, &scene, false);
     for (unsigned turns = 1; turns < 3; turns++) {
         scene_turn_axes(&turned);
-        PictureLayers other = verify_render(run, &turned, false, 256, 192);
+        Film other = verify_render(run, &turned, false, 256, 192);
         judge_turned(run, opened, &picture, &other);
-        layers_free(&other);
+        film_free(&other);
     }
     run->renderer->close(opened);
-    layers_free(&picture);
+    film_free(&picture);
     scene_free(&scene);
     scene_free(&turned);
 }

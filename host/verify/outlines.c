@@ -10,7 +10,7 @@
 static const Vector3 origin;
 
 // Of rays from the center outward no pixel that is farther out is brighter.
-static void judge_radial_brightness(VerifyRun *run, const PictureLayers *picture)
+static void judge_radial_brightness(VerifyRun *run, const Film *picture)
 {
     const uint32_t side = picture->width;
     for (unsigned k = 0; k < 16; k++) {
@@ -31,11 +31,11 @@ static void judge_radial_brightness(VerifyRun *run, const PictureLayers *picture
 }
 
 // Lambert's cosine for light from the eye's side, at each pixel that is hit; the 99.9th percentile counts.
-static void judge_lambert(VerifyRun *run, const PictureLayers *picture, LongVector center, double bound)
+static void judge_lambert(VerifyRun *run, const Film *picture, LongVector center, double bound)
 {
-    float *errors = memory_allocate(layers_pixel_count(picture), sizeof *errors);
+    float *errors = memory_allocate(film_pixel_count(picture), sizeof *errors);
     size_t count = 0;
-    for (size_t i = 0; i < layers_pixel_count(picture); i++) {
+    for (size_t i = 0; i < film_pixel_count(picture); i++) {
         ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(picture, i));
         if (!exact.found || !verify_pixel_found(picture, i)) continue;
         Long shade = fmaxl(exact.normal.z, 0);
@@ -54,23 +54,23 @@ void verify_far_fringe(VerifyRun *run)
         double distance = distances[k];
         const Vector3 eye = {0, 0, distance};
         scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
-        PictureLayers picture = verify_render(run, &scene, false, 512, 512);
+        Film picture = verify_render(run, &scene, false, 512, 512);
         LongVector center = exact_from_eye(run, origin, eye);
         judge_radial_brightness(run, &picture);
-        for (size_t i = 0; i < layers_pixel_count(&picture) && run->tier != TIER_A; i++) {
+        for (size_t i = 0; i < film_pixel_count(&picture) && run->tier != TIER_A; i++) {
             ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(&picture, i));
             exact_judge(run, &exact, verify_pixel_found(&picture, i), picture.t[i]);
         }
         if (run->tier == TIER_B && distance <= 1e3) judge_lambert(run, &picture, center, 2e-3);
         if (run->tier > TIER_B) judge_lambert(run, &picture, center, 1e-5);
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }
 
 // Holds each pixel to the oracle.
 #define JUDGE_PIXELS(picture, exact_of_direction)                                                            \
-    for (size_t i = 0; i < layers_pixel_count(picture) && run->tier != TIER_A; i++) {                        \
+    for (size_t i = 0; i < film_pixel_count(picture) && run->tier != TIER_A; i++) {                          \
         LongVector direction = exact_pixel_ray(picture, i);                                                  \
         ExactHit exact = exact_of_direction;                                                                 \
         exact_judge(run, &exact, verify_pixel_found(picture, i), (picture)->t[i]);                           \
@@ -83,7 +83,7 @@ void verify_wire(VerifyRun *run)
         verify_scene("objects:\n  - cylinder: {from: [-10000, 0, 0], to: [10000, 0, 0], radius: 0.001}\n");
     const Vector3 eye = {0, 0, -10};
     scene.camera = verify_camera(eye, origin, 0.293);
-    PictureLayers picture = verify_render(run, &scene, false, 1024, 64);
+    Film picture = verify_render(run, &scene, false, 1024, 64);
     LongVector center = exact_from_eye(run, origin, eye);
     const LongVector axis = {1, 0, 0};
     Long radius = verify_rounded(run, 0.001);
@@ -97,7 +97,7 @@ void verify_wire(VerifyRun *run)
         }
         run->result->leaks += stretches != 1;
     }
-    layers_free(&picture);
+    film_free(&picture);
     scene_free(&scene);
 }
 
@@ -119,8 +119,8 @@ void verify_apex(VerifyRun *run)
         Scene scene = verify_scene(text);
         scene.camera = verify_camera(views[k].eye, origin, 0);
         scene.camera.half_tangent = SIDE * 1e-4 / 2 / 5;
-        PictureLayers picture = verify_render(run, &scene, false, SIDE, SIDE);
-        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        Film picture = verify_render(run, &scene, false, SIDE, SIDE);
+        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             if (k == 0) run->result->wrong += !verify_pixel_found(&picture, i) || !(picture.color[3 * i] > 0);
             if (!verify_pixel_found(&picture, i)) continue;
             const double u = verify_roundoff(run);
@@ -128,7 +128,7 @@ void verify_apex(VerifyRun *run)
             // a root and a quotient more
             verify_note(run, fabs(length - 1) / u, run->renderer->inexact ? 4 + 6 + 4 : 4, "u");
         }
-        layers_free(&picture);
+        film_free(&picture);
         scene_free(&scene);
     }
 }
@@ -149,10 +149,10 @@ void verify_far_torus(VerifyRun *run)
         const Vector3 eye = {0.3 * distances[k], 0.4 * distances[k], -0.866 * distances[k]};
         scene.camera = verify_camera(eye, origin, 0);
         scene.camera.half_tangent = 1.3 / distances[k];
-        PictureLayers picture = verify_render(run, &scene, false, 160, 160);
+        Film picture = verify_render(run, &scene, false, 160, 160);
         LongVector center = exact_from_eye(run, origin, eye);
         JUDGE_PIXELS(&picture, exact_torus(center, 1, 0.25L, direction))
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }
@@ -182,7 +182,7 @@ void verify_tangent_circle(VerifyRun *run)
 
 // Pixels still to be looked at, and those that were.
 typedef struct {
-    const PictureLayers *picture;
+    const Film *picture;
     uint32_t (*pending)[2]; // column, row
     size_t pending_count;
     bool *seen;
@@ -201,7 +201,7 @@ static bool flood_take(Flood *flood, uint32_t column, uint32_t row)
 
 static void flood_run(Flood *flood)
 {
-    const PictureLayers *picture = flood->picture;
+    const Film *picture = flood->picture;
     while (flood->pending_count > 0) {
         const uint32_t *place = flood->pending[--flood->pending_count];
         uint32_t column = place[0], row = place[1];
@@ -212,9 +212,9 @@ static void flood_run(Flood *flood)
 }
 
 // How many parts the hit pixels fall into, where those that touch at a corner belong together.
-static size_t count_parts(const PictureLayers *picture)
+static size_t count_parts(const Film *picture)
 {
-    size_t parts = 0, pixels = layers_pixel_count(picture);
+    size_t parts = 0, pixels = film_pixel_count(picture);
     Flood flood = {picture, memory_allocate(pixels, sizeof *flood.pending), 0,
                    memory_allocate_zeroed(pixels, sizeof *flood.seen)};
     for (uint32_t row = 0; row < picture->height; row++)
@@ -240,12 +240,12 @@ void verify_thin_ring(VerifyRun *run)
     Scene scene = torus_scene(0.001);
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, origin, views[k].fov);
-        PictureLayers picture = verify_render(run, &scene, false, views[k].side, views[k].side);
+        Film picture = verify_render(run, &scene, false, views[k].side, views[k].side);
         LongVector center = exact_from_eye(run, origin, eye);
         Long minor = verify_rounded(run, 0.001);
         JUDGE_PIXELS(&picture, exact_torus(center, 1, minor, direction))
         if (k == 1) run->result->leaks += count_parts(&picture) != 1;
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }

@@ -78,11 +78,10 @@ void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 Scene verify_scene(const char *objects);
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
-// Renders a picture, all of it kept, and counts what is unsound in it; layers_free frees it.
-PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
-                            uint32_t height);
+// Renders a picture, all of it kept, and counts what is unsound in it; film_free frees it.
+Film verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height);
 
-static inline bool verify_pixel_found(const PictureLayers *picture, size_t pixel)
+static inline bool verify_pixel_found(const Film *picture, size_t pixel)
 {
     return picture->object[pixel] != UINT32_MAX;
 }

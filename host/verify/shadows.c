@@ -26,13 +26,13 @@ void verify_plane_acne(VerifyRun *run)
             scene.lights.items[0].direction = vector_scale(to_light, -1);
             scene.objects.items[0].as.plane.point = point;
             scene.camera = verify_camera(eye, point, 60);
-            PictureLayers picture = verify_render(run, &scene, false, 128, 128);
+            Film picture = verify_render(run, &scene, false, 128, 128);
             Vector3 direction = vector_normalize(scene.lights.items[0].direction);
             LongVector stored = {verify_rounded(run, direction.x), verify_rounded(run, direction.y),
                                  verify_rounded(run, direction.z)};
             Long cosine = -long_dot(long_unit(long_vector(normal)), stored);
             double least = INFINITY, most = 0;
-            for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+            for (size_t i = 0; i < film_pixel_count(&picture); i++) {
                 run->result->leaks += picture.object[i] != 0;
                 run->result->wrong += picture.shadow[i] != 0;
                 least = fmin(least, picture.color[3 * i]);
@@ -42,7 +42,7 @@ void verify_plane_acne(VerifyRun *run)
             verify_note(run, (most - least) / verify_ulp(run, most), 2, "ulp");
             const double u = verify_roundoff(run);
             verify_note(run, (double)fmaxl(fabsl(most - cosine), fabsl(least - cosine)) / u, 8, "u");
-            layers_free(&picture);
+            film_free(&picture);
             scene_free(&scene);
         }
     }
@@ -60,9 +60,9 @@ void verify_thin_plate(VerifyRun *run)
         scene.camera = verify_camera(eye, center, 40);
         scene.lights.items[0].position.z = light_above ? 2 : -2;
         scene.lights.items[1].direction.z = light_above ? -1 : 1;
-        PictureLayers picture = verify_render(run, &scene, false, 256, 256);
+        Film picture = verify_render(run, &scene, false, 256, 256);
         size_t seen = 0;
-        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             if (picture.object[i] == UINT32_MAX) continue;
             seen++;
             const double *color = picture.color + 3 * i;
@@ -72,7 +72,7 @@ void verify_thin_plate(VerifyRun *run)
                 run->result->leaks += color[0] != 0 || !picture.shadow[2 * i] || !picture.shadow[2 * i + 1];
         }
         run->result->wrong += seen == 0;
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }
@@ -106,10 +106,10 @@ void verify_contact_shadow(VerifyRun *run)
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         const Vector3 eye = views[k].eye;
         scene.camera = verify_camera(eye, touched, views[k].fov);
-        PictureLayers picture = verify_render(run, &scene, false, 384, 384);
+        Film picture = verify_render(run, &scene, false, 384, 384);
         LongVector to_light = exact_from_eye(run, light, eye), ground = exact_from_eye(run, touched, eye);
         LongVector center = exact_from_eye(run, middle, eye);
-        for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             LongVector direction = exact_pixel_ray(&picture, i);
             bool dark = picture.shadow[i];
             ExactHit plane = exact_plane(ground, long_vector(up), direction);
@@ -126,7 +126,7 @@ void verify_contact_shadow(VerifyRun *run)
                 run->result->wrong += fabsl(facing) > 1e-5L && dark != (facing < 0);
             }
         }
-        layers_free(&picture);
+        film_free(&picture);
     }
     scene_free(&scene);
 }

@@ -173,7 +173,7 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const Trac
     run->renderer->close(opened);
 }
 
-static bool is_pixel_sound(const VerifyRun *run, const PictureLayers *picture, size_t i)
+static bool is_pixel_sound(const VerifyRun *run, const Film *picture, size_t i)
 {
     const double *color = &picture->color[3 * i], *normal = &picture->normal[3 * i];
     if (!is_finite(color) || color[0] < 0 || color[1] < 0 || color[2] < 0) return false;
@@ -184,14 +184,10 @@ static bool is_pixel_sound(const VerifyRun *run, const PictureLayers *picture, s
     return run->tier == TIER_A || is_unit(run, normal);
 }
 
-PictureLayers verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
-                            uint32_t height)
+Film verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height)
 {
-    PictureLayers picture = layers_allocate(width, height, (uint32_t)scene->lights.count);
-    const size_t pixels = layers_pixel_count(&picture);
-    picture.position = memory_allocate_zeroed(3 * pixels, sizeof *picture.position);
-    picture.ray = memory_allocate_zeroed(3 * pixels, sizeof *picture.ray);
-    run->renderer->render(run->renderer->context, scene, hierarchy, &picture);
+    Film picture = run->renderer->render(run->renderer->context, scene, hierarchy, width, height);
+    const size_t pixels = film_pixel_count(&picture);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
         run->result->unsound += !is_pixel_sound(run, &picture, i);

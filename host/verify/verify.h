@@ -2,7 +2,7 @@
 // held to a bound. Expected hits are exact (tests/oracle). docs/verify.md says what each case is.
 #pragma once
 
-#include "host/render/layers.h"
+#include "host/render/film.h"
 #include "host/render/trace.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
@@ -20,8 +20,8 @@ typedef struct {
     void *(*open)(void *context, const Scene *scene, bool hierarchy);
     void (*trace)(void *opened, const TraceRay *rays, size_t count, TraceHit *hits);
     void (*close)(void *opened);
-    // Renders a picture of the scene into all its arrays.
-    void (*render)(void *context, const Scene *scene, bool hierarchy, PictureLayers *picture);
+    // Renders an image of the scene, with all its layers.
+    Film (*render)(void *context, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height);
     // The forward axis, and those along the picture's width and height, of a camera.
     void (*camera_axes)(const Camera *camera, Vector3 axes[3]);
     // Whether quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp.

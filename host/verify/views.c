@@ -19,19 +19,19 @@ static Scene tiled_scene(Vector3 place)
     return scene;
 }
 
-static PictureLayers view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Vector3 up, double fov)
+static Film view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Vector3 up, double fov)
 {
     Scene scene = tiled_scene(place);
     scene.camera = verify_camera(eye, look_at, fov);
     scene.camera.up = up;
-    PictureLayers picture = verify_render(run, &scene, false, SIDE, SIDE);
+    Film picture = verify_render(run, &scene, false, SIDE, SIDE);
     scene_free(&scene);
     return picture;
 }
 
-static void compare(VerifyRun *run, const PictureLayers *a, const PictureLayers *b)
+static void compare(VerifyRun *run, const Film *a, const Film *b)
 {
-    for (size_t i = 0; i < layers_pixel_count(a); i++) {
+    for (size_t i = 0; i < film_pixel_count(a); i++) {
         run->result->differing += a->object[i] != b->object[i] || a->t[i] != b->t[i];
         run->result->differing += vector_length(vector_subtract(verify_vector(&a->color[3 * i]),
                                                                 verify_vector(&b->color[3 * i]))) != 0;
@@ -47,21 +47,20 @@ static void judge_views_without_up(VerifyRun *run)
     const Vector3 here = {0, 0, 0};
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         Vector3 toward = vector_subtract(views[k].look_at, views[k].eye);
-        PictureLayers expected = view(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
+        Film expected = view(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
         const Vector3 ups[] = {toward, vector_scale(toward, -0.5), {0, 0, 0}};
         for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
-            PictureLayers picture = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
+            Film picture = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
             compare(run, &picture, &expected);
-            layers_free(&picture);
+            film_free(&picture);
         }
         if (k == 0) {
             // nearly along the view is not along it
-            PictureLayers picture =
-                view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
+            Film picture = view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
             compare(run, &picture, &expected);
-            layers_free(&picture);
+            film_free(&picture);
         }
-        layers_free(&expected);
+        film_free(&expected);
     }
 }
 
@@ -69,9 +68,9 @@ static void judge_views_without_up(VerifyRun *run)
 static void judge_tiles(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, eye = {0.3, 5, 0.4}, below = {0.3, 0, 0.4}, up = {0, 1, 0};
-    PictureLayers picture = view(run, here, eye, below, up, 60);
+    Film picture = view(run, here, eye, below, up, 60);
     size_t counts[2] = {0};
-    for (size_t i = 0; i < layers_pixel_count(&picture); i++) {
+    for (size_t i = 0; i < film_pixel_count(&picture); i++) {
         if (picture.object[i] != 0) continue;
         const double *d = picture.ray + 3 * i;
         double x = eye.x - eye.y * d[0] / d[1], z = eye.z - eye.y * d[2] / d[1];
@@ -82,7 +81,7 @@ static void judge_tiles(VerifyRun *run)
     }
     run->result->wrong += counts[0] < counts[1] ? counts[0] : counts[1];
     run->result->wrong += counts[0] + counts[1] == 0;
-    layers_free(&picture);
+    film_free(&picture);
 }
 
 // From nearly no field of view to nearly all there is, far from the origin, and a single pixel.
@@ -92,21 +91,21 @@ static void judge_extremes(VerifyRun *run)
     static const double fovs[] = {1e-3, 179.9};
     const size_t middle = (SIDE * SIDE - 1) / 2;
     for (size_t i = 0; i < sizeof fovs / sizeof *fovs; i++) {
-        PictureLayers picture = view(run, here, eye, here, up, fovs[i]);
+        Film picture = view(run, here, eye, here, up, fovs[i]);
         run->result->wrong += picture.object[middle] != 1 || !(picture.color[3 * middle] > 0);
-        layers_free(&picture);
+        film_free(&picture);
     }
-    PictureLayers near = view(run, here, eye, here, up, 40);
-    PictureLayers away = view(run, far, vector_add(far, eye), far, up, 40);
-    for (size_t i = 0; i < layers_pixel_count(&near); i++)
+    Film near = view(run, here, eye, here, up, 40);
+    Film away = view(run, far, vector_add(far, eye), far, up, 40);
+    for (size_t i = 0; i < film_pixel_count(&near); i++)
         run->result->differing += near.object[i] != away.object[i] || near.t[i] != away.t[i];
-    layers_free(&near);
-    layers_free(&away);
+    film_free(&near);
+    film_free(&away);
     Scene scene = tiled_scene(here);
     scene.camera = verify_camera(eye, here, 40);
-    PictureLayers one = verify_render(run, &scene, true, 1, 1);
+    Film one = verify_render(run, &scene, true, 1, 1);
     run->result->wrong += one.object[0] != 1 || !(one.color[0] > 0);
-    layers_free(&one);
+    film_free(&one);
     scene_free(&scene);
 }
 

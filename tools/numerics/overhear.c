@@ -29,10 +29,10 @@ void __real_exact_judge_surface(VerifyRun *run, const Object *object, const Trac
                                 const TraceHit *hit);
 void __wrap_exact_judge_surface(VerifyRun *run, const Object *object, const TraceRay *ray,
                                 const TraceHit *hit);
-PictureLayers __real_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
-                                   uint32_t height);
-PictureLayers __wrap_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
-                                   uint32_t height);
+Film __real_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+                          uint32_t height);
+Film __wrap_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
+                          uint32_t height);
 
 static Json *json;
 static size_t every, pixels_per_picture;
@@ -330,7 +330,7 @@ static void scene_write(const Scene *scene)
     json_end(json);
 }
 
-static void pixel_write(const PictureLayers *picture, size_t pixel)
+static void pixel_write(const Film *picture, size_t pixel)
 {
     json_begin_object(json, NULL);
     json_integer(json, "pixel", (int64_t)pixel);
@@ -347,9 +347,9 @@ static void pixel_write(const PictureLayers *picture, size_t pixel)
 }
 
 // Something begins or ends here: the next pixel shows another object, way or shadow.
-static bool is_border(const PictureLayers *picture, size_t pixel)
+static bool is_border(const Film *picture, size_t pixel)
 {
-    if (pixel + 1 == layers_pixel_count(picture)) return false;
+    if (pixel + 1 == film_pixel_count(picture)) return false;
     bool same = picture->path[pixel] == picture->path[pixel + 1];
     for (size_t light = 0; light < picture->light_count; light++) {
         const uint32_t *shadow = picture->shadow + pixel * picture->light_count + light;
@@ -359,11 +359,10 @@ static bool is_border(const PictureLayers *picture, size_t pixel)
 }
 
 // Half of them evenly over the picture, half of them evenly over its borders.
-PictureLayers __wrap_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width,
-                                   uint32_t height)
+Film __wrap_verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height)
 {
-    PictureLayers picture = __real_verify_render(run, scene, hierarchy, width, height);
-    size_t pixels = layers_pixel_count(&picture), borders = 0, passed = 0;
+    Film picture = __real_verify_render(run, scene, hierarchy, width, height);
+    size_t pixels = film_pixel_count(&picture), borders = 0, passed = 0;
     for (size_t i = 0; i < pixels; i++)
         borders += is_border(&picture, i);
     size_t half = pixels_per_picture / 2, stride = pixels / (half + 1) + 1,

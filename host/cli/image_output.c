@@ -1,0 +1,347 @@
+#include "host/cli/image_output.h"
+
+#include "host/base/clock.h"
+#include "host/base/memory.h"
+#include "host/base/numbers.h"
+#include "host/base/text.h"
+#include "host/cli/options.h"
+#include "host/cli/version.h"
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NOTE_COUNT_LARGEST = 16 };
+
+typedef struct {
+    void *items;
+    size_t capacity;
+} Scratch;
+
+struct ImageOutput {
+    const ImageOutputOptions *options;
+    const char *scene_path;
+    const Scene *scene;
+    const RenderSettings *settings;
+    const Renderer *renderer;
+    const Device *device;
+    bool opened;
+    ImageWriter *image, *aovs[LAYER_COUNT];
+    Scratch converted; // a band's values in another type
+
+    // A band is written by a thread of its own while the next is rendered; until it has ended, all from here
+    // on is that thread's, and so are the writers and messages.
+    pthread_t thread;
+    bool writing, failed;
+    MessageList *messages;
+    Film band;
+    Scratch layers[LAYER_COUNT]; // that it points to
+    double seconds;
+};
+
+char *image_output_default_path(const char *scene_path)
+{
+    const char *slash = strrchr(scene_path, '/');
+    const char *name = slash ? slash + 1 : scene_path;
+    const char *dot = strrchr(name, '.');
+    Text path = {0};
+    text_append(&path, name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
+    text_appendf(&path, ".png");
+    return path.items;
+}
+
+bool image_output_path_known(const char *path)
+{
+    if (image_format_of(path) != IMAGE_UNKNOWN) return true;
+    fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
+    return false;
+}
+
+ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
+                               const RenderSettings *settings, const Renderer *renderer, const Device *device)
+{
+    ImageOutput *output = memory_allocate_zeroed(1, sizeof *output);
+    *output = (ImageOutput){.options = options,
+                            .scene_path = scene_path,
+                            .scene = scene,
+                            .settings = settings,
+                            .renderer = renderer,
+                            .device = device};
+    return output;
+}
+
+typedef struct {
+    Text text;
+    size_t starts[NOTE_COUNT_LARGEST][2];
+    size_t count;
+} Notes;
+
+static void notes_add(Notes *notes, const char *key, const char *value)
+{
+    notes->starts[notes->count][0] = notes->text.count;
+    text_append(&notes->text, key, strlen(key) + 1);
+    notes->starts[notes->count++][1] = notes->text.count;
+    text_append(&notes->text, value, strlen(value) + 1);
+}
+
+// The settings that made the image: enough to make it again.
+static void notes_write(Notes *notes, const ImageOutput *output)
+{
+    const RenderSettings *settings = output->settings;
+    const RenderReport *report = renderer_report(output->renderer);
+    const char *slash = strrchr(output->scene_path, '/');
+    Text value = {0};
+#define NOTE(key, ...)                                                                                       \
+    (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
+    NOTE("Software", "glint %s", glint_version());
+    NOTE("Scene", "%s", slash ? slash + 1 : output->scene_path);
+    NOTE("Device", "%s", output->device->name);
+    NOTE("Driver", "%s, %s", output->device->platform_name, output->device->driver);
+    NOTE("Precision", "%s", precision_names[settings->precision]);
+    NOTE("Lanes", "%u", report->lanes);
+    NOTE("Samples", "%u", settings->sample_count);
+    NOTE("Bounces", "%u", settings->bounce_count);
+    NOTE("Size", "%ux%u", settings->width, settings->height);
+    NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
+         settings->region_height);
+    NOTE("Transfer", "%s", output->options->transfer == TRANSFER_SRGB ? "srgb" : "none");
+    NOTE("Kernel", "%016llx", (unsigned long long)report->kernel_hash);
+#undef NOTE
+    text_free(&value);
+}
+
+static ImageHeader layer_header(const Film *film, Layer layer)
+{
+    bool integer = layer_types[layer] == LAYER_TYPE_INTEGER;
+    return (ImageHeader){
+        .format = IMAGE_NPY,
+        .width = film->width,
+        .height = film->height,
+        .channels = film_components(film, layer),
+        .bits = 8,
+        .npy_type = integer      ? 'u'
+                    : film->wide ? 'd'
+                                 : 'f',
+    };
+}
+
+// image.png -> image.NAME.npy
+static char *aov_path(const ImageOutputOptions *options, const char *name)
+{
+    Text path = {0};
+    const char *dot = strrchr(options->path, '.');
+    text_append(&path, options->path, (size_t)(dot - options->path));
+    text_appendf(&path, ".%s.npy", name);
+    return path.items;
+}
+
+bool image_output_spares_scene(const ImageOutputOptions *options, const Scene *scene, const char *scene_path)
+{
+    bool spares = output_spares_scene(options->path, scene, scene_path);
+    for (Layer layer = 0; layer < LAYER_COUNT && spares; layer++) {
+        if (!(options->aovs >> layer & 1)) continue;
+        char *path = aov_path(options, layer_names[layer]);
+        spares = output_spares_scene(path, scene, scene_path);
+        free(path);
+    }
+    return spares;
+}
+
+static bool files_open(ImageOutput *output, const Film *band, MessageList *messages)
+{
+    Notes notes = {0};
+    notes_write(&notes, output);
+    ImageNote list[NOTE_COUNT_LARGEST + 1] = {0};
+    for (size_t i = 0; i < notes.count; i++)
+        list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
+
+    Film film = *band;
+    film.height = output->settings->region_height;
+    ImageHeader header = layer_header(&film, LAYER_COLOR);
+    header.format = image_format_of(output->options->path);
+    header.transfer = output->options->transfer;
+    header.bits = output->options->bits;
+    header.notes = list;
+    if (header.format != IMAGE_NPY) header.npy_type = 'f';
+    output->image = image_writer_open(output->options->path, &header, messages);
+    bool opened = output->image != NULL;
+
+    for (Layer layer = 0; layer < LAYER_COUNT && opened; layer++) {
+        if (!(output->options->aovs >> layer & 1)) continue;
+        header = layer_header(&film, layer);
+        if (layer == LAYER_POSITION) header.npy_type = 'd';
+        if (header.channels == 0) {
+            message_add(messages, MESSAGE_WARNING, "no shadow masks are written: the scene has no lights");
+            continue;
+        }
+        char *path = aov_path(output->options, layer_names[layer]);
+        output->aovs[layer] = image_writer_open(path, &header, messages);
+        opened = output->aovs[layer] != NULL;
+        free(path);
+    }
+    text_free(&notes.text);
+    return opened;
+}
+
+static void *scratch_reserve(Scratch *scratch, size_t size)
+{
+    if (scratch->capacity < size) {
+        scratch->items = memory_resize(scratch->items, size, 1);
+        scratch->capacity = size;
+    }
+    return scratch->items;
+}
+
+static const float *color_narrowed(ImageOutput *output, const Film *band)
+{
+    float *narrow = scratch_reserve(&output->converted, 3 * film_pixel_count(band) * sizeof *narrow);
+    numbers_narrow(narrow, band->color, 3 * film_pixel_count(band));
+    return narrow;
+}
+
+// Positions come relative to the eye; the file has them in the world, in double so that no bit is lost.
+static const double *positions_in_world(ImageOutput *output, const Film *band)
+{
+    size_t count = 3 * film_pixel_count(band);
+    double *world = scratch_reserve(&output->converted, count * sizeof *world);
+    numbers_widen(world, band->layers[LAYER_POSITION], count, band->wide);
+    Vector3 eye = output->scene->camera.position;
+    const double axes[3] = {eye.x, eye.y, eye.z};
+    for (size_t i = 0; i < count; i++)
+        world[i] += axes[i % 3];
+    return world;
+}
+
+static bool band_write(ImageOutput *output)
+{
+    const Film *band = &output->band;
+    MessageList *messages = output->messages;
+    bool narrows = band->wide && image_format_of(output->options->path) != IMAGE_NPY;
+    const void *color = narrows ? color_narrowed(output, band) : band->layers[LAYER_COLOR];
+    if (!image_writer_rows(output->image, color, band->height, messages)) return false;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!output->aovs[layer]) continue;
+        const void *values = layer == LAYER_POSITION ? positions_in_world(output, band) : band->layers[layer];
+        if (!image_writer_rows(output->aovs[layer], values, band->height, messages)) return false;
+    }
+    return true;
+}
+
+static void *band_thread(void *argument)
+{
+    ImageOutput *output = argument;
+    double start = clock_seconds();
+    if (!band_write(output)) output->failed = true;
+    output->seconds += clock_seconds() - start;
+    return NULL;
+}
+
+// False: a band could not be written.
+static bool band_written(ImageOutput *output)
+{
+    if (output->writing) pthread_join(output->thread, NULL);
+    output->writing = false;
+    return !output->failed;
+}
+
+// The renderer's own memory is for its next band.
+static void band_keep(ImageOutput *output, const Film *band)
+{
+    output->band = *band;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!band->layers[layer]) continue;
+        size_t size = film_layer_size(band, layer);
+        output->band.layers[layer] =
+            memcpy(scratch_reserve(&output->layers[layer], size), band->layers[layer], size);
+    }
+}
+
+bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
+{
+    if (!output->opened && !files_open(output, band, messages)) return false;
+    output->opened = true;
+    if (!band_written(output)) return false;
+    output->messages = messages;
+    band_keep(output, band);
+    output->writing =
+        !output->options->apart && pthread_create(&output->thread, NULL, band_thread, output) == 0;
+    if (output->writing) return true; // or reported with the next band
+    band_thread(output);
+    return !output->failed;
+}
+
+static void image_output_free(ImageOutput *output)
+{
+    free(output->converted.items);
+    for (Layer i = 0; i < LAYER_COUNT; i++)
+        free(output->layers[i].items);
+    free(output);
+}
+
+bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
+{
+    if (!band_written(output)) {
+        image_output_abandon(output);
+        return false;
+    }
+    double start = clock_seconds();
+    bool whole = image_writer_settle(output->image, messages);
+    for (Layer i = 0; i < LAYER_COUNT && whole; i++)
+        if (output->aovs[i]) whole = image_writer_settle(output->aovs[i], messages);
+    if (!whole) {
+        image_output_abandon(output);
+        return false;
+    }
+    whole = image_writer_commit(output->image, messages);
+    for (Layer i = 0; i < LAYER_COUNT; i++) {
+        if (!output->aovs[i]) continue;
+        if (whole)
+            whole = image_writer_commit(output->aovs[i], messages);
+        else
+            image_writer_abandon(output->aovs[i]);
+    }
+    *seconds = output->seconds + (clock_seconds() - start);
+    image_output_free(output);
+    return whole;
+}
+
+void image_output_abandon(ImageOutput *output)
+{
+    band_written(output);
+    for (Layer i = 0; i < LAYER_COUNT; i++)
+        if (output->aovs[i]) image_writer_abandon(output->aovs[i]);
+    if (output->image) image_writer_abandon(output->image);
+    image_output_free(output);
+}
+
+static bool layer_save(const Film *film, Layer layer, const char *path, MessageList *messages)
+{
+    const ImageHeader header = layer_header(film, layer);
+    const size_t count = film_pixel_count(film) * header.channels;
+    float *narrow = NULL;
+    if (header.npy_type == 'f') {
+        narrow = memory_allocate(count, sizeof *narrow);
+        numbers_narrow(narrow, film->layers[layer], count);
+    }
+    ImageWriter *writer = image_writer_open(path, &header, messages);
+    bool saved =
+        writer && image_writer_rows(writer, narrow ? narrow : film->layers[layer], film->height, messages);
+    if (saved)
+        saved = image_writer_commit(writer, messages);
+    else
+        image_writer_abandon(writer);
+    free(narrow);
+    return saved;
+}
+
+bool film_save(const Film *film, const char *prefix, MessageList *messages)
+{
+    bool saved = true;
+    for (Layer layer = 0; layer < LAYER_COUNT && saved; layer++) {
+        if (!film->layers[layer] || film_components(film, layer) == 0) continue;
+        Text path = {0};
+        text_appendf(&path, "%s.%s.npy", prefix, layer_names[layer]);
+        saved = layer_save(film, layer, text_c(&path), messages);
+        text_free(&path);
+    }
+    return saved;
+}

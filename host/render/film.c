@@ -1,0 +1,68 @@
+#include "host/render/film.h"
+
+#include "host/base/memory.h"
+#include "host/base/numbers.h"
+#include <stdlib.h>
+#include <string.h>
+
+#define LAYER_NAME(NAME, name, ...) #name,
+const char *const layer_names[LAYER_COUNT] = {LAYER_LIST(LAYER_NAME)};
+
+#define LAYER_TYPE(NAME, name, type, ...) LAYER_TYPE_##type,
+const LayerType layer_types[LAYER_COUNT] = {LAYER_LIST(LAYER_TYPE)};
+
+#define LAYER_COMPONENTS(NAME, name, type, components, note) components,
+static const uint32_t layer_components[LAYER_COUNT] = {LAYER_LIST(LAYER_COMPONENTS)};
+
+uint32_t film_components(const Film *film, Layer layer)
+{
+    return layer_components[layer] == PER_LIGHT ? film->light_count : layer_components[layer];
+}
+
+size_t film_value_size(const Film *film, Layer layer)
+{
+    return layer_types[layer] == LAYER_TYPE_INTEGER ? sizeof(uint32_t) : film->real_size;
+}
+
+size_t film_layer_size(const Film *film, Layer layer)
+{
+    return film_pixel_count(film) * film_components(film, layer) * film_value_size(film, layer);
+}
+
+Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs)
+{
+    Film film = {.width = width, .height = height, .light_count = light_count, .real_size = sizeof(double)};
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if ((aovs | AOV_COLOR) >> layer & 1)
+            film.layers[layer] = memory_allocate_zeroed(film_layer_size(&film, layer), 1);
+    return film;
+}
+
+void film_free(Film *film)
+{
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        free(film->layers[layer]);
+    *film = (Film){0};
+}
+
+void film_copy_band(Film *film, const Film *band)
+{
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!film->layers[layer] || !band->layers[layer]) continue;
+        size_t row_size = film_layer_size(film, layer) / film->height;
+        void *rows = (char *)film->layers[layer] + band->first_row * row_size;
+        if (layer_types[layer] == LAYER_TYPE_INTEGER)
+            memcpy(rows, band->layers[layer], film_layer_size(band, layer));
+        else
+            numbers_widen(rows, band->layers[layer], film_layer_size(band, layer) / band->real_size,
+                          band->real_size == sizeof(double));
+    }
+}
+
+float *film_narrow_color(const Film *film)
+{
+    const size_t count = 3 * film_pixel_count(film);
+    float *narrow = memory_allocate(count, sizeof *narrow);
+    numbers_narrow(narrow, film->color, count);
+    return narrow;
+}

@@ -1,0 +1,33 @@
+// The layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), which describe
+// the ray through its center. From these lists follow the layers' numbers and names, the kernels' arguments,
+// the host's buffers and the files; what remains is to compute an AOV in its kernel and to document it.
+//
+// LAYER(NAME, name, type, components, note). Type: REAL, of the kernel's precision; LENGTH, a real in the
+// scene's unit of length; INTEGER, of 32 bits. Components: values per pixel; PER_LIGHT: one for each light.
+#ifndef AOVS_H
+#define AOVS_H
+
+#define PER_LIGHT 0
+
+// clang-format off
+// aov.cl, in the order of its arguments
+#define HIT_AOV_LIST(LAYER)                                                                                    \
+    LAYER(T,        t,        LENGTH,  1, "distance from the eye; infinite where nothing is hit")               \
+    LAYER(NORMAL,   normal,   REAL,    3, "unit normal, facing the eye; 0 where nothing is hit")                \
+    LAYER(POSITION, position, LENGTH,  3, "hit point, in the scene's coordinates")                              \
+    LAYER(OBJECT,   object,   INTEGER, 1, "number of the object, from 0; 4294967295 where nothing is hit")      \
+    LAYER(SHADOW,   shadow,   INTEGER, PER_LIGHT, "1 where that light is occluded, 0 elsewhere")                \
+    LAYER(RAY,      ray,      REAL,    3, "direction of the ray from the eye")
+
+// path.cl
+#define PATH_AOV_LIST(LAYER) \
+    LAYER(PATH, path, INTEGER, 1, "signature of all objects met, also in mirrors and through glass")
+
+// render.cl
+#define COLOR_LAYER(LAYER) \
+    LAYER(COLOR, color, REAL, 3, "linear RGB, the mean of all samples")
+
+#define LAYER_LIST(LAYER) HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) COLOR_LAYER(LAYER)
+// clang-format on
+
+#endif

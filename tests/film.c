@@ -1,0 +1,104 @@
+#include "tests/film.h"
+
+#include "host/base/memory.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision)
+{
+    return (RenderSettings){.width = width,
+                            .height = height,
+                            .region_width = width,
+                            .region_height = height,
+                            .sample_count = 1,
+                            .bounce_count = 5,
+                            .precision = precision,
+                            .shift_to_eye = true};
+}
+
+Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs)
+{
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(compute, scene, settings, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    assert_non_null(renderer);
+    Film film;
+    assert_true(renderer_render_film(renderer, aovs, &film));
+    renderer_close(renderer);
+    return film;
+}
+
+Film film_cut(const Film *film, uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+    Film cut = film_allocate(width, height, 0, 0);
+    for (uint32_t row = 0; row < height; row++)
+        memcpy(cut.color + 3 * (size_t)row * width, film->color + 3 * ((size_t)(y + row) * film->width + x),
+               3 * width * sizeof *cut.color);
+    return cut;
+}
+
+Film film_flipped(const Film *film)
+{
+    Film flipped = film_allocate(film->width, film->height, 0, 0);
+    for (size_t pixel = 0; pixel < (size_t)film->width * film->height; pixel++) {
+        size_t column = pixel % film->width, row_start = pixel - column;
+        memcpy(flipped.color + 3 * pixel, film->color + 3 * (row_start + film->width - 1 - column),
+               3 * sizeof *film->color);
+    }
+    return flipped;
+}
+
+static double value_at(const void *values, size_t i, LayerType type)
+{
+    return type == LAYER_TYPE_INTEGER ? ((const uint32_t *)values)[i] : ((const double *)values)[i];
+}
+
+static void layer_assert_same(const Film *film, const Film *expected, Layer layer, const char *what)
+{
+    const void *values = film->layers[layer], *wanted = expected->layers[layer];
+    if (!values || !wanted) return;
+    const LayerType type = layer_types[layer];
+    const size_t components = film_components(film, layer), count = components * film_pixel_count(film);
+    size_t differing = 0, first = 0;
+    for (size_t i = count; i-- > 0;) {
+        double value = value_at(values, i, type), other = value_at(wanted, i, type);
+        if (value == other || (isnan(value) && isnan(other))) continue;
+        differing++;
+        first = i;
+    }
+    if (differing == 0) return;
+    size_t pixel = first / components;
+    fail_msg("%s: %s: %zu of %zu values differ, first at pixel %zu,%zu component %zu: %.9g, expected %.9g",
+             what, layer_names[layer], differing, count, pixel % film->width, pixel / film->width,
+             first % components, value_at(values, first, type), value_at(wanted, first, type));
+}
+
+void film_assert_same(const Film *film, const Film *expected, const char *what)
+{
+    assert_int_equal(film->width, expected->width);
+    assert_int_equal(film->height, expected->height);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        layer_assert_same(film, expected, layer, what);
+}
+
+size_t film_count_faulty(const Film *film)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < (size_t)film->width * film->height; i++) {
+        bool faulty = false;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++) {
+            faulty |= !isfinite(film->color[k]) || film->color[k] < 0;
+            if (film->normal) faulty |= !isfinite(film->normal[k]);
+            if (film->position) faulty |= !isfinite(film->position[k]);
+        }
+        if (film->t) faulty |= isnan(film->t[i]);
+        count += faulty;
+    }
+    return count;
+}

@@ -1,0 +1,22 @@
+// Rendering films for the tests that compare them.
+#pragma once
+
+#include "host/render/renderer.h"
+
+// The whole image, one sample per pixel, with the defaults of glint render.
+RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
+
+// Renders what the settings say; fails the test where they do not fit the device.
+Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs);
+
+// The color of the part of a film that starts at x, y.
+Film film_cut(const Film *film, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
+// Its color with the columns from right to left.
+Film film_flipped(const Film *film);
+
+// The layers that both have are equal in value (hence in their bits, but for the sign of a zero); else fails
+// the test, naming the first pixel that differs. Frees neither.
+void film_assert_same(const Film *film, const Film *expected, const char *what);
+
+// The number of pixels with a value that is not finite, or a negative color.
+size_t film_count_faulty(const Film *film);
