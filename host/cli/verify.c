@@ -238,7 +238,7 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
         json_integer(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
         json_end(json);
-    } else {
+    } else if (compute_ok(compute)) {
         printf("  tier %c: %zu of %zu cases held, in %.1f s; kernels: trace %016" PRIx64
                ", render %016" PRIx64 "\n",
                report.tier, report.held, report.held + report.failed, seconds, prober.trace_kernel,

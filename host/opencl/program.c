@@ -101,7 +101,7 @@ static cl_program build_from_binary(const Compute *compute, const Text *binary, 
     cl_int binary_status, status;
     cl_program program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
                                                    &bytes, &binary_status, &status);
-    if (status != CL_SUCCESS) return NULL;
+    if (status != CL_SUCCESS || !program) return NULL;
     if (clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL) == CL_SUCCESS) return program;
     clReleaseProgram(program);
     return NULL;

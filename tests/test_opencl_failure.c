@@ -1,0 +1,436 @@
+// Every OpenCL call of a render and a trace fails once: glint reports that call, releases everything, and the
+// next render on the same device is right. The linker puts the functions __wrap_cl… below in the place of
+// those that host/ calls (ld --wrap, see the Makefile); a call without one does not link.
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/cli/commands.h"
+#include "host/render/renderer.h"
+#include "tests/child.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static struct {
+    const char *call;  // the function that fails; NULL: none
+    size_t index;      // at which of its calls, from 0, or EVERY_CALL
+    bool returns_null; // with CL_SUCCESS
+} injected;
+
+static const size_t EVERY_CALL = SIZE_MAX;
+
+typedef struct {
+    const char *call;
+    size_t count;
+} CallCount;
+
+static CallCount counts[64];
+static long live_count; // objects created and mapped, less those released
+
+static CallCount *counted(const char *call)
+{
+    CallCount *count = counts;
+    while (count->call && strcmp(count->call, call) != 0)
+        count++;
+    count->call = call;
+    return count;
+}
+
+static bool call_fails(const char *call)
+{
+    size_t index = counted(call)->count++;
+    return injected.call && strcmp(injected.call, call) == 0 &&
+           (injected.index == index || injected.index == EVERY_CALL);
+}
+
+// A call that returns a status: not made where it fails.
+#define STATUS(name, parameters, arguments)                                                                  \
+    cl_int __real_##name parameters;                                                                         \
+    cl_int __wrap_##name parameters;                                                                         \
+    cl_int __wrap_##name parameters                                                                          \
+    {                                                                                                        \
+        return call_fails(#name) ? CL_OUT_OF_RESOURCES : __real_##name arguments;                            \
+    }
+
+// One that releases: made all the same, so that nothing is left in the driver.
+#define RELEASE(name, parameters, arguments)                                                                 \
+    cl_int __real_##name parameters;                                                                         \
+    cl_int __wrap_##name parameters;                                                                         \
+    cl_int __wrap_##name parameters                                                                          \
+    {                                                                                                        \
+        live_count--;                                                                                        \
+        cl_int released = __real_##name arguments;                                                           \
+        return call_fails(#name) ? CL_OUT_OF_RESOURCES : released;                                           \
+    }
+
+#define CREATE(type, name, parameters, arguments)                                                            \
+    type __real_##name parameters;                                                                           \
+    type __wrap_##name parameters;                                                                           \
+    type __wrap_##name parameters                                                                            \
+    {                                                                                                        \
+        if (call_fails(#name)) {                                                                             \
+            *status = injected.returns_null ? CL_SUCCESS : CL_OUT_OF_RESOURCES;                              \
+            return NULL;                                                                                     \
+        }                                                                                                    \
+        type object = __real_##name arguments;                                                               \
+        live_count += object != NULL;                                                                        \
+        return object;                                                                                       \
+    }
+
+// A command whose event is requested creates one.
+#define EVENT(event) (live_count++, (event))
+
+typedef void(CL_CALLBACK *ContextNotify)(const char *, const void *, size_t, void *);
+typedef void(CL_CALLBACK *ProgramNotify)(cl_program, void *);
+typedef void(CL_CALLBACK *MemoryNotify)(cl_mem, void *);
+
+// clang-format off
+STATUS(clGetPlatformIDs, (cl_uint n, cl_platform_id *ids, cl_uint *count), (n, ids, count))
+STATUS(clGetPlatformInfo, (cl_platform_id id, cl_platform_info what, size_t size, void *value, size_t *needed),
+       (id, what, size, value, needed))
+STATUS(clGetDeviceIDs, (cl_platform_id id, cl_device_type type, cl_uint n, cl_device_id *ids, cl_uint *count),
+       (id, type, n, ids, count))
+STATUS(clGetDeviceInfo, (cl_device_id id, cl_device_info what, size_t size, void *value, size_t *needed),
+       (id, what, size, value, needed))
+
+CREATE(cl_context, clCreateContext, (const cl_context_properties *properties, cl_uint n, const cl_device_id *ids,
+       ContextNotify notify, void *data, cl_int *status), (properties, n, ids, notify, data, status))
+CREATE(cl_command_queue, clCreateCommandQueue, (cl_context context, cl_device_id id,
+       cl_command_queue_properties properties, cl_int *status), (context, id, properties, status))
+CREATE(cl_mem, clCreateBuffer, (cl_context context, cl_mem_flags flags, size_t size, void *bytes, cl_int *status),
+       (context, flags, size, bytes, status))
+CREATE(cl_program, clCreateProgramWithSource, (cl_context context, cl_uint n, const char **texts,
+       const size_t *lengths, cl_int *status), (context, n, texts, lengths, status))
+CREATE(cl_program, clCreateProgramWithBinary, (cl_context context, cl_uint n, const cl_device_id *ids,
+       const size_t *lengths, const unsigned char **binaries, cl_int *statuses, cl_int *status),
+       (context, n, ids, lengths, binaries, statuses, status))
+CREATE(cl_kernel, clCreateKernel, (cl_program program, const char *name, cl_int *status), (program, name, status))
+RELEASE(clReleaseContext, (cl_context context), (context))
+RELEASE(clReleaseCommandQueue, (cl_command_queue queue), (queue))
+RELEASE(clReleaseMemObject, (cl_mem buffer), (buffer))
+RELEASE(clReleaseProgram, (cl_program program), (program))
+RELEASE(clReleaseKernel, (cl_kernel kernel), (kernel))
+RELEASE(clReleaseEvent, (cl_event event), (event))
+
+STATUS(clSetMemObjectDestructorCallback, (cl_mem buffer, MemoryNotify notify, void *data), (buffer, notify, data))
+STATUS(clBuildProgram, (cl_program program, cl_uint n, const cl_device_id *ids, const char *options,
+       ProgramNotify notify, void *data), (program, n, ids, options, notify, data))
+STATUS(clGetProgramBuildInfo, (cl_program program, cl_device_id id, cl_program_build_info what, size_t size,
+       void *value, size_t *needed), (program, id, what, size, value, needed))
+STATUS(clGetProgramInfo, (cl_program program, cl_program_info what, size_t size, void *value, size_t *needed),
+       (program, what, size, value, needed))
+STATUS(clGetKernelInfo, (cl_kernel kernel, cl_kernel_info what, size_t size, void *value, size_t *needed),
+       (kernel, what, size, value, needed))
+STATUS(clGetKernelWorkGroupInfo, (cl_kernel kernel, cl_device_id id, cl_kernel_work_group_info what, size_t size,
+       void *value, size_t *needed), (kernel, id, what, size, value, needed))
+STATUS(clSetKernelArg, (cl_kernel kernel, cl_uint index, size_t size, const void *value),
+       (kernel, index, size, value))
+STATUS(clEnqueueReadBuffer, (cl_command_queue queue, cl_mem buffer, cl_bool blocking, size_t offset, size_t size,
+       void *bytes, cl_uint n, const cl_event *list, cl_event *event),
+       (queue, buffer, blocking, offset, size, bytes, n, list, event))
+STATUS(clEnqueueWriteBuffer, (cl_command_queue queue, cl_mem buffer, cl_bool blocking, size_t offset, size_t size,
+       const void *bytes, cl_uint n, const cl_event *list, cl_event *event),
+       (queue, buffer, blocking, offset, size, bytes, n, list, event))
+STATUS(clFinish, (cl_command_queue queue), (queue))
+STATUS(clWaitForEvents, (cl_uint n, const cl_event *list), (n, list))
+STATUS(clGetEventInfo, (cl_event event, cl_event_info what, size_t size, void *value, size_t *needed),
+       (event, what, size, value, needed))
+STATUS(clGetEventProfilingInfo, (cl_event event, cl_profiling_info what, size_t size, void *value, size_t *needed),
+       (event, what, size, value, needed))
+
+RELEASE(clEnqueueUnmapMemObject, (cl_command_queue queue, cl_mem buffer, void *mapped, cl_uint n,
+        const cl_event *list, cl_event *event), (queue, buffer, mapped, n, list, event))
+CREATE(void *, clEnqueueMapBuffer, (cl_command_queue queue, cl_mem buffer, cl_bool blocking, cl_map_flags flags,
+       size_t offset, size_t size, cl_uint n, const cl_event *list, cl_event *event, cl_int *status),
+       (queue, buffer, blocking, flags, offset, size, n, list, EVENT(event), status))
+STATUS(clEnqueueNDRangeKernel, (cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, const size_t *offset,
+       const size_t *global, const size_t *local, cl_uint n, const cl_event *list, cl_event *event),
+       (queue, kernel, dimensions, offset, global, local, n, list, EVENT(event)))
+// clang-format on
+
+enum { SIDE = 8, BAND_ROWS = 4, RAY_COUNT = 3, LARGE_BYTES = 4 << 20 };
+
+typedef struct {
+    float colors[SIDE * SIDE * 3];
+    uint64_t ray_counts[5];
+    size_t band_count;
+    TraceHit hits[RAY_COUNT];
+} Answer;
+
+static DeviceList devices;
+static const Device *device;
+static Scene scene;
+static Answer right;
+
+static bool band_take(void *context, const Film *band, double fraction_done)
+{
+    (void)fraction_done;
+    Answer *answer = context;
+    memcpy(answer->colors + (size_t)band->first_row * SIDE * 3, band->layers[LAYER_COLOR],
+           (size_t)band->height * SIDE * 3 * sizeof *answer->colors);
+    answer->band_count++;
+    return true;
+}
+
+// A render with counted rays, one with all AOVs, a trace, and a large buffer. Returns whether all was done.
+static bool work(Compute *compute, Answer *answer)
+{
+    static const TraceRay rays[RAY_COUNT] = {{{0, 0, 5}, {0, 0, -1}, 0, 100},
+                                             {{0, 3, 5}, {0, 0, -1}, 0, 100},
+                                             {{1, 1, 5}, {0, -0.25, -1}, 0, 100}};
+    RenderSettings settings = {.width = SIDE,
+                               .height = SIDE,
+                               .region_width = SIDE,
+                               .region_height = SIDE,
+                               .sample_count = 1,
+                               .precision = PRECISION_SINGLE,
+                               .lanes = 1,
+                               .counting = true,
+                               .shift_to_eye = true,
+                               .band_rows = BAND_ROWS};
+    MessageList messages = {0};
+    memset(answer, 0, sizeof *answer);
+    compute_open(compute, device);
+    cl_mem large = buffer_take(compute, LARGE_BYTES, buffer_bytes_allocate(LARGE_BYTES));
+    Renderer *counter = renderer_open(compute, &scene, &settings, &messages);
+    settings.counting = false;
+    Renderer *renderer = renderer_open(compute, &scene, &settings, &messages);
+    bool done = counter && renderer_render(counter, 0, band_take, answer) && renderer &&
+                renderer_render(renderer, AOVS_ALL, band_take, answer) &&
+                renderer_trace(renderer, rays, RAY_COUNT, answer->hits);
+    if (counter) memcpy(answer->ray_counts, renderer_report(counter)->rays, sizeof answer->ray_counts);
+    renderer_close(counter);
+    renderer_close(renderer);
+    buffer_release(large);
+    assert_int_equal(messages.count, 0); // the user made no mistake
+    message_list_free(&messages);
+    assert_int_equal(done, compute_ok(compute));
+    return done;
+}
+
+static void compute_close_checked(Compute *compute)
+{
+    compute_close(compute);
+    if (live_count != 0) fail_msg("%ld objects were not released", live_count);
+}
+
+static void assert_work_is_right(void)
+{
+    injected.call = NULL;
+    memset(counts, 0, sizeof counts);
+    Compute compute;
+    Answer answer;
+    assert_true(work(&compute, &answer));
+    compute_close_checked(&compute);
+    assert_memory_equal(&answer, &right, sizeof answer);
+}
+
+// Fails a call. It must be reported where `is_needed`; else the work is done without it.
+static void call_fail(const char *call, size_t index, bool returns_null, bool is_needed)
+{
+    injected.call = call;
+    injected.index = index;
+    injected.returns_null = returns_null;
+    memset(counts, 0, sizeof counts);
+    Compute compute;
+    Answer answer;
+    bool done = work(&compute, &answer);
+    if (done == is_needed) fail_msg("%s, call %zu: %s", call, index, done ? "not reported" : "reported");
+    if (done) {
+        assert_memory_equal(&answer, &right, sizeof answer);
+    } else {
+        assert_string_equal(compute.failure.call, call);
+        char *text = compute_failure_text(&compute);
+        assert_ptr_equal(strstr(text, call), text);
+        assert_non_null(strstr(text, returns_null ? "NULL with CL_SUCCESS" : "CL_OUT_OF_RESOURCES (-5)"));
+        assert_non_null(strstr(text, device->name));
+        free(text);
+    }
+    compute_close_checked(&compute);
+}
+
+// Fails each call of a function in turn.
+static void calls_fail(const char *call, bool returns_null, bool is_needed)
+{
+    assert_work_is_right();
+    size_t count = counted(call)->count;
+    if (count == 0) fail_msg("%s is never called", call);
+    for (size_t i = 0; i < count; i++)
+        call_fail(call, i, returns_null, is_needed);
+}
+
+static void test_needed_calls(void **state)
+{
+    (void)state;
+    static const char *const needed[] = {"clCreateContext",
+                                         "clCreateCommandQueue",
+                                         "clCreateBuffer",
+                                         "clSetMemObjectDestructorCallback",
+                                         "clCreateKernel",
+                                         "clSetKernelArg",
+                                         "clFinish",
+                                         "clEnqueueWriteBuffer",
+                                         "clEnqueueReadBuffer",
+                                         "clEnqueueMapBuffer",
+                                         "clGetEventInfo",
+                                         "clEnqueueUnmapMemObject",
+                                         "clEnqueueNDRangeKernel",
+                                         "clWaitForEvents"};
+    for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
+        calls_fail(needed[i], false, true);
+    assert_work_is_right();
+}
+
+static void test_needed_objects(void **state)
+{
+    (void)state;
+    static const char *const creating[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer",
+                                           "clCreateKernel", "clEnqueueMapBuffer"};
+    for (size_t i = 0; i < sizeof creating / sizeof *creating; i++)
+        calls_fail(creating[i], true, true);
+    assert_work_is_right();
+}
+
+// Times, a kernel's limit of work-items, a binary for the cache, and releases.
+static void test_dispensable_calls(void **state)
+{
+    (void)state;
+    static const char *const dispensable[] = {
+        "clGetEventProfilingInfo", "clGetKernelWorkGroupInfo", "clGetProgramInfo",     "clReleaseEvent",
+        "clReleaseMemObject",      "clReleaseKernel",          "clReleaseProgram",     "clReleaseContext",
+        "clReleaseCommandQueue",   "clGetKernelInfo",          "clGetProgramBuildInfo"};
+    for (size_t i = 0; i < sizeof dispensable / sizeof *dispensable; i++)
+        call_fail(dispensable[i], EVERY_CALL, false, false);
+    assert_work_is_right();
+}
+
+// A cached program that the driver refuses is built from source, without a cache every program is.
+static void test_builds(void **state)
+{
+    (void)state;
+    calls_fail("clCreateProgramWithBinary", false, false);
+    calls_fail("clCreateProgramWithBinary", true, false);
+    calls_fail("clBuildProgram", false, false);
+    char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
+    setenv("XDG_CACHE_HOME", "/dev/null", 1);
+    calls_fail("clCreateProgramWithSource", false, true);
+    calls_fail("clBuildProgram", false, true);
+    assert_work_is_right();
+    if (cache[0] != '\0')
+        setenv("XDG_CACHE_HOME", cache, 1);
+    else
+        unsetenv("XDG_CACHE_HOME");
+    free(cache);
+}
+
+// A list without the devices that cannot be described, and a message where none is left.
+static void test_discovery(void **state)
+{
+    (void)state;
+    static const char *const queries[] = {"clGetPlatformIDs", "clGetPlatformInfo", "clGetDeviceIDs",
+                                          "clGetDeviceInfo"};
+    for (size_t i = 0; i < sizeof queries / sizeof *queries; i++) {
+        injected.call = NULL;
+        for (size_t index = 0, count = 1; index < count; index++) {
+            memset(counts, 0, sizeof counts);
+            DeviceList list;
+            MessageList messages = {0};
+            device_list_open(&list);
+            const Device *chosen = device_choose(&list, NULL, &messages);
+            assert_int_equal(messages.count, chosen == NULL);
+            message_list_free(&messages);
+            device_list_close(&list);
+            if (!injected.call) {
+                count = counted(queries[i])->count + 1;
+                injected.call = queries[i];
+            }
+            injected.index = index;
+        }
+    }
+    injected.call = NULL;
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    setenv("TMPDIR", "/dev/null", 1); // no place for the text of programs that do not build
+    MessageList messages = {0};
+    device_list_open(&devices);
+    device = device_choose(&devices, device_wish(NULL), &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!device) return -1;
+    scene = scene_of_text("tiny.yaml", "camera: {position: [0, 1, 5], look_at: [0, 0, 0]}\n"
+                                       "lights: [{point: {position: [3, 5, 4]}}]\n"
+                                       "objects: [{sphere: {center: [0, 0, 0], radius: 1}}]\n");
+    Compute compute;
+    if (!work(&compute, &right)) return -1;
+    compute_close(&compute);
+    return right.hits[0].object == 0 && right.colors[(SIDE + 1) * SIDE / 2 * 3] > 0 ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scene_free(&scene);
+    device_list_close(&devices);
+    return 0;
+}
+
+typedef struct {
+    int (*run)(int argument_count, char **arguments);
+    const char *arguments[8];
+} Command;
+
+static const char *failing_call;
+
+static void command_fail(void *result)
+{
+    const Command *command = result;
+    char *arguments[8] = {NULL};
+    int count = 0;
+    for (; command->arguments[count]; count++)
+        arguments[count] = memory_copy_text(command->arguments[count]);
+    injected.call = failing_call;
+    int status = command->run(count, arguments);
+    while (count > 0)
+        free(arguments[--count]);
+    exit(status);
+}
+
+static void test_commands(void **state)
+{
+    (void)state;
+    static const Command commands[] = {
+        {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", "/dev/null/none.png"}},
+        {command_bench, {"bench", "scenes/spheres16.yaml", "--size", "8x8"}},
+        {command_accuracy, {"accuracy", "scenes/spheres16.yaml", "--size", "8x8"}},
+        {command_verify, {"verify", "P1"}},
+    };
+    static const char *const calls[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer"};
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+        for (size_t k = 0; k < sizeof calls / sizeof *calls; k++) {
+            Command command = commands[i];
+            failing_call = calls[k];
+            ChildEnd end = child_run(command_fail, &command, sizeof command);
+            char expected[64];
+            snprintf(expected, sizeof expected, "glint: %s: CL_OUT_OF_RESOURCES (-5) on ", calls[k]);
+            if (strncmp(end.errors, expected, strlen(expected)) != 0) print_error("%s\n", end.errors);
+            assert_memory_equal(end.errors, expected, strlen(expected));
+            assert_int_equal(end.status, EXIT_MACHINE);
+        }
+}
+
+int main(void)
+{
+    // each command is a process of its own, and forks before this one has opened a device
+    const struct CMUnitTest command_tests[] = {cmocka_unit_test(test_commands)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_needed_calls),
+                                       cmocka_unit_test(test_needed_objects),
+                                       cmocka_unit_test(test_dispensable_calls),
+                                       cmocka_unit_test(test_builds), cmocka_unit_test(test_discovery)};
+    int failed = cmocka_run_group_tests(command_tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, set_up, tear_down) + failed;
+}
