@@ -77,8 +77,12 @@ def need_modules(*modules):
 
 
 def find_icd(name):
-    """The file by which the OpenCL loader finds an implementation; None where it is not installed."""
-    return next((str(path) for path in Path("/etc/OpenCL/vendors").glob(f"*{name}*.icd")), None)
+    """The file by which the OpenCL loader finds an implementation, as OCL_ICD_VENDORS takes it."""
+    return next(map(str, Path("/etc/OpenCL/vendors").glob(f"*{name}*.icd")), "/not-installed.icd")
+
+
+def has_device(**options):
+    return re.search("^[0-9]", run("devices", **options).stdout, re.MULTILINE) is not None
 
 
 class TestCase(unittest.TestCase):
