@@ -1,0 +1,89 @@
+#!/usr/bin/env -S python3 -B
+"""At `strict` every OpenCL implementation gives the same bits: images and traces of a scene with every shape, every light,
+highlights and checkers, at 1 and 4 lanes. Implementations that are not installed are skipped. INTEL_OPENCL_RT names a folder
+that holds Intel's CPU runtime (libintelocl.so, for one from the package intel-opencl-rt of PyPI).
+
+rusticl on llvmpipe (Mesa 22.3) has no fused multiply-add, and its compiler inlines the kernels' own one everywhere. It
+renders one kind of shape at a time under all lights, a few seconds each; with GLINT_LONG_TESTS=1 the whole scene too, at 1
+lane, which takes the compiler 17 seconds and 1.8 GB."""
+import math
+import os
+import shutil
+import unittest
+from pathlib import Path
+
+from glint import IS_LONG, IS_SANITIZED, ROOT, TestCase, find_icd, has_device, main, read, skip_all, write
+
+SCENE = ROOT / "tests/scenes/every_shape.yaml"
+POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
+RUSTICL = {"env": {"OCL_ICD_VENDORS": find_icd("rusticl"), "RUSTICL_ENABLE": "llvmpipe"}}
+# optimized, LLVM leaves calls that Oclgrind 21.10 does not know
+OCLGRIND = {"wrapper": ("oclgrind", "--build-options", "-cl-opt-disable")}
+
+
+def rays():
+    """Rays from all around at the scene's middle, with zeros of either sign among the directions."""
+    for i in range(512):
+        angle, y, far = i * 2.399963, 1 - (2 * i + 1) / 512, 3 + i % 7 * 4
+        x, z = (f(angle) * math.sqrt(1 - y * y) for f in (math.cos, math.sin))
+        yield x * far, 1 + y * far, z * far, -x + 0.05 * math.sin(i), -y + 0.04 * math.cos(i), -z
+    for i in range(64):
+        yield i * 0.2 - 6.4, 0.5, -20, 0.0 if i % 2 else -0.0, 0, 1
+    for i in range(64):
+        yield i * 0.2 - 6.4, 20, math.sin(i) * 3, 0, -1, -0.0
+
+
+class DevicesAgree(TestCase):
+    def pixels(self, implementation, scene=SCENE, lanes=1):
+        """The bytes of each pixel."""
+        command = f"render {scene} --lanes {lanes} --size 32x18 --precision strict --quiet -o image.npy"
+        self.glint(command, **implementation)
+        data = Path("image.npy").read_bytes()
+        return [data[i : i + 12] for i in range(len(data) - 32 * 18 * 12, len(data), 12)]
+
+    def trace(self, implementation, lanes=1):
+        write("rays", "".join(" ".join(f"{number:.9g}" for number in ray) + "\n" for ray in rays()))
+        return self.glint(f"trace {SCENE} --rays rays --precision strict --lanes {lanes}", **implementation).stdout
+
+    def check_image(self, what, implementation, scene=SCENE, lanes=1):
+        pairs = zip(self.pixels(implementation, scene, lanes), self.pixels(POCL, scene))
+        differing = [(i % 32, i // 32) for i, (one, other) in enumerate(pairs) if one != other]
+        self.assertEqual(differing, [], f"{what}: these pixels (x, y) are not PoCL's")
+
+    def check(self, implementation):
+        if not has_device(**implementation):
+            self.skipTest("not installed")
+        for lanes in 1, 4:
+            self.check_image(f"{lanes} lanes", implementation, lanes=lanes)
+            self.assertEqual(self.trace(implementation, lanes), self.trace(POCL), f"traces at {lanes} lanes")
+
+    def test_pocl(self):
+        hits = sum(line[0].isdigit() for line in self.trace(POCL).splitlines())
+        self.assertTrue(200 < hits < 640, f"{hits} of 640 rays hit")
+        self.check(POCL)
+
+    @unittest.skipIf(IS_SANITIZED or not shutil.which("oclgrind"), "Oclgrind is not installed, or the build is sanitized")
+    def test_oclgrind(self):
+        self.check(OCLGRIND)
+
+    @unittest.skipIf(IS_SANITIZED, "the build is sanitized")
+    def test_intel(self):
+        library = next(Path(os.environ.get("INTEL_OPENCL_RT", "/none")).rglob("libintelocl.so"), None)
+        self.check({"env": {"OCL_ICD_VENDORS": os.path.abspath(write("intel.icd", f"{library}\n"))}})
+
+    @unittest.skipIf(IS_SANITIZED, "the build is sanitized")
+    def test_rusticl(self):
+        if not has_device(**RUSTICL):
+            self.skipTest("not installed")
+        head, objects = read(SCENE).split("objects:\n")
+        for shape in ["plane", "disc", "box", "sphere", "triangle", "cylinder", "cone", "torus"] + IS_LONG * [""]:
+            kept = [line for line in objects.splitlines() if line.startswith(f"  - {shape}")]
+            self.assertTrue(kept, shape)
+            scene = write("apart.yaml", "\n".join([head + "objects:", *kept]))
+            self.check_image(shape, RUSTICL, scene)
+
+
+if __name__ == "__main__":
+    if not has_device(**POCL):
+        skip_all("PoCL is not here to compare with")
+    main()
