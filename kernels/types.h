@@ -100,7 +100,7 @@ typedef struct {
 // clang-format on
 
 #define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
-enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT };
+enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 };
 
 // A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
 // high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. The
@@ -224,12 +224,12 @@ typedef struct {
     // corners of a box around all points where a transparent object may touch an opaque one; low above high
     // where none does
     scalar4 contact_low, contact_high;
-    scalar4 sample;          // x: width of a sample's share of a pixel, at distance 1
-    uint4 picture;           // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;           // x: largest depth
-    uint4 cull_spheres;      // x: number per common origin, 0: none
-    uint4 counts[2];         // of each KIND_…, in that order
-    uint4 bounded_counts[2]; // of these those in the BVH, which come first
+    scalar4 sample;                      // x: width of a sample's share of a pixel, at distance 1
+    uint4 picture;                       // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;                       // x: largest depth
+    uint4 cull_spheres;                  // x: number per common origin, 0: none
+    uint4 counts[KIND_QUARTETS];         // of each KIND_…, in that order
+    uint4 bounded_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
 } SceneHeader;
 
 #endif

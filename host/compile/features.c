@@ -2,7 +2,7 @@
 
 #include "host/compile/shapes.h"
 
-#define FEATURE_NAME(name) #name,
+#define FEATURE_NAME(name, ...) #name,
 const char *const feature_names[FEATURE_COUNT] = {FEATURE_LIST(FEATURE_NAME)};
 #undef FEATURE_NAME
 

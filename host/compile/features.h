@@ -2,16 +2,17 @@
 #pragma once
 
 #include "host/base/text.h"
+#include "host/compile/flat_types.h"
 #include "host/scene/scene.h"
 #include "kernels/features.h"
 #include <stdint.h>
 
 typedef uint32_t FeatureSet;
 
-#define FEATURE_BIT_INDEX(name) FEATURE_INDEX_##name,
+#define FEATURE_BIT_INDEX(name, ...) FEATURE_INDEX_##name,
 enum { FEATURE_LIST(FEATURE_BIT_INDEX) FEATURE_COUNT };
 #undef FEATURE_BIT_INDEX
-#define FEATURE_BIT(name) FEATURE_##name = 1u << FEATURE_INDEX_##name,
+#define FEATURE_BIT(name, ...) FEATURE_##name = 1u << FEATURE_INDEX_##name,
 enum { FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (1u << FEATURE_COUNT) - 1 };
 #undef FEATURE_BIT
 
