@@ -32,7 +32,7 @@ static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
     DeviceList list;
     MessageList messages = {0};
     device_list_open(&list);
-    const Device *device = device_choose(&list, device_wish(NULL), &messages);
+    const Device *device = device_choose(&list, device_selector(NULL), &messages);
     if (!device) _exit(NO_DEVICE);
     message_list_free(&messages);
     Compute compute;

@@ -88,7 +88,7 @@ static void test_work_groups_fit(void **state)
 {
     (void)state;
     static const struct {
-        size_t wish[2], largest, sides[2], fit[2];
+        size_t preferred[2], largest, sides[2], fit[2];
     } cases[] = {
         {{8, 8}, 64, {64, 64}, {8, 8}},  {{8, 8}, SIZE_MAX, {SIZE_MAX, SIZE_MAX}, {8, 8}},
         {{8, 8}, 63, {64, 64}, {8, 4}},  {{8, 8}, 16, {64, 64}, {4, 4}},
@@ -97,7 +97,7 @@ static void test_work_groups_fit(void **state)
         {{64, 1}, 48, {64, 1}, {32, 1}}, {{1, 1}, 1, {1, 1}, {1, 1}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        size_t sides[2] = {cases[i].wish[0], cases[i].wish[1]};
+        size_t sides[2] = {cases[i].preferred[0], cases[i].preferred[1]};
         work_group_fit(sides, 2, cases[i].largest, cases[i].sides);
         assert_int_equal(sides[0], cases[i].fit[0]);
         assert_int_equal(sides[1], cases[i].fit[1]);

@@ -47,7 +47,7 @@ static void test_choice(void **state)
 {
     (void)state;
     static const struct {
-        const char *wish;
+        const char *selector;
         int index;
     } cases[] = {
         {NULL, 3},    {"gpu", 3},     {"GPU", 3},
@@ -64,13 +64,15 @@ static void test_choice(void **state)
     machine_fill(&machine);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         MessageList messages = {0};
-        const Device *device = device_choose(&machine.list, cases[i].wish, &messages);
+        const Device *device = device_choose(&machine.list, cases[i].selector, &messages);
         int index = device ? (int)device->index : -1;
-        if (index != cases[i].index) print_error("wish %s\n", cases[i].wish ? cases[i].wish : "NULL");
+        if (index != cases[i].index)
+            print_error("selector %s\n", cases[i].selector ? cases[i].selector : "NULL");
         assert_int_equal(index, cases[i].index);
         assert_int_equal(message_count(&messages, MESSAGE_ERROR), index < 0);
         if (index < 0) {
-            assert_non_null(strstr(messages.items[0].text, cases[i].wish ? cases[i].wish : "no wish"));
+            assert_non_null(
+                strstr(messages.items[0].text, cases[i].selector ? cases[i].selector : "no usable"));
             assert_non_null(strstr(messages.items[0].text, "2 (Iris Mute, gpu, unusable: no compiler)"));
         }
         message_list_free(&messages);
@@ -117,16 +119,16 @@ static void test_lanes(void **state)
     assert_int_equal(device_lanes(&device, false), 1);
 }
 
-static void test_wish(void **state)
+static void test_selector(void **state)
 {
     (void)state;
     unsetenv("GLINT_DEVICE");
-    assert_null(device_wish(NULL));
+    assert_null(device_selector(NULL));
     setenv("GLINT_DEVICE", "", 1);
-    assert_null(device_wish(NULL));
+    assert_null(device_selector(NULL));
     setenv("GLINT_DEVICE", "cpu", 1);
-    assert_string_equal(device_wish(NULL), "cpu");
-    assert_string_equal(device_wish("gpu"), "gpu");
+    assert_string_equal(device_selector(NULL), "cpu");
+    assert_string_equal(device_selector("gpu"), "gpu");
     unsetenv("GLINT_DEVICE");
 }
 
@@ -189,7 +191,7 @@ int main(void)
         cmocka_unit_test(test_choice),
         cmocka_unit_test(test_choice_falls_back),
         cmocka_unit_test(test_lanes),
-        cmocka_unit_test(test_wish),
+        cmocka_unit_test(test_selector),
         cmocka_unit_test(test_list_of_this_machine),
         cmocka_unit_test(test_list_without_platforms),
     };

@@ -340,6 +340,8 @@ static void test_discovery(void **state)
             device_list_open(&list);
             const Device *chosen = device_choose(&list, NULL, &messages);
             assert_int_equal(messages.count, chosen == NULL);
+            if (messages.count > 0 && list.count == 0)
+                assert_non_null(strstr(messages.items[0].text, queries[i]));
             message_list_free(&messages);
             device_list_close(&list);
             if (!injected.call) {
@@ -358,7 +360,7 @@ static int set_up(void **state)
     setenv("TMPDIR", "/dev/null", 1); // no place for the text of programs that do not build
     MessageList messages = {0};
     device_list_open(&devices);
-    device = device_choose(&devices, device_wish(NULL), &messages);
+    device = device_choose(&devices, device_selector(NULL), &messages);
     message_list_print(&messages, stderr);
     message_list_free(&messages);
     if (!device) return -1;

@@ -43,7 +43,7 @@ static void opened_open(Opened *opened)
 {
     MessageList messages = {0};
     device_list_open(&opened->list);
-    const Device *device = device_choose(&opened->list, device_wish(NULL), &messages);
+    const Device *device = device_choose(&opened->list, device_selector(NULL), &messages);
     message_list_print(&messages, stderr);
     if (!device) _exit(77);
     compute_open(&opened->compute, device);

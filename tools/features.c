@@ -115,7 +115,7 @@ int main(int argument_count, char **arguments)
     Compute compute;
     MessageList messages = {0};
     device_list_open(&devices);
-    const Device *device = device_choose(&devices, device_wish(NULL), &messages);
+    const Device *device = device_choose(&devices, device_selector(NULL), &messages);
     bool loaded = scene_load(&scene, arguments[1], &(SceneOptions){0}, &messages);
     message_list_print(&messages, stderr);
     message_list_free(&messages);

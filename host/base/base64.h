@@ -1,4 +1,4 @@
-// Bytes as text (RFC 4648, "The Base16, Base32, and Base64 Data Encodings", 2006, section 4).
+// Base64 (RFC 4648, "The Base16, Base32, and Base64 Data Encodings", 2006, section 4).
 #pragma once
 
 #include "host/base/text.h"

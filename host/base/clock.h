@@ -1,5 +1,5 @@
 // The monotonic clock.
 #pragma once
 
-// Seconds since an arbitrary moment; never goes back.
+// Seconds since an arbitrary moment; never decreases.
 double clock_seconds(void);

@@ -1,4 +1,4 @@
-// Files of the source that the program carries within itself; tools/embed writes them into C.
+// Source files embedded in the program; tools/embed writes them as C.
 #pragma once
 
 typedef struct {

@@ -1,4 +1,4 @@
-// Faults of the program or the machine: reported once, then the process ends with exit status 2.
+// Bugs and lack of memory end the process. Everything else that fails is returned to the caller.
 #pragma once
 
 enum { EXIT_DONE = 0, EXIT_USER = 1, EXIT_MACHINE = 2, EXIT_CHECK = 3, EXIT_INTERRUPTED = 130 };

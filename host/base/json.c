@@ -13,13 +13,12 @@
 struct Json {
     struct fy_emitter *emitter;
     Text text;
-    bool *items; // the open objects and arrays: is it an object?
+    bool *items; // whether each open container is an object
     size_t count, capacity;
 };
 
-// libfyaml (0.7, 0.8) drops spaces at the ends of a text that YAML could write plainly, even where it is to
-// be quoted. They pass through it as a noncharacter (The Unicode Standard 15.0, section 23.7), which no text
-// has.
+// libfyaml (0.7, 0.8) drops spaces at the ends of a text that YAML could write plainly, even in quotes. They
+// are passed as a noncharacter (The Unicode Standard 15.0, section 23.7), which no text has.
 static const char space_stand_in[] = "\xEF\xB7\x90", replacement_character[] = "\xEF\xBF\xBD";
 
 static int json_output(struct fy_emitter *emitter, enum fy_emitter_write_type type, const char *text,
@@ -125,7 +124,7 @@ void json_number(Json *json, const char *key, double value)
 {
     char word[32] = "null";
     if (isfinite(value)) {
-        // 17 digits always read back (Goldberg, What every computer scientist should know about
+        // 17 digits always suffice (Goldberg, What every computer scientist should know about
         // floating-point arithmetic, 1991, theorem 15).
         int digits = 1;
         do

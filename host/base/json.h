@@ -1,7 +1,7 @@
-// JSON out, through libfyaml, so that strings are escaped by a library.
-// Calls nest: json_begin_object .. json_end.
-// A key is the program's own word, without control characters; a text may be anything (what is not UTF-8 in
-// it becomes U+FFFD).
+// Writes JSON through libfyaml, which escapes strings.
+// Calls nest: json_begin_object ... json_end.
+// A key has no control characters; a text may have any bytes, of which those that are not UTF-8 become
+// U+FFFD.
 #pragma once
 
 #include <stdbool.h>

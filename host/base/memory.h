@@ -1,4 +1,4 @@
-// Memory that is there: what cannot be had is a fault.
+// Allocation that never fails: lack of memory is a fault.
 #pragma once
 
 #include <stddef.h>

@@ -9,18 +9,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A line longer than this is cut where it is shown, and not shown where the caret would lie beyond the cut.
+// A longer source line is truncated, and not shown at all if the caret would be beyond.
 enum { CHARACTERS_SHOWN = 240 };
 
-// C0 and C1 controls could drive the reader's terminal.
+// C0 and C1 controls could control the user's terminal.
 static bool character_is_control(const unsigned char *bytes, size_t size)
 {
     return (size == 1 && (bytes[0] < 0x20 || bytes[0] == 0x7F)) ||
            (size == 2 && bytes[0] == 0xC2 && bytes[1] < 0xA0);
 }
 
-// The text as it can be shown: as many characters as it has, at most `character_limit`, with `?` for each
-// control character and each byte that is not UTF-8. Tabs stay where they are wanted.
+// At most `character_limit` characters of the text, with `?` for each control character and each byte that is
+// not UTF-8. Tabs are kept on request.
 static char *printable_copy(const char *bytes, size_t length, size_t character_limit, bool keep_tabs)
 {
     Text shown = {0};
@@ -28,8 +28,8 @@ static char *printable_copy(const char *bytes, size_t length, size_t character_l
     for (size_t i = 0, characters = 0; i < length && characters < character_limit; characters++) {
         const unsigned char *here = (const unsigned char *)bytes + i;
         size_t size = text_character_size(bytes + i, length - i);
-        bool as_it_is = size && (!character_is_control(here, size) || (keep_tabs && *here == '\t'));
-        text_append(&shown, as_it_is ? bytes + i : "?", as_it_is ? size : 1);
+        bool printable = size && (!character_is_control(here, size) || (keep_tabs && *here == '\t'));
+        text_append(&shown, printable ? bytes + i : "?", printable ? size : 1);
         i += size ? size : 1;
     }
     return shown.items;
@@ -69,7 +69,7 @@ static Message message_place(const Source *source, size_t offset)
     Message message = {0};
     if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
     if (offset > source->length) offset = source->length;
-    // A byte order mark is no character of the first line.
+    // A byte order mark is not a character of the first line.
     size_t start = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
     if (offset < start) offset = start;
     message.line = 1;
@@ -116,7 +116,7 @@ size_t message_count(const MessageList *list, MessageSeverity severity)
     return count;
 }
 
-// The caret stands under the character: the line's own tabs before it keep it there at any tab width.
+// Repeats the line's tabs before the caret, which keep it under its character at any tab width.
 static void caret_print(const char *line, unsigned column, FILE *stream)
 {
     const char *at = line;

@@ -1,4 +1,4 @@
-// Messages to the user about a file they gave: errors and warnings with their place.
+// Messages to the user: errors and warnings with their file, line and column.
 #pragma once
 
 #include <stdbool.h>
@@ -20,19 +20,19 @@ typedef struct {
     size_t count, capacity;
 } MessageList;
 
-// Where a message points: into a text held in memory, so that the line can be shown with a caret.
+// The text in memory that a message points into, so that its line can be shown with a caret.
 typedef struct {
     const char *file;
     const char *bytes;
     size_t length;
 } Source;
 
-// Adds a message without a place.
+// Adds a message without a file.
 void message_add(MessageList *list, MessageSeverity severity, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-// Adds a message at a byte offset of a source; line, column and the line's text are worked out here.
-// An offset past the end points at the end. Control bytes in the shown line are made printable.
+// Adds a message at a byte offset of a source, which determines its line, column and source line. An offset
+// past the end points at the end. Control characters are replaced by `?`.
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
 

@@ -1,4 +1,4 @@
-// Arrays of numbers, from one precision to the other.
+// Arrays of numbers converted between precisions.
 #pragma once
 
 #include <stdbool.h>

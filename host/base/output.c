@@ -45,7 +45,7 @@ static char *temporary_name(const char *target)
     const char *slash = strrchr(target, '/');
     const char *name = slash ? slash + 1 : target;
     char *temporary;
-    // A name may have 255 bytes; its start tells whose temporary it is.
+    // A name may have 255 bytes; its start shows what the temporary is for.
     if (asprintf(&temporary, "%.*s.%.200s.XXXXXX", (int)(name - target), target, name) < 0)
         fault("out of memory: file name");
     return temporary;
@@ -65,7 +65,7 @@ static bool output_failed(OutputFile *output, const char *doing, MessageList *me
     return false;
 }
 
-// A device or a pipe cannot be replaced by renaming: it is written as it is.
+// A device or a pipe cannot be replaced by renaming: it is written directly.
 static bool output_open_directly(OutputFile *output, MessageList *messages)
 {
     output->file = fopen(output->target, "wbe");
@@ -87,7 +87,7 @@ static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *mes
         return output_failed(output, "create", messages);
     }
     pending_add(output->temporary);
-    fchmod(descriptor, mode); // where a file system has no modes, it is written all the same
+    fchmod(descriptor, mode); // fails where a file system has no modes, which does not matter
     output->file = fdopen(descriptor, "wb");
     if (output->file) return true;
     int error = errno;
@@ -96,10 +96,10 @@ static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *mes
     return output_failed(output, "create", messages);
 }
 
-// Where a link that leads to no file yet ends: `target` itself if it is none.
+// The end of a chain of symbolic links, whether a file exists there or not; `target` itself if it is no link.
 static char *link_end(const char *target)
 {
-    enum { STEPS_LARGEST = 40 }; // as Linux has it; what is left then leads in a circle
+    enum { STEPS_LARGEST = 40 }; // as in Linux; a longer chain is a cycle
     char *path = memory_copy_text(target), aim[PATH_MAX];
     for (int step = 0; step < STEPS_LARGEST; step++) {
         ssize_t length = readlink(path, aim, sizeof aim);
@@ -124,12 +124,12 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     }
     struct stat old;
     bool exists = stat(target, &old) == 0;
-    // A link stays: the file it leads to is the one replaced, or made.
+    // A symbolic link is kept: its target is replaced or created.
     char *resolved = exists ? realpath(target, NULL) : link_end(target);
     output->target = resolved ? resolved : memory_copy_text(target);
     if (!exists && errno == ELOOP) return output_failed(output, "create", messages);
     if (exists && !S_ISREG(old.st_mode)) return output_open_directly(output, messages);
-    // Renaming would replace a file that its owner made read-only.
+    // Renaming would replace a read-only file.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
     return output_open_beside(output, exists ? old.st_mode & 0777 : mode_by_umask(), messages);
 }
@@ -146,7 +146,7 @@ bool output_settle(OutputFile *output, MessageList *messages)
     FILE *file = output->file;
     output->file = NULL;
     if (!file || file == stdout) return true;
-    errno = EIO; // what an error that an earlier write met has left is not known
+    errno = EIO; // if an earlier write failed, its error is lost
     bool written = fflush(file) == 0 && !ferror(file);
     int error = errno;
     if (fclose(file) == 0 && written) return true;

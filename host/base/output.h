@@ -1,4 +1,5 @@
-// A file written beside its target and renamed when whole, so that a failure leaves the old file untouched.
+// A file written beside its target and renamed when complete, so that a failure leaves the old file
+// untouched.
 #pragma once
 
 #include "host/base/message.h"
@@ -10,15 +11,14 @@ typedef struct {
     char *target, *temporary;
 } OutputFile;
 
-// Opens a file beside `target`. On failure adds a message and returns false. `-` is standard output, of which
-// main tells whether it could be written.
-// The temporary is removed by output_abandon, also from an atexit handler if the process faults.
+// Opens a file beside `target`, or, for `-`, standard output, whose errors main reports. On failure adds a
+// message and returns false. output_abandon removes the temporary; so does an atexit handler.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);
-// On failure adds a message and returns false; the file stays open, to be abandoned.
+// On failure adds a message and returns false; the file stays open until it is abandoned.
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);
-// Flushes, checks for write errors (disk full), closes: only the renaming is left to output_commit. On
-// failure adds a message, removes the temporary.
+// Flushes, checks for write errors (disk full) and closes, which leaves only the renaming to output_commit.
+// On failure adds a message and removes the temporary.
 bool output_settle(OutputFile *output, MessageList *messages);
-// Settles the file unless it is, and renames it. On failure adds a message, removes the temporary.
+// Settles the file if it is not settled, and renames it. On failure adds a message and removes the temporary.
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);

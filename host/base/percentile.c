@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The value at `rank` (from 0) of the sorted magnitudes. The bits of floats that are not negative order them:
-// first the upper half of the bits is found by counting, then the lower among those that share it.
+// The value at `rank` (from 0) of the sorted magnitudes, by radix selection: the bits of non-negative floats
+// are in their order, so histograms of the upper half of the bits, then of the lower, find it.
 static float rank_select(const float *magnitudes, size_t count, size_t rank)
 {
     size_t *counts = memory_allocate(1u << 16, sizeof *counts);

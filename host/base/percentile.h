@@ -1,7 +1,8 @@
-// What nearly all of many magnitudes do not exceed.
+// The 99.9th percentile.
 #pragma once
 
 #include <stddef.h>
 
-// The smallest of the magnitudes (none negative, none NaN) that 99.9 % of them are no larger than; 0 of none.
+// The smallest of the magnitudes (none negative, none NaN) that 99.9 % of them do not exceed; 0 if there are
+// none.
 double percentile_999(const float *magnitudes, size_t count);

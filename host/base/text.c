@@ -65,7 +65,7 @@ size_t text_character_size(const char *text, size_t length)
 
 bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages)
 {
-    // A device or a pipe may be endless.
+    // A device or a pipe may have no end.
     struct stat status;
     bool is_regular = fstat(fileno(file), &status) == 0 && S_ISREG(status.st_mode);
     const size_t largest = is_regular ? SIZE_MAX : (size_t)2 << 30;

@@ -1,4 +1,4 @@
-// Growing text, always ended by a NUL that `count` does not count; a zeroed Text is the empty text.
+// Growing text with a NUL at its end, which `count` excludes; a zeroed Text is empty.
 #pragma once
 
 #include "host/base/message.h"
@@ -16,14 +16,14 @@ void text_appendf(Text *text, const char *format, ...) __attribute__((format(pri
 const char *text_c(const Text *text); // never NULL
 void text_free(Text *text);           // and zeroes
 
-// Bytes of the well-formed UTF-8 character that `text` starts with, or 0 where it starts with none.
+// Bytes of the well-formed UTF-8 character that `text` starts with; 0 if it does not start with one.
 size_t text_character_size(const char *text, size_t length);
 
 // Reads a whole file (`-`: standard input). On failure adds a message that names the file and returns false.
 bool text_read_file(Text *text, const char *path, MessageList *messages);
-// The rest of one that is open, and stays so; `path` is used in messages only.
+// Reads the rest of an open file and leaves it open; `path` is used in messages only.
 bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages);
 
-// The known word nearest to `word` by edit distance, or NULL where none is near
-// (distance > 1 + length / 4, or as large as the word). A swap of neighbors counts one.
+// The known word nearest to `word` by edit distance, in which a swap of neighbors counts one; NULL if the
+// nearest is farther than 1 + length / 4 or than length - 1.
 const char *text_nearest(const char *word, const char *const *known, size_t known_count);

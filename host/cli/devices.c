@@ -158,7 +158,7 @@ int command_devices(int argument_count, char **arguments)
     DeviceList list;
     device_list_open(&list);
     MessageList messages = {0};
-    const Device *chosen = device_choose(&list, device_wish(NULL), &messages);
+    const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
     if (as_json)
         devices_print_json(&list, chosen);
     else if (list.count > 0)

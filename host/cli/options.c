@@ -215,12 +215,12 @@ void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
     *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
 }
 
-bool device_open(OpenDevice *open, const char *wish)
+bool device_open(OpenDevice *open, const char *selector)
 {
     *open = (OpenDevice){0};
     device_list_open(&open->devices);
     MessageList messages = {0};
-    const Device *device = device_choose(&open->devices, device_wish(wish), &messages);
+    const Device *device = device_choose(&open->devices, device_selector(selector), &messages);
     messages_print(&messages, NULL);
     if (!device) {
         device_list_close(&open->devices);

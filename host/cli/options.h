@@ -116,7 +116,7 @@ typedef struct {
 
 // Chooses and opens a device. False, with a message, if there is none; nothing to close then. A device that
 // fails, now or later, is reported by device_close.
-bool device_open(OpenDevice *open, const char *wish);
+bool device_open(OpenDevice *open, const char *selector);
 // At the end of a command. Returns the exit status: EXIT_MACHINE, with a message, if the device failed, else
 // `status`. Leaves the context to the process's end unless interrupted: PoCL takes 80 ms to free its
 // compiler.

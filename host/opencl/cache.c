@@ -1,4 +1,4 @@
-// Entries: a CacheHeader, the key without its NUL, the binary; numbers as this machine stores them, since
+// An entry is a CacheHeader, the key without its NUL, and the binary. Numbers are in native byte order, as
 // the binary is for this machine.
 #include "host/opencl/cache.h"
 
@@ -46,8 +46,8 @@ char *cache_entry_path(const char *key)
     return copy;
 }
 
-// Every folder above the entry, for its owner alone (XDG Base Directory Specification 0.8, "Referencing this
-// specification"). One that cannot be made is found out by who writes into it.
+// Creates every folder above the entry, private to its owner (XDG Base Directory Specification 0.8,
+// "Referencing this specification"). A failure shows when the entry is written.
 static void make_folders(const char *path)
 {
     char *folder = memory_copy_text(path);
@@ -73,8 +73,7 @@ static bool entry_open(const Text *entry, const char *key, Text *binary)
     return true;
 }
 
-// What is loaded is run: an entry is a file of its user's own, and whatever else lies there is not waited
-// for.
+// Loaded code is executed: only regular files of the user are read, and opening never blocks.
 static bool is_own_file(const struct stat *status)
 {
     return S_ISREG(status->st_mode) && status->st_uid == geteuid();
@@ -104,7 +103,7 @@ bool cache_load(const char *key, Text *binary)
     if (!path) return false;
     Text entry = {0};
     bool found = entry_read(&entry, path) && entry_open(&entry, key, binary);
-    if (found) utimensat(AT_FDCWD, path, NULL, 0); // used now
+    if (found) utimensat(AT_FDCWD, path, NULL, 0); // most recently used
     text_free(&entry);
     free(path);
     return found;
@@ -129,8 +128,7 @@ static int file_compare(const void *a, const void *b)
     return first->tv_nsec < second->tv_nsec ? -1 : first->tv_nsec > second->tv_nsec;
 }
 
-// An entry, or what a process that was killed while it wrote one left of it: whatever else lies in the folder
-// is not ours.
+// Whether it names an entry, or the temporary that a killed process left: other files are not ours.
 static bool is_entry_name(const char *name)
 {
     static const char ending[] = ".bin";
@@ -180,7 +178,7 @@ void cache_store(const char *key, const Text *binary)
     make_folders(path);
     struct stat status;
     bool is_own = lstat(path, &status) == 0 && is_own_file(&status);
-    if (!is_own || access(path, R_OK | W_OK) != 0) unlink(path); // an output would leave it as it is
+    if (!is_own || access(path, R_OK | W_OK) != 0) unlink(path); // output_open would refuse it
     CacheHeader header = entry_header(key, binary->items, binary->count);
     MessageList ignored = {0};
     OutputFile output;

@@ -1,22 +1,22 @@
 // Compiled programs on disk, in $XDG_CACHE_HOME/glint, else $HOME/.cache/glint; a path that is not absolute
-// is ignored, as the XDG Base Directory Specification (0.8, "Basics") has it; neither: no cache. An entry is
-// found by the hash of its key and holds the whole key, so that no two keys are ever taken for one another.
-// Many processes may use it at once: entries are written beside and renamed. Nothing here is an error to
-// anyone: what cannot be read is not there, what cannot be written is not kept.
+// is ignored, as the XDG Base Directory Specification requires (0.8, "Basics"); without either there is no
+// cache. An entry is named by the hash of its key and contains the whole key, so that keys are never
+// confused. Safe with many processes: entries are written beside their target and renamed. Nothing here is an
+// error: what cannot be read is absent, what cannot be written is discarded.
 #pragma once
 
 #include "host/base/text.h"
 #include <stdint.h>
 
-// Fills `binary`, which must be empty. False if there is no entry; one that is damaged, no regular file or
-// another user's is none.
+// Fills `binary`, which must be empty. False without an entry; a damaged one, one of another user and one
+// that is not a regular file are ignored.
 bool cache_load(const char *key, Text *binary);
 // Replaces the key's entry, and trims the cache to CACHE_BYTES_LARGEST.
 void cache_store(const char *key, const Text *binary);
 
 enum { CACHE_BYTES_LARGEST = 128 << 20 }; // several hundred programs
-// Removes what has not been used for the longest time, until no more than that is left.
+// Removes the least recently used entries until at most `bytes_largest` are left.
 void cache_trim(const char *folder, uint64_t bytes_largest);
 
-// The path of the key's entry, to be freed by the caller; NULL: no cache.
+// The path of the key's entry, which the caller frees; NULL: no cache.
 char *cache_entry_path(const char *key);

@@ -8,7 +8,7 @@
 
 typedef struct {
     const EmbeddedFile *files;
-    bool *included; // one for each file
+    bool *included; // per file
     Text text;
     char *missing;
 } Composer;

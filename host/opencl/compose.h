@@ -1,5 +1,5 @@
-// The kernel text as one piece. A driver's own -I is not used: some serve a stale kernel after a header
-// changed.
+// The kernel text as one string. The driver's -I is not used: some drivers return a stale kernel after a
+// header changed.
 #pragma once
 
 #include "host/base/embedded.h"
@@ -8,8 +8,8 @@
 // The files of kernels/: "render.cl", "sphere.h", …; ended by a NULL name.
 extern const EmbeddedFile kernel_files[];
 
-// `prelude`, then `root` with each quoted include replaced by its file the first time and by an empty line
-// after that, in any branch of the preprocessor; #line before and after, so that the compiler names the file
-// and line as they are in kernels/. Files are found by the last part of their path; <…> includes stay. NULL
-// if `root` or an include is not in `files`, with *missing (may be NULL) its name, to be freed by the caller.
+// `prelude`, then `root` with each quoted include expanded the first time and replaced by an empty line after
+// that, whatever the preprocessor's branch; #line around each, so that the compiler reports files and lines
+// of kernels/. Files are found by the last part of their path; <...> includes are kept. NULL if `root` or an
+// include is not in `files`; *missing (may be NULL) is its name then, which the caller frees.
 char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude, char **missing);

@@ -43,8 +43,6 @@ void compute_fail(Compute *compute, const char *call, cl_int status, const char 
 // "CALL: STATUS (CODE) on DEVICE: detail", after a failure. Caller frees.
 char *compute_failure_text(const Compute *compute);
 
-const char *cl_status_name(cl_int status);
-
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"
     const char *prelude; // definitions placed before the text (features, LANES, precision)

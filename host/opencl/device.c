@@ -1,10 +1,11 @@
-// Devices as their platforms describe them. A query that fails leaves its field zero or its text empty: a
-// runtime that cannot answer must not keep the other devices from being used.
+// Devices as their platforms describe them. A query that fails leaves its field zero or its text empty: one
+// faulty runtime must not make the other devices unusable.
 #include "host/opencl/device.h"
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include <CL/cl_ext.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -27,13 +28,13 @@ static char *device_text(cl_device_id id, cl_device_info what)
     return text;
 }
 
-// The same for numbers: `value` must be zero before and stays so where the device cannot answer.
+// The same for numbers: `value` is zero before, and after a failure.
 #define device_number(id, what, value)                                                                       \
     do {                                                                                                     \
         if (clGetDeviceInfo((id), (what), sizeof *(value), (value), NULL) != CL_SUCCESS) *(value) = 0;       \
     } while (0)
 
-// The first three, where the device tells of at most eight dimensions.
+// The first three of up to eight dimensions.
 static void device_sides(cl_device_id id, size_t longest[3])
 {
     size_t sides[8] = {0};
@@ -48,7 +49,7 @@ static bool device_flag(cl_device_id id, cl_device_info what)
     return flag != CL_FALSE;
 }
 
-// A whole word of the blank-separated list of extensions.
+// Whether `name` is a whole word of the blank-separated list.
 static bool extensions_have(const char *extensions, const char *name)
 {
     size_t length = strlen(name);
@@ -113,11 +114,36 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
     array_push(*list, device);
 }
 
-// PoCL reads this when it compiles a kernel for its first launch. A kernel made for one work-group size is no
-// faster here than the one for all sizes, which its binaries need in any case: without this, it makes both.
+// PoCL reads this when it compiles a kernel for its first launch. A kernel specialized for one work-group
+// size is no faster here than the generic one, which its binaries need in any case: this avoids compiling
+// both.
 static void pocl_compile_once(void)
 {
     setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", false);
+}
+
+// Whether a call that counts or lists platforms or devices succeeded; keeps the first failure.
+static bool list_check(DeviceList *list, cl_int status, const char *call)
+{
+    bool is_empty = status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR;
+    if (status != CL_SUCCESS && !is_empty && !list->failed_call) {
+        list->failed_call = call;
+        list->failed_status = status;
+    }
+    return status == CL_SUCCESS;
+}
+
+// The platform's devices, which the caller frees.
+static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform, cl_uint *count)
+{
+    *count = 0;
+    if (!list_check(list, clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, NULL, count), "clGetDeviceIDs"))
+        *count = 0;
+    cl_device_id *ids = memory_allocate_zeroed(*count, sizeof *ids);
+    if (*count > 0 &&
+        !list_check(list, clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, *count, ids, NULL), "clGetDeviceIDs"))
+        *count = 0;
+    return ids;
 }
 
 void device_list_open(DeviceList *list)
@@ -125,19 +151,16 @@ void device_list_open(DeviceList *list)
     pocl_compile_once();
     *list = (DeviceList){0};
     cl_uint platform_count = 0;
-    if (clGetPlatformIDs(0, NULL, &platform_count) != CL_SUCCESS || platform_count == 0) return;
+    if (!list_check(list, clGetPlatformIDs(0, NULL, &platform_count), "clGetPlatformIDs") ||
+        platform_count == 0)
+        return;
     cl_platform_id *platforms = memory_allocate_zeroed(platform_count, sizeof *platforms);
-    if (clGetPlatformIDs(platform_count, platforms, NULL) != CL_SUCCESS) platform_count = 0;
-    list->platform_count = platform_count;
+    if (list_check(list, clGetPlatformIDs(platform_count, platforms, NULL), "clGetPlatformIDs"))
+        list->platform_count = platform_count;
 
-    for (cl_uint i = 0; i < platform_count; i++) {
-        cl_uint device_count = 0;
-        if (clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, 0, NULL, &device_count) != CL_SUCCESS)
-            device_count = 0;
-        cl_device_id *ids = memory_allocate_zeroed(device_count + 1u, sizeof *ids);
-        if (device_count > 0 &&
-            clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, device_count, ids, NULL) != CL_SUCCESS)
-            device_count = 0;
+    for (cl_uint i = 0; i < list->platform_count; i++) {
+        cl_uint device_count;
+        cl_device_id *ids = platform_devices(list, platforms[i], &device_count);
         if (device_count == 0) list->empty_platform_count++;
         for (cl_uint j = 0; j < device_count; j++)
             device_list_add(list, platforms[i], ids[j]);
@@ -187,11 +210,11 @@ const char *device_type_name(cl_device_type type)
     return "other";
 }
 
-const char *device_wish(const char *option)
+const char *device_selector(const char *option)
 {
     if (option) return option;
-    const char *wish = getenv("GLINT_DEVICE");
-    return wish && wish[0] != '\0' ? wish : NULL;
+    const char *selector = getenv("GLINT_DEVICE");
+    return selector && selector[0] != '\0' ? selector : NULL;
 }
 
 // GPUs before CPUs before the rest.
@@ -200,51 +223,55 @@ static int device_rank(const Device *device)
     return device->type & CL_DEVICE_TYPE_GPU ? 2 : device->type & CL_DEVICE_TYPE_CPU ? 1 : 0;
 }
 
-static bool is_number(const char *wish)
+static bool is_number(const char *selector)
 {
-    return wish[0] != '\0' && wish[strspn(wish, "0123456789")] == '\0';
+    return selector[0] != '\0' && selector[strspn(selector, "0123456789")] == '\0';
 }
 
-// A number fits a whole number of the name: an index that no device has is no part of "haswell-avx512".
-static bool name_fits(const char *name, const char *wish)
+// A number must match a whole number of the name: the index 51 does not match "haswell-avx512".
+static bool name_matches(const char *name, const char *selector)
 {
-    if (!is_number(wish)) return strcasestr(name, wish) != NULL;
+    if (!is_number(selector)) return strcasestr(name, selector) != NULL;
     for (const char *at = name + strcspn(name, "0123456789"); *at; at += strcspn(at, "0123456789")) {
         size_t length = strspn(at, "0123456789");
-        if (length == strlen(wish) && strncmp(at, wish, length) == 0) return true;
+        if (length == strlen(selector) && strncmp(at, selector, length) == 0) return true;
         at += length;
     }
     return false;
 }
 
-static bool device_fits(const Device *device, const char *wish)
+static bool device_matches(const Device *device, const char *selector)
 {
-    if (!wish) return true;
-    if (strcasecmp(wish, "gpu") == 0) return (device->type & CL_DEVICE_TYPE_GPU) != 0;
-    if (strcasecmp(wish, "cpu") == 0) return (device->type & CL_DEVICE_TYPE_CPU) != 0;
-    return name_fits(device->name, wish) || name_fits(device->platform_name, wish);
+    if (!selector) return true;
+    if (strcasecmp(selector, "gpu") == 0) return (device->type & CL_DEVICE_TYPE_GPU) != 0;
+    if (strcasecmp(selector, "cpu") == 0) return (device->type & CL_DEVICE_TYPE_CPU) != 0;
+    return name_matches(device->name, selector) || name_matches(device->platform_name, selector);
 }
 
-// Whether the wish is the index of a device: "3090" may still be a part of a name.
-static bool wish_is_index(const DeviceList *list, const char *wish, size_t *index)
+// Whether the selector is the index of a device: "3090" may still be a part of a name.
+static bool selector_is_index(const DeviceList *list, const char *selector, size_t *index)
 {
-    if (!wish || !is_number(wish)) return false;
-    *index = strtoul(wish, NULL, 10);
+    if (!selector || !is_number(selector)) return false;
+    *index = strtoul(selector, NULL, 10);
     return *index < list->count;
 }
 
-static void complain(const DeviceList *list, const char *wish, MessageList *messages)
+static void report_no_match(const DeviceList *list, const char *selector, MessageList *messages)
 {
     if (list->count == 0) {
+        Text failure = {0};
+        if (list->failed_call)
+            text_appendf(&failure, " (%s: %s (%d))", list->failed_call, cl_status_name(list->failed_status),
+                         list->failed_status);
         message_add(
             messages, MESSAGE_ERROR,
-            "no OpenCL device (platforms: %u, none has one); PoCL runs on any CPU: "
-            "`apt install pocl-opencl-icd` on Debian and Ubuntu%s",
-            list->platform_count,
-            list->platform_count == 0
-                ? ""
-                : "; if it is installed, it needs a folder for its cache that can be written: set HOME, "
-                  "XDG_CACHE_HOME or POCL_CACHE_DIR");
+            "no OpenCL device on %u platforms%s; PoCL runs on any CPU: `apt install pocl-opencl-icd` on "
+            "Debian and Ubuntu%s",
+            list->platform_count, text_c(&failure),
+            list->platform_count == 0 ? ""
+                                      : "; if it is installed, its cache needs a writable folder: set HOME, "
+                                        "XDG_CACHE_HOME or POCL_CACHE_DIR");
+        text_free(&failure);
         return;
     }
     Text devices = {0};
@@ -256,25 +283,25 @@ static void complain(const DeviceList *list, const char *wish, MessageList *mess
         if (!device_usable(device, &why)) text_appendf(&devices, ", unusable: %s", why);
         text_append(&devices, ")", 1);
     }
-    if (wish)
-        message_add(messages, MESSAGE_ERROR, "no usable device is \"%s\"; there are: %s", wish,
+    if (selector)
+        message_add(messages, MESSAGE_ERROR, "no usable device matches \"%s\"; there are: %s", selector,
                     text_c(&devices));
     else
         message_add(messages, MESSAGE_ERROR, "no usable device; there are: %s", text_c(&devices));
     text_free(&devices);
 }
 
-const Device *device_choose(const DeviceList *list, const char *wish, MessageList *messages)
+const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages)
 {
     const Device *best = NULL;
     size_t index = 0;
-    bool is_index = wish_is_index(list, wish, &index);
+    bool is_index = selector_is_index(list, selector, &index);
     for (size_t i = 0; i < list->count; i++) {
         const Device *device = &list->items[i];
-        if (is_index ? i != index : !device_fits(device, wish)) continue;
+        if (is_index ? i != index : !device_matches(device, selector)) continue;
         if (!device_usable(device, NULL)) continue;
         if (!best || device_rank(device) > device_rank(best)) best = device;
     }
-    if (!best) complain(list, wish, messages);
+    if (!best) report_no_match(list, selector, messages);
     return best;
 }

@@ -17,40 +17,45 @@ typedef struct {
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
     unsigned compute_units, clock_mhz;
-    unsigned native_float_width, native_double_width; // 1 at least; double 0 without fp64
+    unsigned native_float_width, native_double_width; // at least 1; double 0 without fp64
     uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes;
     size_t largest_work_group, longest_group_sides[3];
     double timer_resolution_seconds;
     bool fp64, denormals, fma_in_hardware;
-    bool correctly_rounded; // -cl-fp32-correctly-rounded-divide-sqrt may be used
+    bool correctly_rounded; // supports -cl-fp32-correctly-rounded-divide-sqrt
     bool compiler, available, little_endian;
 } Device;
 
 typedef struct {
     Device *items;
     size_t count, capacity;
-    unsigned platform_count, empty_platform_count; // platforms without a device are counted, not an error
+    unsigned platform_count, empty_platform_count; // empty: without a device, which is no error
+    const char *failed_call; // the first call that found no devices because it failed, or NULL
+    cl_int failed_status;
 } DeviceList;
 
-// Looks at all platforms. None at all is an empty list, not a failure.
+// Queries all platforms. Without any the list is empty, which is no failure.
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
 
-// `wish`: an index, a part of the name or platform's name (any case; a number only as a whole), "cpu", "gpu",
-// or NULL for the default: a GPU if there is one, else a CPU, else any. Only devices that are available,
-// little-endian and have a compiler are taken. Identical twins: the first. NULL with an error message where
-// nothing fits; the message lists the devices there are, and says how to install PoCL if there are none.
-const Device *device_choose(const DeviceList *list, const char *wish, MessageList *messages);
+// `selector`: an index, a part of the device's or platform's name (any case; a number only as a whole),
+// "cpu", "gpu", or NULL for the default: a GPU if there is one, else a CPU, else any device. Considers only
+// devices that are available, little-endian and have a compiler; of identical ones, chooses the first. NULL,
+// with an error message, if none matches: the message lists the devices, or says how to install PoCL if there
+// are none.
+const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages);
 
-// What the user asked for: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
+// The selector the user gave: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
 // NULL.
-const char *device_wish(const char *option);
+const char *device_selector(const char *option);
 
-// Whether kernels can be built and run there; if not, *why (may be NULL) says what is missing.
+// Whether the device can build and run kernels; if not, *why (may be NULL) says what is missing.
 bool device_usable(const Device *device, const char **why);
 
-// Pixels that one work-item carries at once unless the user says otherwise: on a CPU the native vector width
-// of float, or of double where `wide`, cut to 1, 4, 8 or 16; elsewhere 1.
+// The default number of rays per work-item: on a CPU the native vector width of float, or of double where
+// `wide`, rounded down to 1, 4, 8 or 16; elsewhere 1.
 unsigned device_lanes(const Device *device, bool wide);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
+
+const char *cl_status_name(cl_int status); // "CL_SUCCESS", …

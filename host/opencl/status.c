@@ -1,5 +1,5 @@
 // OpenCL's status codes by name.
-#include "host/opencl/compute.h"
+#include "host/opencl/device.h"
 #include <CL/cl_ext.h>
 
 #define STATUS(name)                                                                                         \
