@@ -15,8 +15,8 @@ static inline void vector_store(Vector vector, RealLanes *to)
 }
 
 // rays: RAY_SCALARS of each, near and far its tmin and tmax. results: RESULT_SCALARS of each: t; the
-// geometric normal, facing the ray; the point; the mirrored ray's origin and direction; the passed one's; how
-// much of the ray passes; and how much light passes along it from tmin to tmax. Behind t all are without
+// geometric normal, facing the ray; the point; the reflected ray's origin and direction; the refracted one's;
+// how much of the ray passes; and how much light passes along it from tmin to tmax. Behind t all are without
 // meaning where nothing is hit, but for the last.
 static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
@@ -32,18 +32,18 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
     Hit hit = closest_hit(scene, &ray);
     Surface surface = surface_at(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
-    Bounce mirrored = {origin, direction, black}, passed = mirrored;
-    surface_bounce(&surface, vector_normalize(direction), white, true, &mirrored, &passed);
+    Bounce reflected = {origin, direction, black}, refracted = reflected;
+    surface_bounce(&surface, vector_normalize(direction), white, true, &reflected, &refracted);
 
     RealLanes result[RESULT_SCALARS];
     result[RESULT_T].all = hit.t;
     vector_store(surface.normal, result + RESULT_NORMAL);
     vector_store(surface.position, result + RESULT_POSITION);
-    vector_store(mirrored.origin, result + RESULT_MIRRORED_ORIGIN);
-    vector_store(mirrored.direction, result + RESULT_MIRRORED_DIRECTION);
-    vector_store(passed.origin, result + RESULT_PASSED_ORIGIN);
-    vector_store(passed.direction, result + RESULT_PASSED_DIRECTION);
-    result[RESULT_PASSED].all = passed.weight.x;
+    vector_store(reflected.origin, result + RESULT_REFLECTED_ORIGIN);
+    vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);
+    vector_store(refracted.origin, result + RESULT_REFRACTED_ORIGIN);
+    vector_store(refracted.direction, result + RESULT_REFRACTED_DIRECTION);
+    result[RESULT_TRANSMISSION].all = refracted.weight.x;
     result[RESULT_LIGHT].all = transmittance(scene, &ray);
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {

@@ -1,5 +1,5 @@
-// Rendering the region band by band: each launch short enough for a desktop to stay usable and for an
-// interrupt to be heard, memory that of a band.
+// Renders the region band by band. Each launch is short, so that a desktop stays responsive and an interrupt
+// takes effect soon; memory is that of a band.
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/render/pace.h"
@@ -21,7 +21,7 @@ static TileShape tile_shape(uint32_t lanes)
     return (TileShape){TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
 }
 
-// The pixels of all tiles that a work-item carries, as ITEM_TILES in kernels/film.h has it.
+// The pixels of all tiles of a work-item (ITEM_TILES in kernels/film.h).
 static TileShape item_shape(uint32_t lanes)
 {
     TileShape shape = tile_shape(lanes);
@@ -29,17 +29,17 @@ static TileShape item_shape(uint32_t lanes)
     return shape;
 }
 
-// Work-items along each side of a group, fewer where the device takes fewer. Neighboring pixels meet the same
-// objects. But a work-item that carries whole tiles of them makes a group of its own: PoCL lays out the
-// private variables of a group's items side by side, and those of 64, each with room for the rays that wait
-// behind glass, are more than a cache holds.
+// Work-items along each side of a group, before the device's limits. Square groups are coherent: neighboring
+// pixels hit the same objects. But a work-item with whole tiles is a group of its own: PoCL places the
+// private variables of a group's items side by side, and 64 sets of them, each with the rays waiting behind
+// glass, exceed the cache.
 static size_t group_side(const Renderer *renderer)
 {
     bool on_cpu = renderer->compute->device->type & CL_DEVICE_TYPE_CPU;
     return renderer->report.lanes > 1 && on_cpu ? 1 : 8;
 }
 
-// What a band is rendered into, on the device.
+// The device buffers a band is rendered into.
 typedef struct {
     uint32_t rows;
     cl_mem offsets, ray_counts, losses, layers[LAYER_COUNT];
@@ -70,7 +70,7 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
 {
     const uint32_t sample_count = renderer->settings.sample_count;
     const Film film = film_of_rows(renderer, 0, rows);
-    // a kernel fills all of its layers, but computes shadows only where they are asked for
+    // a kernel fills all of its layers, but computes shadows only on request
     unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & AOVS_OF_PATH);
     buffers->rows = rows;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
@@ -134,7 +134,7 @@ static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
         renderer->report.rays[i] += counts[i];
 }
 
-// One launch for samples first..last-1; returns its seconds, the event's where it can be trusted.
+// One launch for samples first..last-1. Returns its seconds: the event's if trusted, else the host's.
 static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRows rows, uint32_t first,
                           uint32_t last)
 {
@@ -152,7 +152,7 @@ static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRo
     return time.trusted ? time.event_seconds : time.host_seconds;
 }
 
-// Has a kernel fill its layers, whose buffers follow the band in its arguments.
+// Launches a kernel that fills its layers, whose buffers follow the band in its arguments.
 static void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
                       unsigned aovs, BandRows rows)
 {
@@ -168,8 +168,8 @@ static void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, cons
     band_launch(renderer, kind, rows);
 }
 
-// Lengths of the device in the scene's unit. They are so already where that is 1, as at `double` it always
-// is; else the caller frees a copy.
+// Device lengths converted to the scene's unit: `lengths` itself where the unit is 1, as always at `double`;
+// else a float copy, which the caller frees.
 static void *lengths_restored(const Renderer *renderer, void *lengths, size_t count)
 {
     if (renderer->unit == 1) return lengths;
@@ -206,7 +206,7 @@ static uint32_t rows_step(const Renderer *renderer)
     return tile_shape(renderer->report.lanes).height * (uint32_t)group_side(renderer);
 }
 
-// As many as give each of the device's units several groups: the last to end would else be waited for.
+// Enough rows for several groups per compute unit: with fewer, the last group to end would idle the others.
 static uint32_t rows_least(const Renderer *renderer)
 {
     uint32_t group_width = item_shape(renderer->report.lanes).width * (uint32_t)group_side(renderer);

@@ -30,7 +30,7 @@ extern const LayerType layer_types[LAYER_COUNT];
 #define FILM_LAYER(NAME, name, type, ...) FILM_##type *name;
 
 // Every pixel of an image's region or of a band of its rows, row by row from the top left. Layers are NULL
-// where they were not asked for.
+// where they were not requested.
 //
 // Of a miss t is infinite, normal and position are 0, object is UINT32_MAX. Positions are relative to the
 // eye. A path is a signature of what the ray met (kernels/types.h).

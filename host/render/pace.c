@@ -1,14 +1,14 @@
-// What a band's samples cost is known only from its own launches: one band may be sky, which costs next to
-// nothing, and the next glass, thousands of times as dear. So the time that a sample took decides how many
-// rows a band gets, but its first launch has one sample a pixel. Its later launches go by its own time, which
-// all of its pixels have a part in, and may grow the faster for it.
+// The cost of a band's samples is known only from its own launches: a band of sky costs next to nothing, the
+// next, of glass, thousands of times as much. So the time per sample decides the rows of the next band, but
+// its first launch has one sample per pixel. Its later launches follow its own time, to which all of its
+// pixels have contributed, and may grow faster for that reason.
 #include "host/render/pace.h"
 
 #include <math.h>
 
 enum {
     FIRST_LAUNCH_SAMPLES = 1 << 17, // before any time is known
-    LAUNCH_SAMPLES_LARGEST = 1024,  // of each pixel
+    LAUNCH_SAMPLES_LARGEST = 1024,  // per pixel
     BAND_GROWTH_LARGEST = 4,
     LAUNCH_GROWTH_LARGEST = 16, // within a band
 };
@@ -29,7 +29,7 @@ void pace_begin_band(Pace *pace)
 static double samples_wanted(const Pace *pace)
 {
     if (pace->launch_samples <= 0 || pace->launch_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
-    if (pace->begins_band) return 0; // one a pixel
+    if (pace->begins_band) return 0; // one per pixel
     double of_target = pace->target_seconds * pace->launch_samples / pace->launch_seconds;
     return fmin(of_target, LAUNCH_GROWTH_LARGEST * pace->launch_samples);
 }

@@ -1,12 +1,11 @@
-// How much of the picture a launch takes, from how long those before it took. Too long a launch is killed by
-// a GPU's watchdog, keeps a desktop waiting, and an interrupt, too.
+// How many samples a launch takes, from the times of earlier launches. Too long a launch is killed by a GPU's
+// watchdog, freezes the desktop and delays an interrupt.
 #pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
 
-// Samples are counted over all pixels of a launch or band. Zeroed but for the target, it has seen no launch
-// yet.
+// Samples are counted over all pixels of a launch or band. Initially zero but for the target.
 typedef struct {
     double target_seconds;                 // of a launch
     double launch_samples, launch_seconds; // of the last launch
@@ -14,11 +13,11 @@ typedef struct {
     bool begins_band;
 } Pace;
 
-// How many samples the next band may have, pixels times samples of each: as many as last one launch, should
-// all of them go into it, and at most four times those of the band before.
+// Samples of the next band, over all its pixels: as many as one launch of the target's duration would take,
+// at most four times those of the previous band.
 uint64_t pace_band_samples(const Pace *pace);
 void pace_begin_band(Pace *pace);
 
-// How many of the samples that each pixel of the band still needs the next launch takes; one at least.
+// Samples per pixel of the next launch, of the `left` that each pixel of the band still needs; at least 1.
 uint32_t pace_launch_samples(const Pace *pace, uint64_t pixels, uint32_t left);
 void pace_note_launch(Pace *pace, uint64_t pixels, uint32_t samples, double seconds);

@@ -60,7 +60,7 @@ static bool device_has_room(const CompiledScene *compiled, const Device *device,
     return false;
 }
 
-// Frees each array of the host as it goes, so that no two copies of all of them exist.
+// Frees each host array after its upload, so that the scene is never in memory twice.
 static void upload(Renderer *renderer, CompiledScene *compiled)
 {
     bool wide = renderer->report.wide;
@@ -74,7 +74,7 @@ static void upload(Renderer *renderer, CompiledScene *compiled)
     }
 }
 
-// Everything that tells one variant of the kernel text from another.
+// The definitions that distinguish the variants of the kernel text.
 static void prelude_write(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
@@ -82,8 +82,8 @@ static void prelude_write(Renderer *renderer)
     const Device *device = renderer->compute->device;
     // errors are repaired, as on a device that makes them
     bool correct = device->correctly_rounded && seed == 0;
-    // of doubles it is asked for; Intel's runtime for CPUs does not tell of it, but has vectors, which
-    // llvmpipe and Oclgrind do not tell of
+    // OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
+    // vectors, unlike llvmpipe and Oclgrind
     bool has_fma = renderer->report.wide || device->fma_in_hardware || device->native_float_width > 1;
     Text *text = &renderer->prelude;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
@@ -187,7 +187,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
         .no_cache = renderer->settings.no_cache,
     };
     program_build(renderer->compute, &slot->request, &slot->program);
-    // the picture's own kernel is the one that reports name
+    // reports name the kernel that computes the result itself
     if (kind != KERNEL_AOV && kind != KERNEL_PATH) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;

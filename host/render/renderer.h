@@ -1,5 +1,5 @@
-// A scene on a device: flattened, uploaded, rendered in bands, or probed with explicit rays.
-// The only room that joins scene and opencl.
+// A scene compiled and uploaded to a device, then rendered in bands or probed with explicit rays. Of the
+// rooms, only this one uses both scenes and OpenCL.
 #pragma once
 
 #include "host/compile/settings.h"
@@ -11,22 +11,22 @@
 #include <stdint.h>
 
 typedef struct {
-    uint32_t width, height;                                   // of the whole picture
-    uint32_t region_x, region_y, region_width, region_height; // what is rendered of it
+    uint32_t width, height;                                   // of the whole image
+    uint32_t region_x, region_y, region_width, region_height; // the part to render
     uint32_t sample_count;                                    // per pixel, >= 1
-    uint32_t bounce_count;                                    // of a ray, at most; 0..16
+    uint32_t bounce_count;                                    // at most, per ray; 0..16
     Precision precision;
-    uint32_t lanes; // 1, 4, 8, 16; 0: the device's own choice
+    uint32_t lanes; // rays per work-item: 1, 4, 8, 16; 0: device_lanes
     BvhChoice bvh;
-    bool counting;             // count rays by kind, with a build of its own: never time such a run
-    uint32_t perturb_seed;     // not 0: a build that errs as devices may (kernels/numerics/perturb.h)
-    uint32_t perturb_scale;    // times as much, at most PERTURB_SCALE_LARGEST; 0: once
-    FeatureSet extra_features; // built in though the scene does not need them, for tests
-    bool shift_to_eye;         // true for pictures; false for probes: rays and scene as they are
+    bool counting;             // count rays by kind in a slower build; only for renders without AOVs
+    uint32_t perturb_seed;     // not 0: inject the rounding error OpenCL permits (kernels/numerics/perturb.h)
+    uint32_t perturb_scale;    // multiplies that error, up to PERTURB_SCALE_LARGEST; 0: 1
+    FeatureSet extra_features; // built in beyond the scene's own, for tests
+    bool shift_to_eye;         // the eye is the origin, for images; false for explicit rays
     bool no_cache;
-    double band_seconds; // aim for a launch's length; 0: 0.1
-    bool (*stop)(void);  // asked between launches whether to end early; NULL: never
-    uint32_t band_rows;  // fixed number of rows in a band (tests); 0: by time
+    double band_seconds; // target duration of a launch; 0: 0.1
+    bool (*stop)(void);  // called between launches; true ends the render; NULL: never
+    uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
 } RenderSettings;
 
 // Beyond this an error could reach the next power of two but one.
@@ -34,9 +34,9 @@ enum { PERTURB_SCALE_LARGEST = 1000 };
 
 typedef struct Renderer Renderer;
 
-// Flattens and uploads; kernels are built when first used. NULL with a message: the settings do not fit the
-// device (double without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the precision.
-// NULL without one: the device failed, see Compute. The compute outlives it.
+// Compiles and uploads the scene; kernels are built when first used. NULL with a message: the settings do not
+// fit the device (double without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the
+// precision. NULL without one: the device failed, see Compute. The compute outlives it.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
 void renderer_close(Renderer *renderer);
@@ -55,7 +55,7 @@ bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 // device failed, and `hits` are undefined.
 bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
 
-// A kernel's launch, or a transfer.
+// A kernel launch or a transfer.
 typedef struct {
     const char *name; // "render", "aov", "path", "trace", "read-back"
     LaunchTime time;
@@ -68,12 +68,12 @@ typedef struct {
     uint64_t kernel_hash;
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
-    uint64_t rays[5];      // of each RAYS_… (kernels/types.h); counted only where asked for
+    uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting
     struct {
         NamedLaunch *items;
         size_t count, capacity;
     } launches, reads;
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
-// Forgets launches, reads and counted rays, so that the next picture has a report of its own.
+// Clears launches, reads and counted rays, so that the next render has its own report.
 void renderer_report_restart(Renderer *renderer);

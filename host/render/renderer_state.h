@@ -1,4 +1,4 @@
-// The inside of a Renderer, shared by the files of this room.
+// A Renderer's members, for the files of this room.
 #pragma once
 
 #include "host/compile/compiled_scene.h"
@@ -9,7 +9,7 @@ typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_PATH, KERNEL_TRACE, KERNEL_COUN
 typedef struct {
     ProgramRequest request;
     Program program;
-    cl_kernel kernel; // NULL until first asked for
+    cl_kernel kernel; // NULL until first requested
 } KernelSlot;
 
 struct Renderer {
@@ -20,7 +20,7 @@ struct Renderer {
     const char *options;
     cl_mem arrays[FLAT_COUNT];
     size_t light_count;
-    double unit; // a power of two: lengths on the device count so many of the scene's
+    double unit; // scene lengths per device length, a power of two
     KernelSlot kernels[KERNEL_COUNT];
 };
 
@@ -30,11 +30,11 @@ size_t renderer_scalar_size(const Renderer *renderer);
 // the device failed.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 
-// Launches (as kernel_launch does) and notes the time in the report.
+// Launches as kernel_launch does and adds the time to the report.
 LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
                            const size_t *group);
 
-// Maps a buffer for the host to read, noting the time; NULL: the device failed. Released with renderer_unmap,
-// which accepts NULL.
+// Maps a buffer for the host to read and adds the time to the report; NULL: the device failed. Released with
+// renderer_unmap, which accepts NULL.
 void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

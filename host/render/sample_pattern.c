@@ -5,10 +5,10 @@
 #include <stddef.h>
 #include <stdlib.h>
 
-// The R2 sequence, whose steps are the powers of the inverse of the plastic number (Roberts, The unreasonable
-// effectiveness of quasirandom sequences, 2018), moved so that the samples' mean is the pixel's center: a
-// picture does not shift with the number of samples. The few that the move takes out of the pixel stay at its
-// edge.
+// The R2 sequence, whose steps are powers of the inverse of the plastic number (Roberts, The unreasonable
+// effectiveness of quasirandom sequences, 2018), shifted so that the mean is the pixel's center and the
+// number of samples does not shift the image. Samples that the shift moves out of the pixel are clamped to
+// its edge.
 void *sample_pattern(uint32_t count, bool wide)
 {
     const double steps[2] = {0.7548776662466927, 0.5698402909980532};

@@ -31,19 +31,19 @@ static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t ob
 {
     TraceHit hit = {.object = object,
                     .t = scalar_at(scalars, index + RESULT_T, wide),
-                    .passed = scalar_at(scalars, index + RESULT_PASSED, wide),
+                    .transmission = scalar_at(scalars, index + RESULT_TRANSMISSION, wide),
                     .light = scalar_at(scalars, index + RESULT_LIGHT, wide)};
     vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
     vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
-    vector_at(scalars, index + RESULT_MIRRORED_ORIGIN, wide, hit.mirrored_origin);
-    vector_at(scalars, index + RESULT_MIRRORED_DIRECTION, wide, hit.mirrored_direction);
-    vector_at(scalars, index + RESULT_PASSED_ORIGIN, wide, hit.passed_origin);
-    vector_at(scalars, index + RESULT_PASSED_DIRECTION, wide, hit.passed_direction);
+    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, wide, hit.reflected_origin);
+    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, wide, hit.reflected_direction);
+    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, wide, hit.refracted_origin);
+    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, wide, hit.refracted_direction);
     hit.t *= unit;
     for (size_t axis = 0; axis < 3; axis++) {
         hit.position[axis] *= unit;
-        hit.mirrored_origin[axis] *= unit;
-        hit.passed_origin[axis] *= unit;
+        hit.reflected_origin[axis] *= unit;
+        hit.refracted_origin[axis] *= unit;
     }
     return hit;
 }

@@ -108,8 +108,8 @@ static void judge_straight_rays(VerifyRun *run, const char *object, unsigned see
         inner[i] = rays[i];
         if (first[i].object != 1) continue;
         for (size_t axis = 0; axis < 3; axis++) {
-            inner[i].origin[axis] = first[i].passed_origin[axis];
-            inner[i].direction[axis] = first[i].passed_direction[axis];
+            inner[i].origin[axis] = first[i].refracted_origin[axis];
+            inner[i].direction[axis] = first[i].refracted_direction[axis];
         }
         verify_round_ray(run, &inner[i]);
     }
@@ -126,8 +126,8 @@ static void judge_straight_rays(VerifyRun *run, const char *object, unsigned see
             run->result->leaks++;
             continue;
         }
-        LongVector passed = long_vector(verify_vector(second[i].passed_direction));
-        LongVector off = long_subtract(passed, d);
+        LongVector refracted = long_vector(verify_vector(second[i].refracted_direction));
+        LongVector off = long_subtract(refracted, d);
         Long largest = fmaxl(fabsl(off.x), fmaxl(fabsl(off.y), fabsl(off.z)));
         // two cosines, roots each, and a unit vector, a root and a quotient
         double bound = run->renderer->inexact ? 4 + 6 + 6 + 6 + 4 : 4;

@@ -296,9 +296,9 @@ static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first,
         if (i % 4 == 2) direction = vector_subtract(corner, origin);
         if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
             const TraceHit *hit = &reflected[i - first - 3];
-            origin = (Vector3){hit->mirrored_origin[0], hit->mirrored_origin[1], hit->mirrored_origin[2]};
-            direction =
-                (Vector3){hit->mirrored_direction[0], hit->mirrored_direction[1], hit->mirrored_direction[2]};
+            origin = (Vector3){hit->reflected_origin[0], hit->reflected_origin[1], hit->reflected_origin[2]};
+            direction = (Vector3){hit->reflected_direction[0], hit->reflected_direction[1],
+                                  hit->reflected_direction[2]};
         }
         rays[i - first] = ray_of(run, origin, direction);
     }

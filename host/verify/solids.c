@@ -105,8 +105,9 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, void *opened, size_
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         Vector3 direction = random_unit(64, sphere * DIRECTIONS + i, 0);
         if (vector_dot(direction, verify_vector(first->normal)) < 0) direction = vector_scale(direction, -1);
-        rays[i] = ray_of(run, verify_vector(first->mirrored_origin), direction);
-        rays[DIRECTIONS + i] = ray_of(run, verify_vector(first->passed_origin), vector_scale(direction, -1));
+        rays[i] = ray_of(run, verify_vector(first->reflected_origin), direction);
+        rays[DIRECTIONS + i] =
+            ray_of(run, verify_vector(first->refracted_origin), vector_scale(direction, -1));
     }
     verify_trace_opened(run, opened, rays, 2 * (size_t)DIRECTIONS, hits);
     for (size_t i = 0; i < DIRECTIONS; i++) {

@@ -112,8 +112,8 @@ static bool is_sound(const VerifyRun *run, const TraceRay *ray, const TraceHit *
     if (!verify_is_hit(hit)) return true;
     if (!isfinite(hit->t) || !(hit->t > ray->tmin) || !(hit->t < ray->tmax)) return false;
     if (!is_finite(hit->normal) || !is_finite(hit->position)) return false;
-    if (!is_finite(hit->mirrored_origin) || !is_finite(hit->mirrored_direction)) return false;
-    if (!is_finite(hit->passed_origin) || !is_finite(hit->passed_direction)) return false;
+    if (!is_finite(hit->reflected_origin) || !is_finite(hit->reflected_direction)) return false;
+    if (!is_finite(hit->refracted_origin) || !is_finite(hit->refracted_direction)) return false;
     return run->tier == TIER_A || is_unit(run, hit->normal);
 }
 
@@ -148,11 +148,11 @@ static void hash_hit(VerifyRun *run, const TraceHit *hit)
     hash_numbers(run, &hit->t, 1);
     hash_numbers(run, hit->normal, 3);
     hash_numbers(run, hit->position, 3);
-    hash_numbers(run, hit->mirrored_origin, 3);
-    hash_numbers(run, hit->mirrored_direction, 3);
-    hash_numbers(run, hit->passed_origin, 3);
-    hash_numbers(run, hit->passed_direction, 3);
-    hash_numbers(run, &hit->passed, 1);
+    hash_numbers(run, hit->reflected_origin, 3);
+    hash_numbers(run, hit->reflected_direction, 3);
+    hash_numbers(run, hit->refracted_origin, 3);
+    hash_numbers(run, hit->refracted_direction, 3);
+    hash_numbers(run, &hit->transmission, 1);
 }
 
 void verify_trace_opened(VerifyRun *run, void *opened, const TraceRay *rays, size_t count, TraceHit *hits)
