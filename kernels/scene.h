@@ -4,6 +4,7 @@
 #define SCENE_H
 
 #include "shapes/disc.h"
+#include "shapes/paraboloid.h"
 #include "shapes/plane.h"
 #include "shapes/revolution.h"
 #include "shapes/sphere.h"

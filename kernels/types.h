@@ -86,6 +86,13 @@ typedef struct {
     scalar4 c_density; // u and v of c; z: texels of the full texture per unit of length
 } TriangleUvs;
 
+// The points with |p x axis|^2 = k (p . axis), p from the apex.
+typedef struct {
+    scalar4 apex_k;   // w: k, 4 |axis| times the focal length
+    scalar4 axis_end; // w: p . axis runs from 0 to this where finite
+    uint4 id;         // y: REVOLUTION_FINITE | REVOLUTION_CAPPED
+} Paraboloid;
+
 // Every shape: feature, struct, name, name of its array. Adding a shape begins here: docs/adding-a-shape.md.
 // clang-format off
 #define SHAPE_LIST(SHAPE)                           \
@@ -96,7 +103,8 @@ typedef struct {
     SHAPE(CYLINDERS, Cylinder, cylinder, cylinders) \
     SHAPE(CONES,     Cone,     cone,     cones)     \
     SHAPE(TRIANGLES, Triangle, triangle, triangles) \
-    SHAPE(TORI,      Torus,    torus,    tori)
+    SHAPE(TORI,      Torus,    torus,    tori)      \
+    SHAPE(PARABOLOIDS, Paraboloid, paraboloid, paraboloids)
 // clang-format on
 
 #define SHAPE_KIND(feature, Type, name, names) KIND_##feature,

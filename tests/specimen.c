@@ -1,9 +1,26 @@
 #include "tests/specimen.h"
 
 const char *const specimen_names[SPECIMEN_COUNT] = {
-    "sphere",           "plane",       "disc",       "box",          "capped cylinder", "open cylinder",
-    "endless cylinder", "capped cone", "open cone",  "pointed cone", "endless cone",    "triangle",
-    "smooth triangle",  "torus",       "thin torus", "fat torus",    "spindle torus",
+    "sphere",
+    "plane",
+    "disc",
+    "box",
+    "capped cylinder",
+    "open cylinder",
+    "infinite cylinder",
+    "capped cone",
+    "open cone",
+    "pointed cone",
+    "infinite cone",
+    "triangle",
+    "smooth triangle",
+    "torus",
+    "thin torus",
+    "fat torus",
+    "spindle torus",
+    "capped paraboloid",
+    "open paraboloid",
+    "infinite paraboloid",
 };
 
 // SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
@@ -122,6 +139,23 @@ static Specimen make_torus(SpecimenKind kind, Random *random, Vector3 center, do
                       .axis = axis};
 }
 
+// A rim from a fifth to twice as wide as the paraboloid is high.
+static Specimen make_paraboloid(SpecimenKind kind, Random *random, Vector3 center, double size)
+{
+    double height = size * random_between(random, 0.5, 3), rim = height * random_between(random, 0.1, 1);
+    Vector3 axis = random_coin(random) ? world_axis(random) : on_grid(random_unit(random));
+    Vector3 to_center = vector_scale(vector_normalize(axis), height / 2);
+    bool finite = kind != SPECIMEN_PARABOLOID_INFINITE;
+    return (Specimen){
+        .kind = kind,
+        .object = {.kind = SHAPE_PARABOLOID,
+                   .as.paraboloid = {vector_subtract(center, to_center), axis, rim * rim / (4 * height),
+                                     height, finite, kind == SPECIMEN_PARABOLOID_CAPPED}},
+        .center = center,
+        .reach = hypot(height / 2, rim),
+        .axis = axis};
+}
+
 Specimen specimen_make(SpecimenKind kind, Random *random)
 {
     double size = random_power(random, -1, 1);
@@ -150,6 +184,10 @@ Specimen specimen_make(SpecimenKind kind, Random *random)
     case SPECIMEN_TRIANGLE:
     case SPECIMEN_TRIANGLE_SMOOTH:
         return make_triangle(kind, random, center, size);
+    case SPECIMEN_PARABOLOID_CAPPED:
+    case SPECIMEN_PARABOLOID_OPEN:
+    case SPECIMEN_PARABOLOID_INFINITE:
+        return make_paraboloid(kind, random, center, size);
     case SPECIMEN_TORUS:
     case SPECIMEN_TORUS_THIN:
     case SPECIMEN_TORUS_FAT:
@@ -203,7 +241,7 @@ SpecimenRay specimen_ray(const Specimen *specimen, Random *random)
     Vector3 eye = vector_add(center, vector_scale(random_unit(random), distance));
     Vector3 near = vector_add(center, vector_scale(random_in_ball(random), 1.1 * reach));
     Vector3 axis;
-    if (specimen->kind >= SPECIMEN_TORUS && random_coin(random)) return torus_ray(specimen, random);
+    if (specimen->object.kind == SHAPE_TORUS && random_coin(random)) return torus_ray(specimen, random);
     switch (random_bits(random) % 8) {
     case 0:
         return ray_between(vector_add(center, vector_scale(random_in_ball(random), 0.3 * reach)), eye,

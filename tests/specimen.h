@@ -22,6 +22,9 @@ typedef enum {
     SPECIMEN_TORUS_THIN,
     SPECIMEN_TORUS_FAT,
     SPECIMEN_TORUS_SPINDLE, // whose tube is wider than its circle: no hole
+    SPECIMEN_PARABOLOID_CAPPED,
+    SPECIMEN_PARABOLOID_OPEN,
+    SPECIMEN_PARABOLOID_INFINITE,
     SPECIMEN_COUNT
 } SpecimenKind;
 

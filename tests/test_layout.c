@@ -96,6 +96,7 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
                                  "  - cylinder: {from: [0, 0, 0], to: [0, 1, 0], radius: 1}\n"
                                  "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
+                                 "  - paraboloid: {apex: [0, 0, 0], axis: [0, 1, 0], focal_length: 1}\n"
                                  "  - torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, minor: 1}\n"
                                  "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], normals: [[0, "
                                  "0, 1], [0, 0, 1], [0, 0, 1]]}\n"

@@ -62,6 +62,7 @@ typedef struct {
     SHAPE(CONE, "cone")                                                                                      \
     SHAPE(TRIANGLE, "triangle")                                                                              \
     SHAPE(TORUS, "torus")                                                                                    \
+    SHAPE(PARABOLOID, "paraboloid")                                                                          \
     SHAPE(MESH, "mesh")
 
 #define SHAPE_ENUMERATOR(NAME, name) SHAPE_##NAME,
@@ -114,6 +115,13 @@ typedef struct {
             Vector3 center, axis;
             double major, minor;
         } torus;
+        // the points as far from the focus as from the plane as far behind the apex; finite: up to a height along
+        // the axis
+        struct {
+            Vector3 apex, axis;
+            double focal_length, height;
+            bool finite, caps;
+        } paraboloid;
         struct {
             uint32_t index; // into the scene's meshes
         } mesh;

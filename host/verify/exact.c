@@ -429,6 +429,7 @@ static Sheets surface_sheets(const VerifyRun *run, const Object *object, LongVec
     case SHAPE_TORUS:
         torus_sheets(&sheets, run, object, p);
         break;
+    case SHAPE_PARABOLOID:
     case SHAPE_MESH: // the oracle is asked of single shapes
     case SHAPE_COUNT:
         break;

@@ -247,6 +247,7 @@ static void add_other(Scene *scene, ShapeKind kind, uint64_t index)
         break;
     case SHAPE_PLANE: // without end, so in no hierarchy
     case SHAPE_TRIANGLE:
+    case SHAPE_PARABOLOID:
     case SHAPE_MESH: // as CROWD_TRIANGLES
     case SHAPE_COUNT:
         return;

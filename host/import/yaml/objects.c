@@ -139,6 +139,33 @@ static const Field torus_fields[] = {
     MATERIAL,
 };
 
+// `radius` is that of the rim; it shares its member with the focal length.
+static const Field paraboloid_fields[] = {
+    {"apex", read_vector, offsetof(Object, as.paraboloid.apex), FORM_ANY, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.paraboloid.axis), FORM_ANY, REQUIRED, NULL},
+    {"height", read_number, offsetof(Object, as.paraboloid.height), FORM_ANY, OPTIONAL, &range_positive},
+    {"focal_length", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_FIRST, REQUIRED,
+     &range_positive},
+    {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_SECOND, REQUIRED,
+     &range_positive},
+    {"caps", read_boolean, offsetof(Object, as.paraboloid.caps), FORM_ANY, OPTIONAL, NULL},
+    MATERIAL,
+};
+
+static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
+{
+    object->as.paraboloid.finite = object->as.paraboloid.height > 0;
+    object->as.paraboloid.caps &= object->as.paraboloid.finite;
+    if (form == FORM_FIRST) return true;
+    if (!object->as.paraboloid.finite) {
+        report_error(&reader->report, mapping->offset, "a paraboloid with a 'radius' needs a 'height'");
+        return false;
+    }
+    const double radius = object->as.paraboloid.focal_length;
+    object->as.paraboloid.focal_length = radius / object->as.paraboloid.height * radius / 4;
+    return true;
+}
+
 typedef struct {
     Object start; // defaults
     const Field *fields;
@@ -161,6 +188,10 @@ static const Shape shapes[SHAPE_MESH] = {
     {{.kind = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish, false},
     {{.kind = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish, false},
     {{.kind = SHAPE_TORUS}, FIELDS(torus_fields), NULL, false},
+    {{.kind = SHAPE_PARABOLOID, .as.paraboloid.caps = true},
+     FIELDS(paraboloid_fields),
+     paraboloid_finish,
+     false},
 };
 
 static void object_read(YamlReader *reader, const YamlNode *item)

@@ -1,0 +1,76 @@
+#include "host/compile/shapes.h"
+
+static void paraboloid_flatten(Flattening *flattening, const Object *object)
+{
+    const Rounding *rounding = &flattening->rounding;
+    const Vector3 axis = vector_rounded(rounding, axis_scaled(object->as.paraboloid.axis));
+    const double length = vector_length(axis);
+    const bool finite = object->as.paraboloid.finite;
+    const Paraboloid paraboloid = {
+        .apex_k = scalar4_of(point_from_eye(rounding, object->as.paraboloid.apex),
+                             4 * length * rounded(rounding, object->as.paraboloid.focal_length)),
+        .axis_end = scalar4_of(axis, finite ? length * rounded(rounding, object->as.paraboloid.height) : 0),
+        .id.y = (finite ? REVOLUTION_FINITE : 0u) |
+                (finite && object->as.paraboloid.caps ? REVOLUTION_CAPPED : 0u),
+    };
+    primitive_add(flattening, KIND_PARABOLOIDS, &paraboloid, object->material);
+}
+
+// How far the shape reaches from its apex in a direction with the part `along` the unit axis and `across` it:
+// to the rim, or to where the side is square to the direction, at the height focal_length across^2 / along^2.
+static double paraboloid_extent(double along, double across, double focal_length, double height)
+{
+    const double square = along < 0 ? focal_length * (across / along) * (across / along) : height;
+    const double z = fmin(height, square);
+    return along * z + 2 * across * sqrt(focal_length * z);
+}
+
+static Bounds paraboloid_bounds_of(Vector3 apex, Vector3 axis, double focal_length, double height)
+{
+    const Vector3 along = vector_normalize(axis), across = circle_reach(along);
+    const double f = focal_length, h = height;
+    const Vector3 above = {paraboloid_extent(along.x, across.x, f, h),
+                           paraboloid_extent(along.y, across.y, f, h),
+                           paraboloid_extent(along.z, across.z, f, h)};
+    const Vector3 below = {paraboloid_extent(-along.x, across.x, f, h),
+                           paraboloid_extent(-along.y, across.y, f, h),
+                           paraboloid_extent(-along.z, across.z, f, h)};
+    return (Bounds){vector_subtract(apex, below), vector_add(apex, above)};
+}
+
+static bool paraboloid_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene;
+    if (!object->as.paraboloid.finite) return false;
+    *bounds = paraboloid_bounds_of(object->as.paraboloid.apex, object->as.paraboloid.axis,
+                                   object->as.paraboloid.focal_length, object->as.paraboloid.height);
+    return true;
+}
+
+static bool paraboloid_primitive_bounds(const void *primitive, Bounds *bounds)
+{
+    const Paraboloid *shape = primitive;
+    const Vector3 axis = vector3_of(&shape->axis_end);
+    const double length = vector_length(axis);
+    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
+    *bounds = paraboloid_bounds_of(vector3_of(&shape->apex_k), axis, shape->apex_k.w / (4 * length),
+                                   shape->axis_end.w / length);
+    return true;
+}
+
+static double paraboloid_reach(const void *primitive)
+{
+    const Paraboloid *shape = primitive;
+    return vector_largest(vector3_of(&shape->apex_k)) + shape->apex_k.w;
+}
+
+const ShapeOps paraboloid_ops = {
+    .kind = KIND_PARABOLOIDS,
+    .vectors = {offsetof(Object, as.paraboloid.apex), offsetof(Object, as.paraboloid.axis)},
+    .lengths = {offsetof(Object, as.paraboloid.focal_length), offsetof(Object, as.paraboloid.height)},
+    .bounds = paraboloid_bounds,
+    .flatten = paraboloid_flatten,
+    .primitive_bounds = paraboloid_primitive_bounds,
+    .reach = paraboloid_reach,
+    .test_flops = 50,
+};

@@ -1,0 +1,116 @@
+// Paraboloid: |p x w|^2 = k (p . w) for the axis w from the apex, with k = 4 |w| times the focal length.
+//
+// Along a ray p = f + t d, with q = d x w and m = f x w:
+//     a = q . q,   b = m . q - k/2 (d . w),   c = m . m - k (f . w),
+// and by Lagrange's identity b^2 - a c = (k/2 d . w)^2 - |w|^2 (k E . q + (w . E)^2) with the moment E = f x
+// d, whose terms do not grow with the distance where b^2 and a c do. All of it is in pairs: c cancels next to
+// the surface, b along it.
+#ifndef PARABOLOID_H
+#define PARABOLOID_H
+
+#include "shapes/box.h"
+
+typedef struct {
+    Roots side; // the ray is inside the surface between them
+    Roots slab; // and on the apex' side of the end
+    mask real_roots;
+} ParaboloidCrossings;
+
+// Between which t the ray is on the apex' side of the plane across the axis that ends the shape.
+static inline Roots paraboloid_slab(real end, Pair from, real towards)
+{
+    mask parallel = towards == (real)(0), leaving = towards > (real)(0);
+    real gap = pair_subtract(pair_of(end), from).high;
+    real t = real_divide(gap, lanes_select(parallel, (real)(1), towards));
+    t = lanes_select(parallel, lanes_select(gap >= (real)(0), (real)(LARGEST), (real)(-LARGEST)), t);
+    return (Roots){lanes_select(leaving | parallel, (real)(-LARGEST), t),
+                   lanes_select(leaving | parallel, t, (real)(LARGEST))};
+}
+
+static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, const Ray *ray)
+{
+    Vector axis = vector_of(shape->axis_end);
+    const real half_k = (real)(0.5f * shape->apex_k.w), k = (real)(shape->apex_k.w);
+    const Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
+    PairVector f = pair_vector_difference(ray->origin, vector_of(shape->apex_k));
+    PairVector d = pair_vector_of(ray->direction);
+    PairVector m = pair_vector_cross(f, axis), q = pair_vector_cross(d, axis);
+    PairVector moment = pair_vector_cross(f, ray->direction);
+    Pair height = pair_vector_dot_vector(f, axis), rise = pair_vector_dot_vector(d, axis);
+    Pair turn = pair_vector_dot_vector(moment, axis), bend = pair_scale(rise, half_k);
+    real a = pair_vector_dot(q, q).high;
+    real b = pair_subtract(pair_vector_dot(m, q), bend).high;
+    real c = pair_subtract(pair_vector_dot(m, m), pair_scale(height, k)).high;
+    Pair off = pair_add(pair_scale(pair_vector_dot(moment, q), k), pair_multiply(turn, turn));
+    real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(squared_axis, off)).high;
+
+    ParaboloidCrossings crossings;
+    crossings.real_roots = discriminant >= (real)(0);
+    real root = real_sqrt(real_max(discriminant, (real)(0)));
+    mask ahead = b < (real)(0);
+    real sum = lanes_select(ahead, root - b, -(root + b));
+    mask zero = sum == (real)(0);
+    // a ray along the axis has a = 0 and one root; the other is infinitely far on the open side
+    mask within = fabs(sum) * (real)(SMALLEST_RATIO) < a;
+    real far_root = lanes_select(within, real_divide(sum, lanes_select(within, a, (real)(1))),
+                                 lanes_select(ahead, (real)(LARGEST), (real)(-LARGEST)));
+    real near_root = lanes_select(zero, far_root, real_divide(c, lanes_select(zero, (real)(1), sum)));
+    crossings.side = (Roots){real_min(near_root, far_root), real_max(near_root, far_root)};
+    crossings.slab = (Roots){(real)(-LARGEST), (real)(LARGEST)};
+    if (shape->id.y & REVOLUTION_FINITE)
+        crossings.slab = paraboloid_slab((real)(shape->axis_end.w), height, rise.high);
+    return crossings;
+}
+
+// As a cylinder: capped, inside the side and before the end at once; else a root before the end.
+static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real *t)
+{
+    ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
+    Roots side = crossings.side, slab = crossings.slab;
+    mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
+    if (shape->id.y & REVOLUTION_CAPPED) {
+        real near = real_max(side.near, slab.near), far = real_min(side.far, slab.far);
+        *t = ray_first(ray, near, far);
+        hit = hit & (near <= far);
+    } else {
+        mask near_counts = (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
+        *t = lanes_select(near_counts, side.near, side.far);
+        hit = hit & (*t >= slab.near) & (*t <= slab.far);
+    }
+    return hit & (*t > ray->near) & (*t < (real)(LARGEST));
+}
+
+// On the cap the point is moved along the axis, on the side by two Newton steps along the gradient of
+// rho^2 - 4 f z, which is 2 (rho - 2 f w).
+static inline Patch paraboloid_patch(const Paraboloid *shape, const Ray *ray, real t)
+{
+    ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
+    Vector apex = vector_of(shape->apex_k), axis = vector_of(shape->axis_end);
+    real squared_axis = vector_dot(axis, axis);
+    real half_lift = real_divide((real)(0.5f * shape->apex_k.w), squared_axis); // 2 f / |w|
+    Vector p = ray_point_from(ray, apex, t), place = p, normal = axis;
+    for (uint i = 0; i < 2; i++) {
+        real height = vector_dot(place, axis);
+        Vector across = vector_fma(axis, -real_divide(height, squared_axis), place);
+        Vector gradient = vector_fma(axis, -half_lift, across);
+        real excess = real_fma((real)(-2) * half_lift, height, vector_dot(across, across));
+        real step = real_divide(excess, (real)(2) * vector_dot(gradient, gradient));
+        place = vector_fma(gradient, -step, place);
+        normal = gradient;
+    }
+    real size = vector_magnitude(p) + vector_magnitude(apex);
+    Patch patch = patch_make(vector_add(place, apex), vector_normalize(normal), size);
+    if (!IS_FAST) patch_move_to_ray(&patch, ray, t, size);
+
+    if (shape->id.y & REVOLUTION_CAPPED) {
+        real to_slab = real_min(fabs(t - crossings.slab.near), fabs(t - crossings.slab.far));
+        real to_side = real_min(fabs(t - crossings.side.near), fabs(t - crossings.side.far));
+        real gap = real_divide((real)(shape->axis_end.w) - vector_dot(p, axis), squared_axis);
+        Vector on_plane = vector_fma(axis, gap, p);
+        Patch cap = patch_make(vector_add(on_plane, apex), vector_normalize(axis), size);
+        patch_keep(&patch, to_slab < to_side, &cap);
+    }
+    return patch;
+}
+
+#endif
