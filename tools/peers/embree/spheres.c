@@ -26,61 +26,105 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *arguments)
     bounds->upper_z = sphere->center.z + sphere->radius;
 }
 
-// Where the rays, whose directions are unit, meet the sphere first; `hit` tells which of the valid rays do.
-// From the ray's point that is nearest to the center, so that squares of large numbers do not cancel (Haines
-// and others, Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
-static inline void sphere_meet(Sphere sphere, const struct RTCRay16 *ray, const int *valid, int *hit,
-                               float *distance)
+// Embree hands a callback as many rays as the CPU has lanes, 16 or fewer, each member an array of that many:
+// those of a ray, then those of its hit.
+enum {
+    ORG_X,
+    ORG_Y,
+    ORG_Z,
+    TNEAR,
+    DIR_X,
+    DIR_Y,
+    DIR_Z,
+    TFAR = 8,
+    NG_X = 12,
+    NG_Y,
+    NG_Z,
+    PRIM_ID = 17,
+    GEOM_ID
+};
+
+// The first hits of `count` rays, whose directions are unit; `hit`: which of the valid rays have one. From
+// the ray's point nearest to the center, so that squares of large numbers do not cancel (Haines and others,
+// Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
+static inline __attribute__((always_inline)) void
+sphere_hits(Sphere sphere, const float *rays, unsigned count, const int *valid, int *hit, float *distance)
 {
-    FOR_LANES
-    {
-        float x = sphere.center.x - ray->org_x[i], y = sphere.center.y - ray->org_y[i],
-              z = sphere.center.z - ray->org_z[i];
-        float dx = ray->dir_x[i], dy = ray->dir_y[i], dz = ray->dir_z[i];
+#pragma omp simd
+    for (unsigned i = 0; i < count; i++) {
+        float x = sphere.center.x - rays[ORG_X * count + i], y = sphere.center.y - rays[ORG_Y * count + i],
+              z = sphere.center.z - rays[ORG_Z * count + i];
+        float dx = rays[DIR_X * count + i], dy = rays[DIR_Y * count + i], dz = rays[DIR_Z * count + i];
         float along = x * dx + y * dy + z * dz;
         float px = x - along * dx, py = y - along * dy, pz = z - along * dz;
         float inside = sphere.radius * sphere.radius - (px * px + py * py + pz * pz);
         float half = sqrtf(fmaxf(inside, 0));
-        float near = along - half, far = along + half;
-        float t = near > ray->tnear[i] ? near : far;
-        bool met = (inside >= 0) & (t > ray->tnear[i]) & (t < ray->tfar[i]);
+        float near = along - half, far = along + half, tnear = rays[TNEAR * count + i];
+        float t = near > tnear ? near : far;
+        bool met = (inside >= 0) & (t > tnear) & (t < rays[TFAR * count + i]);
         hit[i] = met ? valid[i] : 0;
         distance[i] = t;
     }
 }
 
-static void sphere_intersect(const struct RTCIntersectFunctionNArguments *arguments)
+static inline __attribute__((always_inline)) void
+intersect(const struct RTCIntersectFunctionNArguments *arguments, unsigned count)
 {
     const Sphere sphere = ((const Sphere *)arguments->geometryUserPtr)[arguments->primID];
-    struct RTCRayHit16 *rays = (struct RTCRayHit16 *)arguments->rayhit;
+    float *rays = (float *)(void *)arguments->rayhit;
+    unsigned *ids = (unsigned *)(void *)arguments->rayhit;
     const unsigned geometry = arguments->geomID, primitive = arguments->primID;
+    alignas(64) int hit[LANES] = {0};
+    alignas(64) float distance[LANES];
+    sphere_hits(sphere, rays, count, arguments->valid, hit, distance);
+    if (!lanes_any(hit)) return;
+#pragma omp simd
+    for (unsigned i = 0; i < count; i++) {
+        float t = distance[i];
+        float x = rays[ORG_X * count + i] + t * rays[DIR_X * count + i] - sphere.center.x;
+        float y = rays[ORG_Y * count + i] + t * rays[DIR_Y * count + i] - sphere.center.y;
+        float z = rays[ORG_Z * count + i] + t * rays[DIR_Z * count + i] - sphere.center.z;
+        rays[TFAR * count + i] = hit[i] ? t : rays[TFAR * count + i];
+        ids[GEOM_ID * count + i] = hit[i] ? geometry : ids[GEOM_ID * count + i];
+        ids[PRIM_ID * count + i] = hit[i] ? primitive : ids[PRIM_ID * count + i];
+        rays[NG_X * count + i] = hit[i] ? x : rays[NG_X * count + i];
+        rays[NG_Y * count + i] = hit[i] ? y : rays[NG_Y * count + i];
+        rays[NG_Z * count + i] = hit[i] ? z : rays[NG_Z * count + i];
+    }
+}
+
+static inline __attribute__((always_inline)) void
+occlude(const struct RTCOccludedFunctionNArguments *arguments, unsigned count)
+{
+    const Sphere sphere = ((const Sphere *)arguments->geometryUserPtr)[arguments->primID];
+    float *rays = (float *)(void *)arguments->ray;
     alignas(64) int hit[LANES];
     alignas(64) float distance[LANES];
-    sphere_meet(sphere, &rays->ray, arguments->valid, hit, distance);
-    if (!lanes_any(hit)) return;
-    FOR_LANES
-    {
-        float t = distance[i];
-        float x = rays->ray.org_x[i] + t * rays->ray.dir_x[i] - sphere.center.x;
-        float y = rays->ray.org_y[i] + t * rays->ray.dir_y[i] - sphere.center.y;
-        float z = rays->ray.org_z[i] + t * rays->ray.dir_z[i] - sphere.center.z;
-        rays->ray.tfar[i] = hit[i] ? t : rays->ray.tfar[i];
-        rays->hit.geomID[i] = hit[i] ? geometry : rays->hit.geomID[i];
-        rays->hit.primID[i] = hit[i] ? primitive : rays->hit.primID[i];
-        rays->hit.Ng_x[i] = hit[i] ? x : rays->hit.Ng_x[i];
-        rays->hit.Ng_y[i] = hit[i] ? y : rays->hit.Ng_y[i];
-        rays->hit.Ng_z[i] = hit[i] ? z : rays->hit.Ng_z[i];
-    }
+    sphere_hits(sphere, rays, count, arguments->valid, hit, distance);
+#pragma omp simd
+    for (unsigned i = 0; i < count; i++)
+        rays[TFAR * count + i] = hit[i] ? -far_away : rays[TFAR * count + i];
+}
+
+// A constant count makes vectors of the loops.
+static void sphere_intersect(const struct RTCIntersectFunctionNArguments *arguments)
+{
+    if (arguments->N == LANES)
+        intersect(arguments, LANES);
+    else if (arguments->N == LANES / 2)
+        intersect(arguments, LANES / 2);
+    else
+        intersect(arguments, arguments->N);
 }
 
 static void sphere_occlude(const struct RTCOccludedFunctionNArguments *arguments)
 {
-    const Sphere sphere = ((const Sphere *)arguments->geometryUserPtr)[arguments->primID];
-    struct RTCRay16 *rays = (struct RTCRay16 *)arguments->ray;
-    alignas(64) int hit[LANES];
-    alignas(64) float distance[LANES];
-    sphere_meet(sphere, rays, arguments->valid, hit, distance);
-    FOR_LANES rays->tfar[i] = hit[i] ? -far_away : rays->tfar[i];
+    if (arguments->N == LANES)
+        occlude(arguments, LANES);
+    else if (arguments->N == LANES / 2)
+        occlude(arguments, LANES / 2);
+    else
+        occlude(arguments, arguments->N);
 }
 
 RTCGeometry spheres_user(RTCDevice device, Sphere *spheres, size_t count)
