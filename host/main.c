@@ -70,7 +70,7 @@ static int command_run(int argument_count, char **arguments)
 
 int main(int argument_count, char **arguments)
 {
-    // what cannot be written is told as on a full disk, and nothing half written is left
+    // a failed write is reported like a full disk, and no partial output is left
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
     int status = command_run(argument_count, arguments);

@@ -1,6 +1,6 @@
 #!/bin/bash
 # tools/peers/bench at a small size: the renderer on Embree draws what glint draws, and a picture that is of other work
-# is told. Needs libembree-dev, and PyYAML.
+# is reported. Needs libembree-dev, and PyYAML.
 . "$(dirname "$0")/support.bash"
 
 is_sanitized && skip_all "Embree is not built with sanitizers"

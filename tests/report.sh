@@ -1,6 +1,6 @@
 #!/bin/bash
-# The measured parts of the documents are what tools/report makes of docs/measurements; a report that is not there is
-# told, and its part stays.
+# The measured parts of the documents are what tools/report makes of docs/measurements; a missing report is
+# reported, and its part stays.
 . "$(dirname "$0")/support.bash"
 
 command -v python3 >/dev/null || skip_all "there is no python3"
@@ -8,11 +8,11 @@ command -v python3 >/dev/null || skip_all "there is no python3"
 documents=(README.md docs/accuracy.md docs/performance.md docs/verify.md)
 cp -r --parents docs/measurements "${documents[@]}" "$scratch"
 for document in "${documents[@]}"; do
-    tools/report "$scratch/$document" 2>"$scratch/told"
+    tools/report "$scratch/$document" 2>"$scratch/messages"
     check "$document: exit status" [ $? = 0 ]
     check "$document says what was measured" diff "$document" "$scratch/$document"
     for measured in $(sed -n 's/^<!-- measured: [a-z]* \(.*\) -->$/\1/p' "$document"); do
-        [ -f "$(dirname "$document")/$measured" ] || check "$measured is not there, which is told" grep -q "no .*$measured" "$scratch/told"
+        [ -f "$(dirname "$document")/$measured" ] || check "$measured is missing, which is reported" grep -q "no .*$measured" "$scratch/messages"
     done
 done
 

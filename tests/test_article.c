@@ -74,7 +74,7 @@ static Scene read_scene(const char *text)
     return scene;
 }
 
-// The reference's hit, after glint's has been held to it at `single`.
+// The reference's hit, after comparing glint's with it at `single`.
 static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
 {
     for (size_t i = 0; i < scene->objects.count; i++)

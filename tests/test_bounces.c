@@ -165,7 +165,7 @@ static void compare(const Trial *trial, const Scene *scene, const Color *expecte
         if (error <= PLAIN_ERROR * u) continue;
         ReferenceRay ray = reference_camera_ray(&scene->camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
         double excuse = sensitivity(scene, &ray, trial, u, expected[i]);
-        // Here the answer itself hangs on the last bits.
+        // Here the result depends on the last bits.
         open += excuse > 0x1p-7;
         if (error <= PLAIN_ERROR * u + 2 * excuse) continue;
         if (wrong++ == 0)

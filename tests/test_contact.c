@@ -31,8 +31,8 @@ typedef struct {
     {                                                                                                        \
         0, 0, 0                                                                                              \
     }
-#define WIDE    (2 * 2000 * 0x1p-14)
-#define ENDLESS ((double)FLT_MAX)
+#define WIDE      (2 * 2000 * 0x1p-14)
+#define UNBOUNDED ((double)FLT_MAX)
 
 static Trial trials[] = {
     {"sphere on a floor", GLASS_SPHERE FLOOR, true, {-1, -1, -5}, {1, -1, -3}},
@@ -74,24 +74,24 @@ static Trial trials[] = {
      true,
      {-1, 0, -5},
      {1, 0, -3}},
-    // their errors grow with the distance, where they are no longer told apart
+    // their errors grow with the distance, where they become indistinguishable
     {"water over a floor",
      FLOOR "  - plane: {point: [0, -0.5, 0], normal: [0, 2, 0], material: glass}\n",
      true,
-     {-ENDLESS, -ENDLESS, -ENDLESS},
-     {ENDLESS, ENDLESS, ENDLESS}},
-    {"an endless glass cylinder on a floor",
+     {-UNBOUNDED, -UNBOUNDED, -UNBOUNDED},
+     {UNBOUNDED, UNBOUNDED, UNBOUNDED}},
+    {"an unbounded glass cylinder on a floor",
      FLOOR "  - cylinder: {point: [0, 999, 0], axis: [1, 0, 0.25], radius: 1000, material: glass}\n",
      true,
-     {-ENDLESS, -ENDLESS, -ENDLESS},
-     {ENDLESS, ENDLESS, ENDLESS}},
-    {"a sphere under a wide endless cylinder, not told apart by numbers so large",
+     {-UNBOUNDED, -UNBOUNDED, -UNBOUNDED},
+     {UNBOUNDED, UNBOUNDED, UNBOUNDED}},
+    {"a sphere under a wide unbounded cylinder, indistinguishable at numbers so large",
      "  - sphere: {center: [0, -1.03125, -4], radius: 1, material: glass}\n"
      "  - cylinder: {point: [0, 1000, 0], axis: [0, 0, 1], radius: 1000, material: chalk}\n",
      true,
      {-1 - WIDE, -2.03125 - WIDE, -5 - WIDE},
      {1 + WIDE, -0.03125 + WIDE, -3 + WIDE}},
-    {"an endless cylinder",
+    {"an unbounded cylinder",
      GLASS_SPHERE "  - cylinder: {point: [0, 0, 0], axis: [1, 0, 0], radius: 1, material: chalk}\n",
      true,
      {-1, -1, -5},
@@ -115,7 +115,7 @@ static Bounds contact_of(const Scene *scene)
 // At or beyond, by no more than a 256th.
 static void check_beyond(const char *name, double value, double bound)
 {
-    if (fabs(bound) == ENDLESS) {
+    if (fabs(bound) == UNBOUNDED) {
         assert_true(value >= fabs(bound));
     } else if (!(value >= bound && value <= bound + 0x1p-8)) {
         fail_msg("%s: reaches %.9g, not %g", name, value, bound);
@@ -142,17 +142,17 @@ static void holds_where_they_touch(void **state)
     text_free(&text);
 }
 
-// So many pairs that what is opaque counts as one box, and, where much is endless, as everywhere.
+// Enough pairs that all opaque objects counts as one box, and, where much is unbounded, as everywhere.
 static void many_pairs_hold_as_much(void **state)
 {
     (void)state;
     enum { SPHERE_COUNT = 1500 };
-    for (int endless = 0; endless <= 1; endless++) {
+    for (int unbounded = 0; unbounded <= 1; unbounded++) {
         Text text = {0};
         text_appendf(&text, STAGE);
         for (int i = 0; i < SPHERE_COUNT; i++) {
             text_appendf(&text, "  - sphere: {center: [%d, 0, -4], radius: 0.5, material: glass}\n", 4 * i);
-            if (endless)
+            if (unbounded)
                 text_appendf(&text, "  - plane: {point: [0, %d, 0], normal: [0, 1, 0], material: chalk}\n",
                              -8 - i);
             else
@@ -161,8 +161,8 @@ static void many_pairs_hold_as_much(void **state)
         }
         Scene scene = scene_of_text("contact.yaml", text_c(&text));
         Bounds contact = contact_of(&scene);
-        if (endless) {
-            assert_true(contact.max.y >= ENDLESS && contact.min.y <= -ENDLESS);
+        if (unbounded) {
+            assert_true(contact.max.y >= UNBOUNDED && contact.min.y <= -UNBOUNDED);
         } else {
             double reach = 4.0 * (SPHERE_COUNT - 1) + 0.5;
             assert_true(contact.min.x <= -0.5 && contact.max.x >= reach);

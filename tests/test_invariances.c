@@ -63,10 +63,10 @@ static Object random_object(Random *random, size_t index)
     for (;;) {
         SpecimenKind kind = index < SPECIMEN_COUNT ? (SpecimenKind)index
                                                    : (SpecimenKind)random_between(random, 0, SPECIMEN_COUNT);
-        bool endless =
+        bool unbounded =
             kind == SPECIMEN_PLANE || kind == SPECIMEN_CYLINDER_INFINITE || kind == SPECIMEN_CONE_INFINITE;
         Specimen specimen = specimen_make(kind, random);
-        if (specimen.reach > 3 || (endless && index >= SPECIMEN_COUNT)) continue;
+        if (specimen.reach > 3 || (unbounded && index >= SPECIMEN_COUNT)) continue;
         // a plane behind the objects and a narrow cone beside them, not across the view
         if (kind == SPECIMEN_PLANE)
             specimen.object.as.plane.point = vector_scale(specimen.object.as.plane.normal, 0x1p5);

@@ -186,7 +186,7 @@ static void numbers_of_materials_are_finite(void **state)
     MessageList messages = {0};
     Scene scene;
     assert_true(scene_read_text(&scene, "scene.yaml", &text, false, &messages));
-    assert_int_equal(messages.count, 2); // the same is told once
+    assert_int_equal(messages.count, 2); // repeats are dropped
     assert_string_equal(messages.items[0].text,
                         "a.obj: a color of material 'red' is not finite or too large: using the default");
     assert_string_equal(messages.items[1].text,

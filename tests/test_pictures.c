@@ -253,7 +253,7 @@ static void highlight_at(Precision precision)
         snprintf(place, sizeof place, "%s, shininess %g", precision_names[precision], exponents[e]);
         scene.camera.half_tangent = fmin(0.3, 0.6 / sqrt(fmax(exponents[e], 1)));
         scene.materials.items[scene.objects.items[0].material].shininess = exponents[e];
-        // `single` is held to 1e4 only: beyond, the normal's own rounding shows
+        // `single` is checked up to 1e4 only: beyond, the normal's own rounding shows
         double tolerance = precision == PRECISION_DOUBLE                          ? 1e-8
                            : precision == PRECISION_STRICT                        ? 1e-4
                            : precision == PRECISION_SINGLE && exponents[e] <= 1e4 ? 2e-3

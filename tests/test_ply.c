@@ -1,4 +1,4 @@
-// PLY files: the layouts that are read, as one square, and what is told of those that promise more than they
+// PLY files: the layouts that are read, as one square, and the errors for files shorter than they
 // hold.
 #include "host/scene/vector.h"
 #include "tests/scene_reading.h"
@@ -272,17 +272,16 @@ static void binary_faults_name_byte_and_row(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const Type *type = &types[cases[i].type];
         Text text = binary_with_count(headers[cases[i].header], cases[i].count, type), message = {0};
-        text_appendf(
-            &message,
-            "byte %zu: face 1 (from 0) declares %s numbers of 'vertex_indices', the file has 3 more",
-            text.count - type->size - 12, cases[i].promise);
+        text_appendf(&message,
+                     "byte %zu: face 1 (from 0) declares %s numbers of 'vertex_indices', the file has 3 more",
+                     text.count - type->size - 12, cases[i].promise);
         assert_refused(&text, text_c(&message));
         text_free(&text);
         text_free(&message);
     }
 }
 
-// Wherever a file ends before its time it is refused, and told where.
+// A file truncated anywhere is rejected with the position.
 static void binary_file_cut_short_is_refused(void **state)
 {
     (void)state;

@@ -138,26 +138,26 @@ static void knows_cylinders(void **state)
 {
     (void)state;
     const Vector3 zero = {0, 0, 0}, x = {1, 0, 0}, z = {0, 0, 1};
-    const Object endless = cylinder(zero, z, 1, false, false);
+    const Object infinite = cylinder(zero, z, 1, false, false);
     const Object capped = cylinder(zero, (Vector3){0, 0, 2}, 1, true, true);
     const Object open = cylinder(zero, (Vector3){0, 0, 2}, 1, true, false);
     const Object wire = cylinder((Vector3){-1e4, 0, 0}, (Vector3){2e4, 0, 0}, 1e-3, true, true);
     const Known known[] = {
-        {"parallel", endless, {0.5, 0, -3}, z, MISS},
-        {"parallel", endless, {2, 0, -3}, z, MISS},
+        {"parallel", infinite, {0.5, 0, -3}, z, MISS},
+        {"parallel", infinite, {2, 0, -3}, z, MISS},
         {"parallel", capped, {0.5, 0, -3}, z, 3},
         {"parallel", capped, {0.5, 0, 1}, z, 1},
         {"parallel", capped, {2, 0, -3}, z, MISS},
         {"parallel", open, {0.5, 0, -3}, z, MISS},
         {"through the opening", open, {0, 0, -1}, {0.5, 0, 1}, 2},
         {"past the end", capped, {-5, 0, 2.25}, x, MISS},
-        {"nearly parallel", endless, zero, {0x1p-20, 0, 1}, 0x1p20},
-        {"nearly parallel", endless, {0.25, 0, 0}, {0x1p-10, 0, 1}, 768},
+        {"nearly parallel", infinite, zero, {0x1p-20, 0, 1}, 0x1p20},
+        {"nearly parallel", infinite, {0.25, 0, 0}, {0x1p-10, 0, 1}, 768},
         {"wire", wire, {0, 5e-4, -10}, z, 9.9991339745551},
-        {"tangent", endless, {-1e3, 0.5, 0}, x, 999.13397459622},
-        {"tangent", endless, {-1e3, 0.99999, 0}, x, 999.99552483963},
-        {"tangent", endless, {-1e3, 1.00001, 0}, x, MISS},
-        {"tangent", endless, {-1e5, 0.99, 0}, x, 99999.858932707},
+        {"tangent", infinite, {-1e3, 0.5, 0}, x, 999.13397459622},
+        {"tangent", infinite, {-1e3, 0.99999, 0}, x, 999.99552483963},
+        {"tangent", infinite, {-1e3, 1.00001, 0}, x, MISS},
+        {"tangent", infinite, {-1e5, 0.99, 0}, x, 99999.858932707},
     };
     check(known, COUNT(known));
 }

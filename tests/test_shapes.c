@@ -1,6 +1,6 @@
 // Every shape at every precision against the reference: hit or miss, distance and normal.
-#include "tests/probe.h"
 #include "host/verify/reference.h"
+#include "tests/probe.h"
 #include "tests/specimen.h"
 #include <math.h>
 #include <setjmp.h>
@@ -75,7 +75,7 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, Preci
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
     double distance = vector_length(vector_subtract(origin, trial->center)) + trial->reach;
-    // An endless plane may be met far beyond the reach.
+    // A plane may be hit far beyond the reach.
     if (expected->found) distance = fmax(distance, fabs((double)expected->t) * vector_length(direction));
     double scale = u * (owed->compensated ? trial->reach : distance);
     // Flat shapes have no compensated edges.

@@ -7,7 +7,7 @@ why=$("$GLINT" devices 2>&1) || skip_all "no OpenCL device: $why"
 wide=D
 "$GLINT" verify C1 --precision double 2>&1 | grep -q 'has no 64-bit floating point' && wide=
 
-# A failed case's line is told.
+# A failed case's line is shown.
 holds() { "$GLINT" verify "$@" >"$scratch/lines" 2>"$scratch/errors" || { grep FAIL "$scratch/lines" "$scratch/errors"; return 1; }; }
 if is_sanitized; then
     check 'cases at single' holds S1 P7 C7 M3 R1 R3 R4 R8 --precision single

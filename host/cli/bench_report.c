@@ -93,15 +93,15 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
 // Reasons for missing figures, each once.
 static void reasons_print(const BenchReport *report, FILE *stream)
 {
-    const char *told[3] = {NULL};
+    const char *printed[3] = {NULL};
     for (size_t i = 0; i < report->count; i++) {
         const BenchRow *row = &report->rows[i];
         if (row->failure) continue;
         const char *reasons[3] = {row->build_cold.why_not, row->build_cached.why_not,
                                   bench_peak_fraction(row, report->peak).why_not};
         for (size_t k = 0; k < 3; k++) {
-            if (reasons[k] && !told[k]) fprintf(stream, "-: %s\n", reasons[k]);
-            if (reasons[k]) told[k] = reasons[k];
+            if (reasons[k] && !printed[k]) fprintf(stream, "-: %s\n", reasons[k]);
+            if (reasons[k]) printed[k] = reasons[k];
         }
     }
 }

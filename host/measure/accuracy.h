@@ -85,7 +85,7 @@ void accuracy_count_unsound(const Film *film, size_t *nonfinite, size_t *negativ
 
 typedef enum {
     ACCURACY_MEASURED,
-    ACCURACY_REFERENCE,   // it is what the others are held to: times, but no errors
+    ACCURACY_REFERENCE,   // the reference: times but no errors
     ACCURACY_UNAVAILABLE, // row->failure tells why
     ACCURACY_STATUS_COUNT
 } AccuracyStatus;

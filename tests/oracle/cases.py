@@ -58,7 +58,7 @@ def cylinder(start, end, radius):
 
 def endless_cylinder(point, axis, radius):
     text = f"cylinder: {{point: {numbers(point)}, axis: {numbers(axis)}, radius: {radius!r}}}"
-    return text, lambda r: exact.Revolution(map(r, point), map(r, axis), [r(radius)] * 2, endless=True)
+    return text, lambda r: exact.Revolution(map(r, point), map(r, axis), [r(radius)] * 2, infinite=True)
 
 
 def cone(start, end, radii):

@@ -60,7 +60,7 @@ def grown(shape, by):
     wider = rational(by * sqrt(1 + as_float(slope) ** 2))
     radii = [shape.radii[0] + wider - slope * rational(by), shape.radii[1] + wider + slope * rational(by)]
     base = [b - ends * a for b, a in zip(shape.base, shape.axis)]
-    return exact.Revolution(base, times(shape.axis, 1 + 2 * ends), radii, shape.endless, shape.caps)
+    return exact.Revolution(base, times(shape.axis, 1 + 2 * ends), radii, shape.infinite, shape.caps)
 
 
 def curvature(thing, point):
@@ -153,8 +153,8 @@ def solid_crossing(thing, beam, rounding):
     distance = shape.distance(ray)
     magnitude = beam.magnitude + distance + shape.size
     slack = rounding.displacement * rounding.u * magnitude + beam.off + beam.turn * magnitude
-    endless = isinstance(shape, exact.DoubleCone) or getattr(shape, "endless", False)
-    if not endless:
+    infinite = isinstance(shape, exact.DoubleCone) or getattr(shape, "infinite", False)
+    if not infinite:
         toward = [as_float(x) for x in subtract(shape.center, ray.origin)]
         way = [as_float(x) / ray.scale for x in ray.direction]
         along = dot(toward, way)
@@ -326,10 +326,10 @@ def highlight(hit, to_light, facing, facing_error, turn, rounding):
 def lit(scene, light, hit, base, rounding, total):
     """Adds what a light gives; True or False: whether the place is in its shadow; None: that is open."""
     u, material = rounding.u, hit.thing.material
-    endless = light.kind == "directional"
-    way = times(light.direction, -1) if endless else subtract(light.position, hit.point)
+    infinite = light.kind == "directional"
+    way = times(light.direction, -1) if infinite else subtract(light.position, hit.point)
     to_light = unit(way)
-    turn = 4 * u + (0.0 if endless else hit.off / length(way))
+    turn = 4 * u + (0.0 if infinite else hit.off / length(way))
     facing = dot(hit.normal, to_light)
     facing_error = hit.turn + turn + rounding.arithmetic * u
     if abs(as_float(facing)) <= facing_error:
@@ -344,7 +344,7 @@ def lit(scene, light, hit, base, rounding, total):
         strength, strength_error = spot
         if strength == 0:
             return True if strength_error == 0 else None
-    part = passing(scene, hit, way, inf if endless else 1.0, turn, rounding)
+    part = passing(scene, hit, way, inf if infinite else 1.0, turn, rounding)
     if part is None:
         return None
     if part == 0:

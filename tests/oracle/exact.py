@@ -182,7 +182,7 @@ class Box(Shape):
         return [rational(int(face == min(faces))) for face in faces]
 
     def cosine(self, ray, t):
-        # at an edge any of the faces that meet there may be told: the one crossed most steeply
+        # at an edge any of the faces that meet there may be reported: the one crossed most steeply
         faces = [min(abs(x - a), abs(x - b)) for a, x, b in zip(self.low, ray.at(t), self.high)]
         return max(abs(float(fraction(d))) for d, face in zip(ray.direction, faces) if face == min(faces)) / ray.scale
 
@@ -197,17 +197,17 @@ class Box(Shape):
 
 
 class Revolution(Shape):
-    """A cylinder or cone from one point to another, or an endless cylinder along `axis`. Without caps it is the part of
-    an endless solid's surface between its ends."""
+    """A cylinder or cone from one point to another, or an infinite cylinder along `axis`. Without caps it is the part of
+    an infinite solid's surface between its ends."""
 
-    def __init__(self, base, axis, radii, endless=False, caps=True):
+    def __init__(self, base, axis, radii, infinite=False, caps=True):
         self.base, self.axis = vector(base), vector(axis)
-        self.radii, self.endless, self.caps = [rational(r) for r in radii], endless, caps
+        self.radii, self.infinite, self.caps = [rational(r) for r in radii], infinite, caps
         self.along = dot(self.axis, self.axis)
         self.axis_length = length(self.axis)
-        self.center = self.base if endless else [b + a / 2 for b, a in zip(self.base, self.axis)]
+        self.center = self.base if infinite else [b + a / 2 for b, a in zip(self.base, self.axis)]
         self.radius = float(max(map(fraction, self.radii)))
-        self.size = self.radius if endless else sqrt(self.radius**2 + self.axis_length**2 / 4)
+        self.size = self.radius if infinite else sqrt(self.radius**2 + self.axis_length**2 / 4)
         self.reach = 4 * self.size
         self.unit_axis = [x / self.axis_length for x in floats(self.axis)]
         self.from_base = floats(subtract(self.center, self.base))
@@ -226,11 +226,11 @@ class Revolution(Shape):
         return found
 
     def has_ends(self):
-        return self.caps and not self.endless
+        return self.caps and not self.infinite
 
     def crossings(self, ray):
         found = super().crossings(ray)
-        if self.caps or self.endless:
+        if self.caps or self.infinite:
             return found
         return [t for t in found if 0 <= dot(subtract(ray.at(t), self.base), self.axis) <= self.along]
 
@@ -257,7 +257,7 @@ class Revolution(Shape):
         q = [x + y for x, y in zip(p, self.from_base)]
         height = sum(x * y for x, y in zip(q, self.unit_axis))
         across = sum((x - height * y) ** 2 for x, y in zip(q, self.unit_axis))
-        if self.endless:
+        if self.infinite:
             return 1 - across / self.radius**2
         start, end = self.end_radii
         radius = start + (end - start) * height / self.axis_length
@@ -268,7 +268,7 @@ class Revolution(Shape):
 
 
 class DoubleCone(Shape):
-    """Both nappes of an endless cone. slope: radius over height. apart: how far the nappes' tips are from the apex
+    """Both nappes of an infinite cone. slope: radius over height. apart: how far the nappes' tips are from the apex
     along the axis, in lengths of the axis; below 0 they overlap."""
 
     def __init__(self, apex, axis, slope, apart=0):

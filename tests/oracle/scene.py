@@ -76,7 +76,7 @@ class Thing:
             radii = given["radius"] if kind == "cone" else [given["radius"]] * 2
             return exact.Revolution(base, axis, map(rounding, radii), caps=given.get("caps", True))
         if kind == "cylinder":
-            return exact.Revolution(from_eye(given["point"]), way("axis"), [size("radius")] * 2, endless=True)
+            return exact.Revolution(from_eye(given["point"]), way("axis"), [size("radius")] * 2, infinite=True)
         if kind != "cone":
             raise ValueError(f"the oracle knows no {kind}")
         if "slope" in given:

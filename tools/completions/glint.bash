@@ -1,4 +1,4 @@
-# Completion of glint for bash; the options of each subcommand are held to its --help by tests/man_options.sh.
+# Completion of glint for bash; the options of each subcommand are checked against its --help by tests/man_options.sh.
 
 _glint_options() {
     case ${1-} in

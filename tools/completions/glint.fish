@@ -1,4 +1,4 @@
-# Completion of glint for fish; the options of each subcommand are held to its --help by tests/man_options.sh.
+# Completion of glint for fish; the options of each subcommand are checked against its --help by tests/man_options.sh.
 
 complete -c glint -f
 complete -c glint -n __fish_use_subcommand -a render -d 'Render a picture'

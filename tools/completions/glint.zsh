@@ -1,5 +1,5 @@
 #compdef glint
-# Completion of glint for zsh; the options of each subcommand are held to its --help by tests/man_options.sh.
+# Completion of glint for zsh; the options of each subcommand are checked against its --help by tests/man_options.sh.
 
 _glint_render() {
     _arguments \

@@ -154,7 +154,7 @@ static void tally_add(Tally *tally, const Specimen *specimen, const Rays *rays, 
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
     double distance = vector_length(vector_subtract(origin, specimen->center)) + specimen->reach;
-    // an endless plane may be met far beyond the reach
+    // a plane may be hit far beyond the reach
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
     double scale = u * (tier->of_size ? specimen->reach : distance);
     // flat shapes have no compensated edges; a triangle's are open below 16 u of edge and distance

@@ -195,7 +195,7 @@ def wire(program):
 
 
 def thin_ring(program):
-    """T5: a torus thinner than a pixel, held to the exact oracle where a ray comes near it."""
+    """T5: a torus thinner than a pixel, compared with the exact oracle where a ray comes near it."""
     import exact
 
     camera = Camera([0, -5, 5], [0, 0, 0], tan(radians(15)), (512, 512))

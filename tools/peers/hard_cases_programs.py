@@ -51,7 +51,7 @@ class Embree:
         if kind in ("cylinder", "cone") and "from" in body:
             radii = body["radius"] if kind == "cone" else [body["radius"]] * 2
             return [line("cone", body["from"], radii[:1], body["to"], radii[1:])]
-        raise NotModelled(f"has no {'endless ' * (kind == 'cylinder')}{kind}")
+        raise NotModelled(f"has no {'infinite ' * (kind == 'cylinder')}{kind}")
 
     def trace(self, objects, rays):
         lines = []
