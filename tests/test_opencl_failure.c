@@ -407,6 +407,7 @@ static void test_commands(void **state)
     (void)state;
     static const Command commands[] = {
         {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", "/dev/null/none.png"}},
+        {command_trace, {"trace", "scenes/spheres16.yaml", "--rays", "/dev/null"}},
         {command_bench, {"bench", "scenes/spheres16.yaml", "--size", "8x8"}},
         {command_accuracy, {"accuracy", "scenes/spheres16.yaml", "--size", "8x8"}},
         {command_verify, {"verify", "P1"}},

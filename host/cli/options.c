@@ -238,8 +238,7 @@ int device_close(OpenDevice *open, int status)
         fprintf(stderr, "glint: %s\n", failure);
         free(failure);
         status = EXIT_MACHINE;
-    }
-    if (status != EXIT_INTERRUPTED) {
+    } else if (status != EXIT_INTERRUPTED) {
         compute->context = NULL;
         compute->queue = NULL;
     }

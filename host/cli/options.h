@@ -118,6 +118,6 @@ typedef struct {
 // fails, now or later, is reported by device_close.
 bool device_open(OpenDevice *open, const char *selector);
 // At the end of a command. Returns the exit status: EXIT_MACHINE, with a message, if the device failed, else
-// `status`. Leaves the context to the process's end unless interrupted: PoCL takes 80 ms to free its
-// compiler.
+// `status`. Unless failed or interrupted, the context is left to the process's end: PoCL takes 80 ms to free
+// its compiler.
 int device_close(OpenDevice *open, int status);
