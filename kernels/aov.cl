@@ -1,9 +1,9 @@
-// What lies behind each pixel's center, in place of its color.
+// AOVs at each pixel's center.
 #include "aovs.h"
 #include "film.h"
 #include "shading/phong.h"
 
-// Infinity for a miss, put together from bits: `fast` need not know infinities.
+// Infinity on a miss, from bits, since `fast` assumes there are none.
 static inline real hit_distance(const Hit *hit)
 {
     return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
@@ -26,11 +26,11 @@ static KERNEL_BODY void tile_describe(const Scene *scene, const Tile *tile, cons
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
     Surface surface = surface_seen(scene, &ray, &hit);
-    const Vector nothing = {(real)(0), (real)(0), (real)(0)};
+    const Vector zero = {(real)(0), (real)(0), (real)(0)};
     film_store_color(layers->ray, tile, ray.direction);
     film_store(layers->t, tile, 1, 0, hit_distance(&hit));
-    film_store_color(layers->normal, tile, vector_select(surface.found, surface.shading_normal, nothing));
-    film_store_color(layers->position, tile, vector_select(surface.found, surface.position, nothing));
+    film_store_color(layers->normal, tile, vector_select(surface.found, surface.shading_normal, zero));
+    film_store_color(layers->position, tile, vector_select(surface.found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
     for (uint i = 0; i < shadow_count; i++) {
         mask shadowed;

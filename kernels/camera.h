@@ -1,16 +1,16 @@
-// From pixels to rays. The eye is the origin.
+// Camera rays. The eye is the origin.
 #ifndef CAMERA_H
 #define CAMERA_H
 
 #include "scene.h"
 
 typedef struct {
-    integer x, y; // of the whole picture, from the top left
+    integer x, y; // in the whole image, from the top left
 } Pixels;
 
-// The ray through a point of each pixel; dx and dy run from -1 to 1 across it, 0 is its center. Pixels are
-// counted in halves from the picture's center, 2 i + 1 - width, which is exact and odd-symmetric: a mirrored
-// scene gives the mirrored picture bit for bit.
+// The ray through a point of each pixel; dx and dy run from -1 to 1 across it, 0 is the center. Coordinates
+// are half pixels from the image's center, 2 i + 1 - width, exact and odd-symmetric: a mirrored scene gives
+// the mirrored image bit for bit.
 static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, scalar dx, scalar dy,
                              mask active)
 {
@@ -20,7 +20,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
     const Vector eye = {(real)(0), (real)(0), (real)(0)};
     Ray ray = ray_make_unit(eye, vector_normalize(direction), active);
-    ray_take_apex(&ray, COMMON_ORIGIN_EYE);
+    ray_set_common_origin(&ray, COMMON_ORIGIN_EYE);
     return ray;
 }
 

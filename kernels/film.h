@@ -1,11 +1,11 @@
-// A band of the picture's region: which pixels a work-item carries, and where its values go.
+// A band of the image: the pixels of each work-item, and where their values are stored.
 #ifndef FILM_H
 #define FILM_H
 
 #include "camera.h"
 
 typedef struct {
-    uint first_x, first_y, width, height; // in the whole picture
+    uint first_x, first_y, width, height; // in the whole image
 } Band;
 
 typedef struct {
@@ -15,10 +15,10 @@ typedef struct {
     uint width;    // of the band
 } Tile;
 
-// How many tiles a work-item carries.
+// Tiles per work-item.
 #define ITEM_TILES (LANES == 1 ? 1 : ITEM_TILES_LARGEST)
 
-// The work-item's tiles, counted from 0.
+// The work-item's tile number `which`, from 0.
 static inline Tile band_tile(const Band *band, uint which)
 {
     Tile tile;

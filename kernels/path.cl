@@ -1,4 +1,4 @@
-// The signature of the way that the ray through each pixel's center takes.
+// The signature of the ray tree at each pixel's center.
 #define SIGNS_PATHS 1
 #include "film.h"
 #include "shading/path.h"

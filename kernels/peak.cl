@@ -1,8 +1,8 @@
-// What the device can do at most: arithmetic without memory, and memory without arithmetic.
+// The device's peak: arithmetic without memory, and memory without arithmetic.
 #include "numerics/lanes.h"
 
-// Eight chains, independent of one another, keep pipelines of 4 steps in 2 units busy; each takes one fma a
-// round. They are variables, not an array: what a compiler does not unroll would load and store it.
+// Eight independent chains of fma keep pipelines of 4 stages in 2 units busy. Variables, not an array, which
+// a compiler that does not unroll would load and store.
 kernel void arithmetic(uint round_count, scalar factor, scalar addend, global scalar *results)
 {
     size_t item = get_global_id(0);

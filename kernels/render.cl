@@ -1,12 +1,12 @@
-// The picture: each work-item traces the rays of one tile of pixels after the other.
+// The image: each work-item renders its tiles of pixels in turn.
 #define SIGNS_PATHS 0
 #include "film.h"
 #include "shading/path.h"
 
-// Adds samples first..last-1 to the tile's part of the film; the last of all turns the sum into the mean.
-// `offsets` has each sample's place in its pixel, from -1 to 1. What each addition loses is carried to the
-// next, in `losses` from launch to launch (Kahan, Further remarks on reducing truncation errors, CACM 8(1),
-// 1965): a plain sum of a million equal samples would be off by 1 %.
+// Adds samples first_sample .. last_sample - 1 to the film; the last launch divides the sum by the number of
+// samples. `offsets`: x and y of each sample in its pixel, -1 to 1. `losses`: the rounding error of the sum,
+// compensated in the next addition and kept between launches (Kahan, Further remarks on reducing truncation
+// errors, CACM 8(1), 1965): a plain sum of a million equal samples would be off by 1 %.
 static KERNEL_BODY void tile_render(const Scene *scene, const Tile *tile, global const scalar *offsets,
                                     global scalar *film, global scalar *losses, uint first_sample,
                                     uint last_sample)

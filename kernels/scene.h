@@ -143,9 +143,9 @@ static inline uint cull_spheres_missed(global const CullSphere *cull_spheres, ui
 // Starts to fetch what is read of the closest hit.
 static inline void object_fetch(const Scene *scene, uint kind, uint4 id)
 {
-    memory_fetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
+    memory_prefetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
     if (HAS_TRIANGLES && kind == KIND_TRIANGLES && id.y > 0)
-        memory_fetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
+        memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
 // Tests shapes first .. last - 1 of one kind; `cull_spheres`, where there are any, are theirs. Each kind has
@@ -203,11 +203,11 @@ typedef struct {
 static inline void stack_fetch(const Scene *scene, uint first, uint what)
 {
     if (what == BVH_NODE)
-        memory_fetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
+        memory_prefetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
     else if (HAS_TRIANGLES && (what & 0xff) == KIND_TRIANGLES)
-        memory_fetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
+        memory_prefetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
     else if (HAS_SPHERES && (what & 0xff) == KIND_SPHERES)
-        memory_fetch((global const char *)&scene->spheres[first], sizeof(Sphere));
+        memory_prefetch((global const char *)&scene->spheres[first], sizeof(Sphere));
 }
 
 // Makes room for a child among its siblings, which begin at `bottom`: the nearest last, or where
@@ -253,7 +253,7 @@ static inline uint node_open(const Scene *scene, uint index, uint lanes, const B
             met = lanes_bits(met_by.all != (integer)(0));
         }
         for (; met != 0; met &= met - 1) {
-            uint child = bit_lowest(met), by = 1;
+            uint child = lowest_bit(met), by = 1;
             if (one_by_one)
                 by = (uint)met_by.each[child];
             else if (LANES > 1)
@@ -365,11 +365,6 @@ static inline Hit closest_hit(const Scene *scene, Ray *ray)
 static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
 {
     return scene_search(scene, ray, false, true).hit;
-}
-
-static inline mask hit_found(const Hit *hit)
-{
-    return hit->object >= (integer)(0);
 }
 
 // How much light passes along each active ray between near and far: 1 where nothing stands, 0 behind anything

@@ -1,5 +1,4 @@
-// Explicit rays, each with its closest hit and what becomes of the ray there. Scene and rays are taken as
-// they are.
+// Traces explicit rays: the closest hit, the bounces there and the transmittance along each.
 #include "shading/bounce.h"
 
 static inline Vector vector_load(const RealLanes *from)
@@ -14,10 +13,9 @@ static inline void vector_store(Vector vector, RealLanes *to)
     to[2].all = vector.z;
 }
 
-// rays: RAY_SCALARS of each, near and far its tmin and tmax. results: RESULT_SCALARS of each: t; the
-// geometric normal, facing the ray; the point; the reflected ray's origin and direction; the refracted one's;
-// how much of the ray passes; and how much light passes along it from tmin to tmax. Behind t all are without
-// meaning where nothing is hit, but for the last.
+// rays: RAY_SCALARS per ray; near and far are its tmin and tmax. results: RESULT_SCALARS per ray: t,
+// geometric normal facing the ray, position, origin and direction of the reflected and of the refracted ray,
+// transmitted fraction, and transmittance from tmin to tmax. On a miss only the last is valid.
 static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
 {

@@ -1,4 +1,4 @@
-// Angles, from + - * / and sqrt alone: the same bits on every device.
+// Angles from + - * / and sqrt alone: the same bits on every device.
 #ifndef ANGLE_H
 #define ANGLE_H
 

@@ -1,13 +1,13 @@
-// All that knows the width: how many rays one work-item carries at once (LANES), in which precision.
+// Packet width and precision: a work-item traces packets of LANES rays, one per lane.
 //
-// Above this file code reads like the scalar algorithm, with a mask where it would branch. A mask is what a
-// comparison gives: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
+// Above this file code reads like the scalar algorithm, with a mask where that would branch. A mask is the
+// result of a comparison: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
 #ifndef LANES_H
 #define LANES_H
 
 #pragma OPENCL FP_CONTRACT OFF
 
-// Relaxed maths let a compiler rearrange sums, and so find that they lose nothing: one that hears does not.
+// Relaxed math lets a compiler reassociate sums, and so cancel the terms that measure their rounding error.
 #if IS_FAST && defined(__clang__) && __clang_major__ >= 12
 #pragma clang fp reassociate(off)
 #endif
@@ -39,12 +39,11 @@ typedef int scalar_integer;
 #define SMALLEST_RATIO   0x1p-120f
 #endif
 
-// For a large function that is called from several places with little in hand: inlined, each copy would be
-// compiled.
+// For large functions with several callers and little live state: inlined, each copy would be compiled.
 #define OUT_OF_LINE __attribute__((noinline))
 
-// What a kernel does once it knows its work-item. PoCL compiles a kernel's own text three times, for each way
-// to launch it, and what it calls out of line once.
+// The body of a kernel. PoCL compiles a kernel three times, once per form of launch, but out-of-line
+// functions once.
 #if LANES == 1
 #define KERNEL_BODY inline
 #else
@@ -67,7 +66,7 @@ typedef int scalar_integer;
 typedef LANES_TYPE(REAL_BASE) real;
 typedef LANES_TYPE(INTEGER_BASE) integer;
 typedef integer mask;
-typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps around
+typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 
 #define real_from_integer LANES_CONVERT(REAL_BASE)
 #define integer_from_real LANES_CONVERT(INTEGER_BASE)
@@ -77,7 +76,7 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps around
 #define unsigned_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
 #define integer_from_unsigned LANES_AS(INTEGER_BASE)
 
-// The tile that one work-item carries at once (types.h), and each lane's place in it.
+// The tile of a packet (types.h), and the position of each lane in it.
 #define TILE_WIDTH  TILE_WIDTH_OF(LANES)
 #define TILE_HEIGHT TILE_HEIGHT_OF(LANES)
 #if LANES == 1
@@ -94,7 +93,7 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps around
 #define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
 #endif
 
-// Marks a branch that few rays take: what it alone needs then stays out of registers.
+// Marks a rare branch, so that the compiler keeps its values out of registers.
 #ifdef __clang__
 #define RARELY(condition) __builtin_expect(condition, false)
 #else
@@ -113,7 +112,7 @@ static inline mask mask_none(void)
     return (real)(0) != (real)(0);
 }
 
-// Lanes as an array, to load and store them one by one.
+// Lanes as an array, to read and write one by one.
 typedef union {
     real all;
     scalar each[LANES];
@@ -132,8 +131,8 @@ typedef union {
 #define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
 #endif
 
-// clang can take a whole vector to one value, which its code for x86 and Arm does by few instructions;
-// halving, written out, is several times as long. What clang compiles to SPIR may not have it.
+// clang's reductions take few instructions on x86 and Arm; halving, written out, takes several times as many.
+// clang for SPIR may lack them.
 #if defined(__x86_64__) || defined(__aarch64__)
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_min)
@@ -195,11 +194,10 @@ static inline scalar_integer lanes_smallest(integer value)
 }
 #endif
 
-// Where clang names the one instruction of x86 that takes a mask to its bits; what stands in for it below is
-// some ten.
+// clang's builtin for the x86 instruction that packs a mask into bits; the fallback below takes some ten.
 #if defined(__x86_64__) && defined(__has_builtin)
 #if __clang_major__ >= 18 && __clang_major__ <= 20 && !defined(__EVEX512__)
-// which ask for this of 512 bits
+// these need EVEX512 for vectors of 512 bits
 #elif LANES == 16 && !IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
 #define MASK_BITS __builtin_ia32_cvtd2mask512
 #elif LANES == 8 && IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtq2mask512)
@@ -211,7 +209,7 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-// The mask's lanes as bits, the first lane's lowest.
+// The mask as bits, lane 0 lowest.
 static inline uint lanes_bits(mask condition)
 {
 #if LANES == 1
@@ -238,8 +236,8 @@ static inline mask mask_of_bits(uint bits)
 #endif
 }
 
-// The place of the lowest bit that is set; not of 0.
-static inline uint bit_lowest(uint bits)
+// The index of the lowest set bit of bits != 0.
+static inline uint lowest_bit(uint bits)
 {
     return 31 - clz(bits & -bits);
 }
@@ -249,13 +247,13 @@ static inline bool lanes_all(mask condition)
     return !lanes_any(!condition);
 }
 
-// One lane's number, in all lanes; of lanes in memory.
+// Broadcasts one lane of a value in memory.
 static inline real real_of_lane(const real *lanes, uint lane)
 {
     return (real)(((const scalar *)lanes)[lane]);
 }
 
-// Comparisons in place of fmin and fmax: no promise about NaN is needed, and they are one instruction.
+// One instruction each, unlike fmin and fmax, whose treatment of NaN is not needed.
 static inline real real_min(real a, real b)
 {
     return lanes_select(a < b, a, b);
@@ -266,12 +264,12 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
-// 8 reals, and the smallest lane of each: `all` becomes `each`.
-enum { LEASTS = 8 };
+// Eight vectors, and then the smallest lane of each: lane_minima_reduce turns `all` into `each`.
+enum { MINIMA_COUNT = 8 };
 typedef union {
-    real all[LEASTS];
-    scalar each[LEASTS];
-} Leasts;
+    real all[MINIMA_COUNT];
+    scalar each[MINIMA_COUNT];
+} LaneMinima;
 
 #if LANES > 1
 static inline real real_min_of_pairs(real a, real b)
@@ -280,9 +278,9 @@ static inline real real_min_of_pairs(real a, real b)
 }
 #endif
 
-// Two reals whose lanes were compared in pairs fill one, so that all of them take little longer than one
-// alone. Written out, they stay in registers.
-static inline void leasts_find(Leasts *leasts)
+// Comparing lanes in pairs packs two vectors into one, so that all eight take little longer than one.
+// Unrolled, so that they stay in registers.
+static inline void lane_minima_reduce(LaneMinima *leasts)
 {
 #if LANES > 1
     real *all = leasts->all;
@@ -299,18 +297,18 @@ static inline void leasts_find(Leasts *leasts)
 #endif
 }
 
-// The largest of the lanes; -LARGEST of none.
+// The largest of the lanes in `members`; -LARGEST if there are none.
 static inline scalar lanes_largest(mask members, real a)
 {
-    // as integers the bits of negative numbers run the wrong way
+    // as integers the bits of negative reals order in reverse
     const uint sign = 8 * sizeof(scalar) - 1;
     integer bits = bits_from_real(lanes_select(members, -a, (real)(LARGEST)));
     scalar_integer least = lanes_smallest(bits ^ ((bits >> sign) & (integer)(INTEGER_LARGEST)));
     return -scalar_from_bits(least ^ ((least >> sign) & INTEGER_LARGEST));
 }
 
-// Starts to fetch memory that will soon be read, by lines of a cache. PoCL's own prefetch does nothing.
-static inline void memory_fetch(global const char *from, uint size)
+// Prefetches memory that will soon be read, by cache line. PoCL's own prefetch does nothing.
+static inline void memory_prefetch(global const char *from, uint size)
 {
 #if REDUCES_LANES
 #pragma unroll

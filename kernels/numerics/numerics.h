@@ -1,19 +1,19 @@
-// Arithmetic whose error is known: correct division and square root, products without cancellation, pairs of
-// reals that carry twice the precision, and the few functions shading needs.
+// Arithmetic with known error bounds: correctly rounded division and square root, products without
+// cancellation, pairs of reals with twice the precision, and the functions that shading needs.
 //
-// Nothing here may be contracted or reassociated; fma is written where it is meant.
+// Nothing here may be contracted or reassociated; real_fma is explicit.
 #ifndef NUMERICS_H
 #define NUMERICS_H
 
 #include "numerics/perturb.h"
 
-// Whether intersections use the compensated forms.
+// Intersections use compensated forms, in pairs.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
 
-// Where a device's own quotients and roots are inexact (REPAIRS_DIVIDE, at `strict`, in floats) they are
-// taken of the operands' mantissas alone, so that nothing on the way is too large or too small, brought
-// within an ulp by a Newton step, and then chosen among three neighbors by comparisons that are exact. A
-// Newton step cannot choose: of 1 - 2^-24 the root lies 2^-27 ulp from the middle between two floats.
+// Correct rounding on devices whose division and square root are inexact (REPAIRS_DIVIDE, at `strict`, in
+// floats): computed from the operands' mantissas alone, so that nothing overflows or underflows, brought
+// within an ulp by a Newton step, then chosen among three neighbors by exact comparisons. A Newton step alone
+// does not suffice: the root of 1 - 2^-24 lies 2^-27 ulp from the midpoint of two floats.
 #define EXPONENT_BITS ((integer)(0x7f800000))
 #define SIGN_BIT      ((integer)(~0x7fffffff))
 #define BITS_OF_ONE   ((integer)(0x3f800000))
@@ -39,7 +39,7 @@ static inline real real_below(real a)
     return real_from_bits(bits_from_real(a) - (integer)(1));
 }
 
-// Of a quotient within an ulp the remainder is exact, and so is its comparison with half the way to a
+// The remainder of a quotient within an ulp is exact, and so is its comparison with half the gap to a
 // neighbor.
 static inline real repaired_quotient(real a, real b)
 {
@@ -53,7 +53,7 @@ static inline real repaired_quotient(real a, real b)
     mask rises = residual > (up - quotient) * half_b, falls = residual < (down - quotient) * half_b;
     quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
     quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & SIGN_BIT));
-    // in two factors: one may be beyond the largest real where the product is not
+    // in two factors: one alone may overflow where the product does not
     integer exponent = ((a_bits & EXPONENT_BITS) >> 23) - ((b_bits & EXPONENT_BITS) >> 23);
     integer half_exponent = exponent >> 1;
     return quotient * real_power_of_two(half_exponent) * real_power_of_two(exponent - half_exponent);
@@ -73,7 +73,7 @@ static inline real repaired_root(real a)
     return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
 }
 
-// Correctly rounded at `strict` on every device, but for numbers below the smallest normal one.
+// Correctly rounded at `strict` on every device, except for subnormal numbers.
 static inline real real_divide(real a, real b)
 {
     real quotient = device_divide(a, b);
@@ -82,7 +82,7 @@ static inline real real_divide(real a, real b)
     return lanes_select(ordinary, repaired_quotient(a, b), quotient);
 }
 
-// Correctly rounded at `strict`, likewise; 0 for 0. The argument is never negative.
+// Likewise; 0 for 0. a >= 0.
 static inline real real_sqrt(real a)
 {
     real root = device_sqrt(a);
@@ -90,7 +90,7 @@ static inline real real_sqrt(real a)
     return lanes_select(real_is_normal(a), repaired_root(a), root);
 }
 
-// One over the power of two at or below a > 0; huge for 0.
+// The reciprocal of the largest power of two <= a, for a > 0; huge for 0.
 static inline real real_inverse_power(real a)
 {
 #if IS_DOUBLE
@@ -101,7 +101,7 @@ static inline real real_inverse_power(real a)
 #endif
 }
 
-// a b - c d to 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of Kahan's
+// a b - c d within 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of Kahan's
 // algorithm for the accurate computation of 2x2 determinants, Math. Comp. 82, 2013).
 static inline real product_difference(real a, real b, real c, real d)
 {
@@ -160,9 +160,9 @@ static inline Pair pair_product_difference(Pair a, Pair b, Pair c, Pair d)
     return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
 }
 
-// ln(1 - s) for 0 <= s < 1: -2 artanh(s / (2 - s)) after the power of two is taken out, by its Taylor series
-// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). For small s no bit of s is lost, which is
-// the point of it: 1 - s itself would lose them.
+// ln(1 - s) for 0 <= s < 1: -2 artanh(s / (2 - s)) after extracting the power of two, by its Taylor series
+// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). Small s keep all bits, which 1 - s would
+// lose.
 static inline real real_log_complement(real s)
 {
     real rest = (real)(1) - s;
@@ -201,8 +201,8 @@ static inline real real_log_complement(real s)
 #define EXP_LOWEST (-87.0f)
 #endif
 
-// e^x for x <= 0: 2^k times the Taylor series of the rest, |rest| <= ln(2)/2 (Abramowitz, Stegun, 4.2.1). 0
-// where the result would be subnormal.
+// e^x for x <= 0: 2^k times the Taylor series of the remainder, at most ln(2)/2 (Abramowitz, Stegun, 4.2.1).
+// 0 where the result would be subnormal.
 static inline real real_exp_negative(real x)
 {
 #if IS_DOUBLE
@@ -234,8 +234,7 @@ static inline real real_exp_negative(real x)
     return lanes_select(x < lowest, (real)(0), series * power);
 }
 
-// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1. `fast` takes the device's own functions, as inaccurate as it
-// likes.
+// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1. `fast` uses the device's native functions.
 static inline real real_complement_power(real s, real n)
 {
 #if IS_FAST
@@ -246,7 +245,7 @@ static inline real real_complement_power(real s, real n)
     return real_min(power, (real)(1));
 }
 
-// Where (1 - s)^n, which is at most e^(-n s), may be more than 0.
+// Where (1 - s)^n, at most e^(-n s), may be above 0.
 static inline mask real_complement_power_counts(real s, real n)
 {
     return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));

@@ -1,10 +1,10 @@
-// The operations that devices may give different results for, and errors to stand in for those devices:
-// divide, square root and the native functions are called here alone. With PERTURB each result is moved by
-// as much as the OpenCL C specification lets it be wrong (3.0, Relative Error as ULPs), times PERTURB_SCALE.
+// The operations whose results differ between devices, and simulated errors: division, square root and the
+// native functions are called only here. PERTURB adds to each result the error that the OpenCL C
+// specification permits (3.0, Relative Error as ULPs), times PERTURB_SCALE.
 //
-// The error is a hash of PERTURB_SEED, the operation and its operands, no more: what a device computes twice
-// it computes alike, whatever the work-item. Of the operands of divide and root it takes the mantissas, since
-// devices start from tables of these: operands' signs and powers of two change the result's alone.
+// The error is a hash of PERTURB_SEED, the operation and its operands alone, so that equal operations err
+// equally in all work-items. Of the operands of division and root only the mantissas count, from whose tables
+// devices start: signs and powers of two change only those of the result.
 #ifndef PERTURB_H
 #define PERTURB_H
 
@@ -22,7 +22,7 @@
 
 enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTURBED_LOG2, PERTURBED_COUNT };
 
-// In ulp. The device's own rounding comes on top.
+// In ulp, in addition to the device's own rounding.
 enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16, NATIVE_ERROR = 8192 };
 
 static inline unsigned_integer perturb_hash(uint operation, integer a, integer b)
@@ -40,7 +40,7 @@ static inline integer perturb_steps(unsigned_integer hash, uint largest)
            (integer)((scalar_integer)largest);
 }
 
-// The real so many ulp away. 0, and what is nearly too small or too large for a real, stays.
+// Moves the value by a hashed number of ulp, up to `largest`. 0 and values near underflow or overflow stay.
 static inline real perturb(real value, unsigned_integer hash, uint largest)
 {
     integer steps = perturb_steps(hash, largest * PERTURB_SCALE);
@@ -48,7 +48,7 @@ static inline real perturb(real value, unsigned_integer hash, uint largest)
     return lanes_select(ordinary, real_from_bits(bits_from_real(value) + steps), value);
 }
 
-// -cl-fast-relaxed-math promises nothing where an operand is beyond 2^-62 .. 2^62, but for reciprocals.
+// Under -cl-fast-relaxed-math the error of division is bounded for operands in 2^-62 .. 2^62 and reciprocals.
 static inline real device_divide(real a, real b)
 {
     real quotient = a / b;
@@ -66,14 +66,13 @@ static inline real device_sqrt(real a)
 {
     real root = sqrt(a);
     if (!PERTURB || IS_DOUBLE) return root;
-    // the exponent's lowest bit with the mantissa
+    // mantissa and lowest bit of the exponent
     integer operand = bits_from_real(a) & (MANTISSA + MANTISSA + (integer)(1));
     return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
 }
 
-// base^exponent, which the kernels work out themselves where they are not `fast`, moved as a device's own
-// power could be: what a picture may differ by where a device's functions stood in. Not at `strict`, whose
-// bits are promised.
+// Gives base^exponent, which kernels compute themselves except at `fast`, the error of a device's own power
+// function. Not at `strict`, whose bits are the same on every device.
 static inline real perturbed_power(real power, real base, real exponent)
 {
     if (!PERTURB || IS_STRICT) return power;

@@ -60,7 +60,7 @@ static inline real vector_dot_exactly(Vector a, Vector b)
     return three.high + (((x.low + y.low) + z.low) + (two.low + three.low));
 }
 
-// Each component to 1.5 ulp.
+// Each component within 1.5 ulp.
 static inline Vector vector_cross(Vector a, Vector b)
 {
     return (Vector){product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),
@@ -72,7 +72,7 @@ static inline real vector_length(Vector a)
     return real_sqrt(vector_dot(a, a));
 }
 
-// Unit to 2.5 u. The zero vector stays zero.
+// Unit within 2.5 u. The zero vector stays zero.
 static inline Vector vector_normalize(Vector a)
 {
     real norm = vector_length(a);
@@ -80,27 +80,27 @@ static inline Vector vector_normalize(Vector a)
     return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), norm)));
 }
 
-// The same for what is unit but for some rounding, e: by Newton's step, whose error is e^2.
+// The same for a vector that is unit within a rounding e: a Newton step, whose error is e^2.
 static inline Vector vector_renormalize(Vector a)
 {
     if (IS_COMPENSATED) return vector_normalize(a);
     return vector_scale(a, real_fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
 }
 
-// |x| + |y| + |z|: what error bounds are proportional to.
+// |x| + |y| + |z|: error bounds are proportional to it.
 static inline real vector_magnitude(Vector a)
 {
     return fabs(a.x) + fabs(a.y) + fabs(a.z);
 }
 
-// What of it counts along a unit vector: how far errors in proportion to coordinates may put a point off a
-// surface of that normal. Those along the surface leave it there.
+// The magnitude along a unit normal: how far errors proportional to coordinates move a point off a surface.
+// Errors along the surface do not.
 static inline real vector_magnitude_along(Vector unit, Vector a)
 {
     return real_fma(fabs(unit.x), fabs(a.x), real_fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
 }
 
-// Vectors of pairs, for the compensated forms.
+// Vectors of pairs, for compensated forms.
 typedef struct {
     Pair x, y, z;
 } PairVector;
@@ -138,8 +138,8 @@ static inline Vector pair_vector_high(PairVector a)
     return (Vector){a.x.high, a.y.high, a.z.high};
 }
 
-// a . b rounded about once, in a third of the operations of pairs: vector_dot_exactly of the high parts, with
-// the low parts' product beside the errors it adds up.
+// a . b rounded about once, in a third of the operations of pairs: vector_dot_exactly of the high parts, plus
+// the low parts' product among the errors it sums.
 static inline real pair_vector_dot_once(PairVector a, Vector b)
 {
     Pair x = pair_product(a.x.high, b.x), y = pair_product(a.y.high, b.y), z = pair_product(a.z.high, b.z);
@@ -148,7 +148,7 @@ static inline real pair_vector_dot_once(PairVector a, Vector b)
     return three.high + ((((x.low + y.low) + z.low) + (two.low + three.low)) + low);
 }
 
-// a x b, each component to 2 ulp.
+// a x b, each component within 2 ulp.
 static inline Vector pair_vector_cross_once(PairVector a, Vector b)
 {
     Vector high = vector_cross(pair_vector_high(a), b);

@@ -1,12 +1,12 @@
-// A ray's whole way through the scene, over mirrors and through glass, and the color it brings back.
-// SIGNS_PATHS, defined as 0 or 1 before this file is included, says whether the way itself is asked for.
+// The ray tree of a camera ray, and its color. SIGNS_PATHS, defined as 0 or 1 before this file is included,
+// asks for the tree's signature instead of the color.
 #ifndef PATH_H
 #define PATH_H
 
 #include "shading/bounce.h"
 #include "shading/phong.h"
 
-// What a surface shows by itself: ambient light and each light that reaches it.
+// Ambient light and each light that reaches the surface, without reflection and refraction.
 static inline Color3 surface_color(const Scene *scene, const Surface *surface)
 {
     Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
@@ -18,14 +18,14 @@ static inline Color3 surface_color(const Scene *scene, const Surface *surface)
     return color;
 }
 
-// Takes up what a ray met and which rays came of it.
-static inline unsigned_integer path_sign(unsigned_integer path, const Ray *ray, const Hit *hit, mask mirrored,
-                                         mask passed, mask total)
+// Adds a ray's hit and its bounces to the signature.
+static inline unsigned_integer path_sign(unsigned_integer path, const Ray *ray, const Hit *hit,
+                                         mask reflected, mask refracted, mask total)
 {
     const integer none = (integer)(0);
-    integer events = lanes_select(mirrored, (integer)(PATH_REFLECTED), none) |
-                     lanes_select(passed, (integer)(PATH_REFRACTED), none) |
-                     lanes_select(mirrored & total, (integer)(PATH_TOTAL_REFLECTION), none);
+    integer events = lanes_select(reflected, (integer)(PATH_REFLECTED), none) |
+                     lanes_select(refracted, (integer)(PATH_REFRACTED), none) |
+                     lanes_select(reflected & total, (integer)(PATH_TOTAL_REFLECTION), none);
     unsigned_integer word =
         unsigned_from_integer((hit->object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
     unsigned_integer longer =
@@ -33,17 +33,16 @@ static inline unsigned_integer path_sign(unsigned_integer path, const Ray *ray, 
     return lanes_select(ray->active, longer, path);
 }
 
-// Follows a ray and all that it becomes: at each surface the mirrored ray first, with all that comes of it,
-// then the one that passes. Where SIGNS_PATHS, *path is the signature (types.h) of the way taken, which in a
-// lane does not depend on the others, and the color is without meaning.
+// Traces a ray tree depth first, reflected before refracted. If SIGNS_PATHS, *path is its signature
+// (types.h), which in each lane is independent of the other lanes, and the color is undefined.
 static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *path)
 {
     *path = (unsigned_integer)(PATH_START);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 background = vector_of(scene->header->background);
     Color3 color = black, weight = white;
-    Bounce waiting[HAS_TRANSMISSION ? BOUNCES_LARGEST : 1];
-    uint waiting_count = 0, depth = 0;
+    Bounce pending[HAS_TRANSMISSION ? BOUNCES_LARGEST : 1];
+    uint pending_count = 0, depth = 0;
     for (;;) {
         Hit hit = closest_hit(scene, &ray);
         Surface surface;
@@ -72,11 +71,11 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *pa
         if (!lanes_any(bounce_counts(&next))) {
             next = other;
         } else if (HAS_TRANSMISSION && lanes_any(bounce_counts(&other))) {
-            waiting[waiting_count++] = other;
+            pending[pending_count++] = other;
         }
         if (!lanes_any(bounce_counts(&next))) {
-            if (waiting_count == 0) return color;
-            next = waiting[--waiting_count];
+            if (pending_count == 0) return color;
+            next = pending[--pending_count];
         }
         ray = bounce_ray(&next);
         weight = next.weight;

@@ -1,4 +1,4 @@
-// Lights and Phong's reflection (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
+// Lights and Phong shading (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
 #ifndef PHONG_H
 #define PHONG_H
 
@@ -6,12 +6,12 @@
 
 typedef struct {
     Vector direction; // from the surface to the light, unit
-    real strength;    // 0..1: a spot's edge
-    Ray shadow_ray;   // meets what stands between; its end is the light
+    real strength;    // 0..1: a spotlight's falloff
+    Ray shadow_ray;   // ends at the light
 } LightRay;
 
-// 1 in a spot's full cone, 0 outside it, smooth between. The angle is measured as s = 1 - cos = |l - axis|^2
-// / 2, which keeps its bits for narrow cones where the cosine itself has none left.
+// 1 in a spotlight's full cone, 0 outside it, smooth between. The angle is measured as
+// s = 1 - cos = |l - axis|^2 / 2, which is accurate for narrow cones, where the cosine has no bits left.
 static inline real spot_strength(const Light *light, Vector from_light)
 {
     Vector difference = vector_subtract(from_light, vector_of(light->direction));
@@ -23,14 +23,15 @@ static inline real spot_strength(const Light *light, Vector from_light)
     return light->cone.z == 0 ? hard : soft;
 }
 
-// The ray to a light at a place runs from 0 to 1, unnormalized, and ends a rounding before the light.
+// The shadow ray to a point or spot light runs from 0 to 1, unnormalized, and ends a rounding before the
+// light.
 static inline LightRay light_ray(const Light *light, const Surface *surface)
 {
     LightRay to_light;
     Vector start = surface_leave(surface, false);
     to_light.strength = (real)(1);
-    bool has_place = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
-    if (HAS_DIRECTIONAL_LIGHTS && (!has_place || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
+    bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
+    if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
         to_light.shadow_ray = ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface->found);
         return to_light;
@@ -44,9 +45,9 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     return to_light;
 }
 
-// max(0, cos)^shininess for the angle between two unit vectors, wanted in some lanes. Near the highlight's
-// center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has. A power of 0
-// gives 1.
+// max(0, cos)^shininess of the angle between two unit vectors, for the lanes in `wanted`. Near the
+// highlight's center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has. A
+// shininess of 0 gives 1.
 static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
 {
     Vector difference = vector_subtract(reflected, to_eye);
@@ -59,8 +60,7 @@ static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye,
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 
-// The light that reaches the eye from one light, black where the surface turns away from it or lies in its
-// shadow; *shadowed tells which lanes do.
+// One light's contribution; black in *shadowed lanes, whose surface faces away from the light or is occluded.
 static inline Color3 phong_light(const Scene *scene, const Surface *surface, uint index, mask *shadowed)
 {
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
@@ -73,7 +73,7 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, uin
 
     to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
-        ray_take_apex(&to_light.shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
+        ray_set_common_origin(&to_light.shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
     rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
     real passing = transmittance(scene, &to_light.shadow_ray);
     lit = lit & (passing > (real)(0));

@@ -1,11 +1,11 @@
-// Box along the axes, its faces included.
+// Axis-aligned box, faces included.
 #ifndef BOX_H
 #define BOX_H
 
-#include "numerics/quadratic.h"
+#include "shapes/quadratic.h"
 
-// Where the ray is between low and high on one axis. A direction of exactly 0 (of either sign) is always or
-// never between: decided by comparison, since 0 times infinity is no number.
+// The interval of t where the ray is between low and high on one axis. A direction of exactly 0, of either
+// sign, is between them always or never: decided by comparison, since 0 times infinity is NaN.
 static inline Roots slab_crossings(real low, real high, real origin, real direction, real inverse)
 {
     mask parallel = direction == (real)(0);
@@ -36,8 +36,8 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
     return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->near);
 }
 
-// How near t is to a slab's crossings, and on which of its faces that lies: a ray that runs towards larger
-// coordinates enters at the low face and leaves at the high one.
+// |t - crossing| for the nearer of a slab's crossings, and whether that is its low face: a ray towards larger
+// coordinates enters there and leaves at the high one.
 static inline real slab_distance(Roots slab, real direction, real t, mask *low_face)
 {
     real to_near = fabs(t - slab.near), to_far = fabs(t - slab.far);
@@ -51,8 +51,8 @@ static inline real slab_clamp(real value, real low, real high)
     return real_min(real_max(value, low), high);
 }
 
-// The face is the one whose crossing is t, x before y before z; the point is put on it exactly.
-static inline Patch box_patch(const Box *box, const Ray *ray, real t)
+// The face is the one whose crossing is t, x before y before z; the position lies exactly on it.
+static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
     Roots x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
@@ -77,7 +77,7 @@ static inline Patch box_patch(const Box *box, const Ray *ray, real t)
     Vector normal = {lanes_select(on_x, lanes_select(low_x, -one, one), zero),
                      lanes_select(on_y, lanes_select(low_y, -one, one), zero),
                      lanes_select(on_z, lanes_select(low_z, -one, one), zero)};
-    return patch_make(position, normal, zero);
+    return surface_point_make(position, normal, zero);
 }
 
 #endif

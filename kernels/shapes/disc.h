@@ -4,8 +4,7 @@
 
 #include "shapes/plane.h"
 
-// The ray's height over the disc's plane, how fast it falls, and, times that, from the center to where it
-// crosses.
+// t = height / along; across / along leads from the center to the crossing.
 typedef struct {
     real height, along;
     Vector across;
@@ -29,8 +28,8 @@ static inline DiscCrossing disc_crossing_exactly(Vector center, Vector normal, c
 }
 
 // Inside the rim: with v the crossing from the center, (n . d) v = n x E for the moment E = f x d, so that
-// |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a distance. Where the ray runs at
-// less than 4 degrees to the plane all three cancel: pairs there at any precision.
+// |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a distance. At less than 4 degrees
+// to the plane all three cancel: pairs there at any precision.
 static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 {
     Vector center = vector_of(disc->center_radius);
@@ -53,7 +52,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
     if (!lanes_any(hit)) return hit;
     real radius = (real)(disc->center_radius.w);
-    // nearly in the disc's plane n . d says little about t, but it lies no farther from the center than the
+    // nearly in the plane n . d hardly determines t, but the crossing is no farther from the center than the
     // rim
     real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
     real half_chord = radius * real_sqrt(ray->inverse_squared);
@@ -62,9 +61,9 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     return hit & (vector_dot(crossing.across, crossing.across) <= reach * reach) & (*t > ray->near);
 }
 
-static inline Patch disc_patch(const Disc *disc, const Ray *ray, real t)
+static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, real t)
 {
-    return plane_crossing_patch(vector_of(disc->center_radius), disc->normal, ray, t);
+    return plane_crossing_point(vector_of(disc->center_radius), disc->normal, ray, t);
 }
 
 #endif

@@ -16,7 +16,7 @@ typedef struct {
     mask real_roots;
 } ParaboloidCrossings;
 
-// Between which t the ray is on the apex' side of the plane across the axis that ends the shape.
+// The interval of t where the ray is on the apex' side of the shape's end plane.
 static inline Roots paraboloid_slab(real end, Pair from, real towards)
 {
     mask parallel = towards == (real)(0), leaving = towards > (real)(0);
@@ -62,7 +62,7 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     return crossings;
 }
 
-// As a cylinder: capped, inside the side and before the end at once; else a root before the end.
+// As a cylinder: capped, the intersection of side and slab; else a root within the slab.
 static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real *t)
 {
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
@@ -82,35 +82,35 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
 
 // On the cap the point is moved along the axis, on the side by two Newton steps along the gradient of
 // rho^2 - 4 f z, which is 2 (rho - 2 f w).
-static inline Patch paraboloid_patch(const Paraboloid *shape, const Ray *ray, real t)
+static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, const Ray *ray, real t)
 {
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
     Vector apex = vector_of(shape->apex_k), axis = vector_of(shape->axis_end);
     real squared_axis = vector_dot(axis, axis);
     real half_lift = real_divide((real)(0.5f * shape->apex_k.w), squared_axis); // 2 f / |w|
-    Vector p = ray_point_from(ray, apex, t), place = p, normal = axis;
+    Vector p = ray_point_from(ray, apex, t), position = p, normal = axis;
     for (uint i = 0; i < 2; i++) {
-        real height = vector_dot(place, axis);
-        Vector across = vector_fma(axis, -real_divide(height, squared_axis), place);
+        real height = vector_dot(position, axis);
+        Vector across = vector_fma(axis, -real_divide(height, squared_axis), position);
         Vector gradient = vector_fma(axis, -half_lift, across);
         real excess = real_fma((real)(-2) * half_lift, height, vector_dot(across, across));
         real step = real_divide(excess, (real)(2) * vector_dot(gradient, gradient));
-        place = vector_fma(gradient, -step, place);
+        position = vector_fma(gradient, -step, position);
         normal = gradient;
     }
     real size = vector_magnitude(p) + vector_magnitude(apex);
-    Patch patch = patch_make(vector_add(place, apex), vector_normalize(normal), size);
-    if (!IS_FAST) patch_move_to_ray(&patch, ray, t, size);
+    SurfacePoint point = surface_point_make(vector_add(position, apex), vector_normalize(normal), size);
+    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
         real to_slab = real_min(fabs(t - crossings.slab.near), fabs(t - crossings.slab.far));
         real to_side = real_min(fabs(t - crossings.side.near), fabs(t - crossings.side.far));
         real gap = real_divide((real)(shape->axis_end.w) - vector_dot(p, axis), squared_axis);
         Vector on_plane = vector_fma(axis, gap, p);
-        Patch cap = patch_make(vector_add(on_plane, apex), vector_normalize(axis), size);
-        patch_keep(&patch, to_slab < to_side, &cap);
+        SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
+        surface_point_replace(&point, to_slab < to_side, &cap);
     }
-    return patch;
+    return point;
 }
 
 #endif

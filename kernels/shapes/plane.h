@@ -2,10 +2,9 @@
 #ifndef PLANE_H
 #define PLANE_H
 
-#include "traversal/ray.h"
+#include "shapes/surface_point.h"
 
-// t = height / along where that is a number, tested without dividing; their signs tell a plane behind the
-// ray.
+// t = height / along where that is finite, tested without dividing; equal signs mean ahead of the ray.
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
     mask ahead = (height > (real)(0)) == (along > (real)(0));
@@ -16,12 +15,10 @@ static inline mask plane_quotient(real height, real along, const Ray *ray, real 
     return hit & (*t > ray->near);
 }
 
-// t = n . (p - o) / n . d, the difference taken first. Only n . d = 0 is no hit: a threshold would cut the
-// horizon.
+// t = n . (p - o) / n . d, the difference first. Only n . d = 0 is no hit: a threshold would cut the horizon.
 static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, real *t)
 {
-    real along;
-    real height;
+    real along, height;
     if (IS_COMPENSATED) {
         along = vector_dot_exactly(normal, ray->direction);
         height = pair_vector_dot_once(pair_vector_difference(point, ray->origin), normal);
@@ -37,21 +34,21 @@ static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
     return plane_crossing(vector_of(plane->point), vector_of(plane->normal), ray, t);
 }
 
-// The point where the ray crosses a plane, moved onto it once. The normal's w is one over its length.
-static inline Patch plane_crossing_patch(Vector point, scalar4 normal, const Ray *ray, real t)
+// The ray's point, moved onto the plane once. The normal's w is one over its length.
+static inline SurfacePoint plane_crossing_point(Vector point, scalar4 normal, const Ray *ray, real t)
 {
     Vector unit = IS_COMPENSATED ? vector_normalize(vector_of(normal))
                                  : vector_scale(vector_of(normal), (real)(normal.w));
     Vector crossing = ray_point(ray, t), to_point = vector_subtract(point, crossing);
-    Patch patch = patch_make(vector_fma(unit, vector_dot(unit, to_point), crossing), unit,
-                             vector_magnitude_along(unit, to_point));
-    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t, patch.size);
-    return patch;
+    SurfacePoint crossed = surface_point_make(vector_fma(unit, vector_dot(unit, to_point), crossing), unit,
+                                              vector_magnitude_along(unit, to_point));
+    if (IS_COMPENSATED) surface_point_move_to_ray(&crossed, ray, t, crossed.size);
+    return crossed;
 }
 
-static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)
+static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ray, real t)
 {
-    return plane_crossing_patch(vector_of(plane->point), plane->normal, ray, t);
+    return plane_crossing_point(vector_of(plane->point), plane->normal, ray, t);
 }
 
 #endif

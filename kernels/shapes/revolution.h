@@ -13,7 +13,7 @@ typedef struct {
     real a, b, c, discriminant;
     Vector q, m;
     real g, h;
-    mask exact; // each of these is rounded about once
+    mask exact; // all of these are rounded about once
 } RevolutionQuadric;
 
 static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *shape, bool sloped,
@@ -84,12 +84,25 @@ static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *sha
     return quadric;
 }
 
-// For lanes that start beside the side. One that leaves it outward has no crossing ahead, and needs none.
+static inline RevolutionQuadric revolution_quadric_select(mask condition, RevolutionQuadric yes,
+                                                          RevolutionQuadric no)
+{
+    return (RevolutionQuadric){lanes_select(condition, yes.a, no.a),
+                               lanes_select(condition, yes.b, no.b),
+                               lanes_select(condition, yes.c, no.c),
+                               lanes_select(condition, yes.discriminant, no.discriminant),
+                               vector_select(condition, yes.q, no.q),
+                               vector_select(condition, yes.m, no.m),
+                               lanes_select(condition, yes.g, no.g),
+                               lanes_select(condition, yes.h, no.h),
+                               lanes_select(condition, yes.exact, no.exact)};
+}
+
+// For lanes that start next to the side. Those that leave it outward have no crossing ahead and are rejected.
 static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
                                                   bool sloped, const Ray *ray, mask beside)
 {
-    // a, which is more than 0, and c well beyond their roundings, which grow with the slope; the sign of b
-    // does not matter where it is within its own
+    // a > 0 and c well beyond their roundings, which grow with the slope; b may have any sign within its own
     real reach = vector_length(vector_subtract(ray->origin, vector_of(shape->base_radius)));
     scalar steepness = 1 + fabs(shape->axis_slope.w);
     real least_c =
@@ -100,19 +113,10 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
     quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
     beside = beside & !leaves;
     if (!lanes_any(beside)) return;
-    RevolutionQuadric exact = revolution_quadric_exactly(shape, sloped, ray);
-    quadric->a = lanes_select(beside, exact.a, quadric->a);
-    quadric->b = lanes_select(beside, exact.b, quadric->b);
-    quadric->c = lanes_select(beside, exact.c, quadric->c);
-    quadric->discriminant = lanes_select(beside, exact.discriminant, quadric->discriminant);
-    quadric->q = vector_select(beside, exact.q, quadric->q);
-    quadric->m = vector_select(beside, exact.m, quadric->m);
-    quadric->g = lanes_select(beside, exact.g, quadric->g);
-    quadric->h = lanes_select(beside, exact.h, quadric->h);
-    quadric->exact = beside;
+    *quadric = revolution_quadric_select(beside, revolution_quadric_exactly(shape, sloped, ray), *quadric);
 }
 
-// Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would tear the horizon of
+// Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would break the horizon of
 // ground that is a cylinder: pairs there at any precision.
 static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
 {
@@ -121,15 +125,15 @@ static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool
     real size = vector_dot(quadric.m, quadric.m);
     mask beside = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
     if (RARELY(lanes_any(beside))) {
-        RevolutionQuadric refined = quadric;
+        RevolutionQuadric refined = quadric; // its address would keep `quadric` itself out of registers
         revolution_quadric_refine(&refined, shape, sloped, ray, beside);
         quadric = refined;
     }
     return quadric;
 }
 
-// Two Newton steps on |m + t q| - |g + t h|, which does not cancel as a, b and c do for a cone seen along its
-// side or from far away: there the plain roots are off by up to 700 ulp at 2500 sizes.
+// Two Newton steps on |m + t q| - |g + t h|. For a cone seen along its side or from afar a, b and c cancel
+// and this does not: there the plain roots are off by up to 700 ulp at 2500 sizes.
 static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 {
     for (uint i = 0; i < 2; i++) {
@@ -146,15 +150,14 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 }
 
 typedef struct {
-    Roots
-        side; // where the ray is inside the endless surface: between the roots, or, if `outer`, outside them
+    Roots side; // the ray is inside the unbounded surface between these; if `outer`, outside them
     mask outer;
     mask real_roots;
-    Roots slab;  // where it is between the ends
+    Roots slab;  // the ray is between the ends
     Vector m, q; // at t the point is |m + t q| / |w| from the axis
 } RevolutionCrossings;
 
-// Where the ray is between the planes of a finite shape's ends.
+// The interval of t between the planes of a finite shape's ends.
 static inline Roots revolution_slab(const Revolution *shape, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_slope);
@@ -170,7 +173,7 @@ static inline Roots revolution_slab(const Revolution *shape, const Ray *ray)
     return slab_crossings((real)(0), (real)(shape->range.x), from, towards, real_inverse_or_zero(towards));
 }
 
-// Inside the nappe that the ends cut: outside the roots, on the side where the radius grows.
+// Restricts `outer` lanes to the nappe that the ends bound: the one towards which the radius grows.
 static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask growing)
 {
     Roots side = crossings->side;
@@ -180,15 +183,15 @@ static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask gr
     crossings->side.far = lanes_select(crossings->outer, nappe.far, side.far);
 }
 
-// Lines that may cross the endless surface: those with roots, those inside a cone but for a stretch between
-// its nappes, and those along the side.
+// Lines that may cross the unbounded surface: those with roots, those within a cone but for an interval
+// between its nappes, and those along the side.
 static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
 {
     return (quadric->discriminant >= (real)(0)) | (quadric->a <= (real)(0));
 }
 
-// A root is taken as q / a only where that is below the largest number; a = 0 is a ray along the side, which
-// has one root, c / q, and one infinitely far.
+// q / a is a root only where it is finite; a = 0 is a ray along the side, with one root, c / q, and one at
+// infinity.
 static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray,
                                                        const RevolutionQuadric *quadric)
 {
@@ -207,8 +210,7 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric->c, lanes_select(zero, (real)(1), q)));
     if (sloped && !IS_COMPENSATED) {
         c_over_q = lanes_select(quadric->exact, c_over_q, revolution_polish(quadric, c_over_q));
-        // where a is nearly 0 a step may lead through infinity, and what lay outside the roots would lie
-        // inside
+        // with a near 0 a step may pass through infinity, which would swap inside and outside
         real polished = revolution_polish(quadric, q_over_a);
         mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
         q_over_a = lanes_select(same_side & !quadric->exact, polished, q_over_a);
@@ -217,7 +219,7 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     crossings.outer = quadric->a < (real)(0);
     crossings.real_roots = (quadric->discriminant >= (real)(0)) | crossings.outer;
 
-    // a ray along a cylinder's axis, or along a cone's through its apex: inside all the way, or never
+    // along a cylinder's axis, or along a cone's through its apex: inside everywhere or nowhere
     mask along = (quadric->a == (real)(0)) & zero;
     mask inside = along & (quadric->c <= (real)(0));
     crossings.side.near = lanes_select(along, (real)(-LARGEST), crossings.side.near);
@@ -232,9 +234,9 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     return crossings;
 }
 
-// Whether the point at t is as near to the axis as any of a finite shape's, but for 8 u of the way there. A
-// ray along a cone's side has one root near infinity; its sign is noise, and the wrong one takes outside for
-// inside.
+// Lanes whose point at t is no farther from the axis than the shape's largest radius, within 8 u of the
+// distance. A ray along a cone's side has a root near infinity with a random sign; the wrong one swaps inside
+// and outside.
 static inline mask revolution_reaches(const Revolution *shape, const RevolutionCrossings *crossings,
                                       const Ray *ray, real t)
 {
@@ -247,9 +249,8 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
     return vector_length(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
 }
 
-// A capped solid is hit where the ray is inside the side and between the ends at once: one comparison decides
-// both surfaces, so that no ray passes between side and cap. An open or endless one is hit at a root between
-// the ends.
+// A capped solid is the intersection of side and slab: one comparison decides both, so that no ray passes
+// between side and cap. An open or unbounded one is hit at a root between the ends.
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
@@ -275,8 +276,9 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     return hit & (*t > ray->near) & (*t < (real)(LARGEST));
 }
 
-// On a cap the point is put on the cap's plane, else on the side along its normal.
-static inline Patch revolution_patch(const Revolution *shape, bool sloped, const Ray *ray, real t)
+// The position is moved onto the cap's plane, or else onto the side, along its normal.
+static inline SurfacePoint revolution_surface_point(const Revolution *shape, bool sloped, const Ray *ray,
+                                                    real t)
 {
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
@@ -290,7 +292,7 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
     real axis_distance = vector_length(across);
     Vector radial = vector_normalize(across);
     real radius = real_divide((real)(shape->base_radius.w), axis_length);
-    Vector normal = radial, place;
+    Vector normal = radial, position;
     if (sloped) {
         // |p x w| - R - k p . w has the gradient |w| radial - k w, on the mirror nappe |w| radial + k w
         real slope = (real)(shape->axis_slope.w);
@@ -298,23 +300,23 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
         mask mirrored = signed_radius < (real)(0);
         real turn = lanes_select(mirrored, -slope, slope);
         Vector gradient = vector_fma(axis, -turn, vector_scale(radial, axis_length));
-        // at the apex the side has no normal: the axis stands in, as it does for an eye looking at the tip
+        // the apex has no normal: use the axis, the normal that an eye on it would expect
         mask apex = axis_distance == (real)(0);
         normal = vector_normalize(vector_select(apex, axis, gradient));
         real excess = axis_distance - real_divide(fabs(signed_radius), axis_length);
         // along the normal: times the cosine of the half-angle, whose tangent is the slope
         real lean = real_divide((real)(1), real_sqrt(real_fma(slope, slope, (real)(1))));
-        place = vector_fma(normal, -excess * lean, p);
+        position = vector_fma(normal, -excess * lean, p);
     } else {
-        place = vector_fma(radial, radius - axis_distance, p);
+        position = vector_fma(radial, radius - axis_distance, p);
     }
 
     real size = vector_magnitude(p) + vector_magnitude(base) + radius;
-    Patch patch = patch_make(vector_add(place, base), normal, size);
-    if (IS_COMPENSATED) patch_move_to_ray(&patch, ray, t, patch.size);
+    SurfacePoint point = surface_point_make(vector_add(position, base), normal, size);
+    if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, point.size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
-        // of the two surfaces the one whose crossing is nearer to t; at the rim the side
+        // the surface whose crossing is nearer to t; at the rim the side
         real to_slab = real_min(fabs(t - crossings.slab.near), fabs(t - crossings.slab.far));
         real to_side = real_min(fabs(t - crossings.side.near), fabs(t - crossings.side.far));
         mask on_cap = to_slab < to_side;
@@ -324,10 +326,10 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
         Vector end_normal = vector_normalize(axis);
         mask at_base = target == (real)(0);
         end_normal = vector_select(at_base, vector_negate(end_normal), end_normal);
-        Patch cap = patch_make(vector_add(on_plane, base), end_normal, size);
-        patch_keep(&patch, on_cap, &cap);
+        SurfacePoint cap = surface_point_make(vector_add(on_plane, base), end_normal, size);
+        surface_point_replace(&point, on_cap, &cap);
     }
-    return patch;
+    return point;
 }
 
 static inline mask cylinder_hit(const Cylinder *cylinder, const Ray *ray, real *t)
@@ -335,9 +337,9 @@ static inline mask cylinder_hit(const Cylinder *cylinder, const Ray *ray, real *
     return revolution_hit(cylinder, false, ray, t);
 }
 
-static inline Patch cylinder_patch(const Cylinder *cylinder, const Ray *ray, real t)
+static inline SurfacePoint cylinder_surface_point(const Cylinder *cylinder, const Ray *ray, real t)
 {
-    return revolution_patch(cylinder, false, ray, t);
+    return revolution_surface_point(cylinder, false, ray, t);
 }
 
 static inline mask cone_hit(const Cone *cone, const Ray *ray, real *t)
@@ -345,9 +347,9 @@ static inline mask cone_hit(const Cone *cone, const Ray *ray, real *t)
     return revolution_hit(cone, true, ray, t);
 }
 
-static inline Patch cone_patch(const Cone *cone, const Ray *ray, real t)
+static inline SurfacePoint cone_surface_point(const Cone *cone, const Ray *ray, real t)
 {
-    return revolution_patch(cone, true, ray, t);
+    return revolution_surface_point(cone, true, ray, t);
 }
 
 #endif

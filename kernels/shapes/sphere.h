@@ -2,7 +2,7 @@
 #ifndef SPHERE_H
 #define SPHERE_H
 
-#include "numerics/quadratic.h"
+#include "shapes/quadratic.h"
 
 typedef struct {
     real b, c;
@@ -22,21 +22,20 @@ static inline SphereCoefficients sphere_coefficients(PairVector to_center, real 
                                 three.high + real_fma((real)(2), twice_low, low)};
 }
 
-// From rounded b and c, off by 2 u (b^2 + |a c|): right where the line's closest approach is within the
-// sphere's reach.
+// From rounded b and c, off by 2 u (b^2 + |a c|): for rays that start near the closest approach.
 static inline real sphere_discriminant_beside(SphereCoefficients exact, const Ray *ray)
 {
     return product_difference(exact.b, exact.b, ray->squared, exact.c);
 }
 
-// a r^2 - |E|^2 for the line's moment E = f x d, by Lagrange's identity: off by some 10 u a r^2 at any
+// a r^2 - |E|^2 for the line's moment E = f x d (Lagrange's identity): off by some 10 u a r^2 at any
 // distance.
 static inline real sphere_discriminant_afar(Vector moment, real radius, const Ray *ray)
 {
     return real_fma(ray->squared * radius, radius, -vector_dot(moment, moment));
 }
 
-// Takes the better of the two.
+// The more accurate of the two.
 static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, real radius, const Ray *ray)
 {
     real discriminant = sphere_discriminant_afar(moment, radius, ray);
@@ -46,16 +45,16 @@ static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, 
     return discriminant;
 }
 
-// First the textbook's b^2 - a c, divided by a, which keeps it within range however long the direction, with
-// f . f lowered by more than all roundings come to (some 20 u): what it rejects is a miss, at no more cost
-// than the textbook's. Then a ray that leaves outward.
+// Two conservative rejects first. b^2 - a c, divided by a to stay in range for any direction, with f . f
+// lowered by more than all roundings (some 20 u), costs no more than the textbook's test. Then rays that
+// leave the sphere outward.
 //
-// The cheap form measures how far the line passes from the center, l = f - (b / a) d, and is off by about 1.4
-// u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
+// The plain form takes the line's closest point to the center, l = f - (b / a) d, and is off by about
+// 1.4 u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
 // intersection, Ray Tracing Gems, 2019, chapter 7). Within 0.4 radii of the surface c cancels, and both roots
-// with it: up to 21 ulp at 1.1 radii, 3.5 from c rounded once. There b^2 - a c tells hit from miss, too: by
-// l, whose square is off by some 3 u r^2, the horizon of a ground sphere would be torn. The compensated form
-// rounds each number once.
+// with it: up to 21 ulp at 1.1 radii, but 3.5 from c rounded once. There b^2 - a c also decides hit or miss:
+// |l|^2, off by some 3 u r^2, would break the horizon of a ground sphere. The compensated form rounds each
+// number once.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -101,8 +100,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     return hit & (*t > ray->near);
 }
 
-// From the point as seen from the center, or, compensated, from the moment as well, n = (l -+ h d) / r with
-// l = d x E / a and h the root of the discriminant over a: no bits are lost with the distance.
+// The point seen from the center; compensated n = (l -+ h d) / r with l = d x E / a and h the root of the
+// discriminant over a, which loses no bits with distance.
 static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, real t)
 {
     if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, center, t));
@@ -117,15 +116,16 @@ static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, r
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 
-// At `fast` a compiler that rearranges undoes what makes c, and so t next to the surface, exact.
-static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
+// Not at `fast`: a compiler that rearranges loses the exact c, and with it t next to the surface.
+static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);
     real radius = (real)(sphere->center_radius.w);
     Vector normal = sphere_normal(center, radius, ray, t);
-    Patch patch = patch_make(vector_fma(normal, radius, center), normal, radius + vector_magnitude(center));
-    if (!IS_FAST) patch_move_to_ray(&patch, ray, t, patch.size);
-    return patch;
+    SurfacePoint point =
+        surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_magnitude(center));
+    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.size);
+    return point;
 }
 
 #endif

@@ -4,15 +4,15 @@
 // no large numbers: in s, the length along the ray from there, it is
 //     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
 // for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
-// The quartic only tells, by its derivative, where the distance to the surface stops falling or rising;
-// between two such places the distance itself,
+// The quartic's derivative only separates the intervals where the distance to the surface is monotonic;
+// within each the distance itself,
 //     sqrt((rho - R)^2 + z^2) - r,
-// which is exact to a few u where the quartic cancels, is followed to its one zero. All by + - * / sqrt:
+// which is exact to a few u where the quartic cancels, is solved for its one zero. All by + - * / sqrt and
 // bracketing, so that axis-parallel and equatorial rays need no case of their own.
 #ifndef TORUS_H
 #define TORUS_H
 
-#include "traversal/ray.h"
+#include "shapes/surface_point.h"
 
 // The line s -> closest + s direction, |direction| = 1, in the torus' frame.
 typedef struct {
@@ -21,7 +21,7 @@ typedef struct {
     real major, minor;
 } TorusLine;
 
-// From the tube's surface, negative inside it, and how fast that grows along the line.
+// The signed distance to the tube's surface, negative inside, and its derivative along the line.
 static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
     Vector radial = vector_fma(line->turn, s, line->across);
@@ -41,7 +41,7 @@ static inline real torus_cubic(real p, real q, real s, real *slope)
     return real_fma(real_fma((real)(4) * s, s, p + p), s, q);
 }
 
-// The next guess within a bracket: Newton's where it lies inside, else the middle.
+// The next iterate within a bracket: Newton's step if it lies inside, else the middle.
 static inline real bracket_next(real low, real high, real s, real value, real slope)
 {
     mask usable = fabs(value) * (real)(SMALLEST_RATIO) < fabs(slope);
@@ -50,8 +50,7 @@ static inline real bracket_next(real low, real high, real s, real value, real sl
     return lanes_select(inside, newton, (real)(0.5f) * (low + high));
 }
 
-// The cubic's zero between low and high, where it has different signs at the ends; else the end that is
-// nearer to one.
+// The cubic's zero between low and high if its signs differ there; else the end where it is nearer to 0.
 static inline real torus_turning_point(real p, real q, real low, real high)
 {
     real slope;
@@ -70,7 +69,7 @@ static inline real torus_turning_point(real p, real q, real low, real high)
     return lanes_select(crosses, s, end);
 }
 
-// The distance's zero between two places where it has different signs.
+// The zero of the distance in a bracket where its signs differ.
 static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
 {
     real s = (real)(0.5f) * (low + high);
@@ -87,7 +86,7 @@ static inline real torus_zero(const TorusLine *line, real low, real high, mask e
     return s;
 }
 
-// The ray's closest approach to the center, seen from there, and its t.
+// The ray's closest point to the center, relative to the center, and its t.
 static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *closest_t)
 {
     Vector center = vector_of(torus->center_major);
@@ -103,24 +102,24 @@ static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *clo
     return vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
 }
 
-// The line's places, from where it enters the ball around the torus to where it leaves it: between any two
-// neighbors the distance has at most one zero. They are where the quartic's derivative has its zeros, which
-// its own turning points, at +-sqrt(-p / 6), keep apart.
-enum { TORUS_PLACES = 5 };
+// The ends of the line in the bounding sphere, and in between the zeros of the quartic's derivative: between
+// neighbors the distance has at most one zero. The derivative's turning points, +-sqrt(-p / 6), separate its
+// zeros.
+enum { TORUS_BREAKS = 5 };
 
-static inline void torus_places(const TorusLine *line, real squared_distance, real span,
-                                real places[TORUS_PLACES])
+static inline void torus_breaks(const TorusLine *line, real squared_distance, real span,
+                                real breaks[TORUS_BREAKS])
 {
     real k = real_fma(line->major, line->major, squared_distance) - line->minor * line->minor;
     real squared_major = line->major * line->major;
     real p = real_fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
     real q = (real)(8) * squared_major * line->height * line->rise;
     real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
-    places[0] = -span;
-    places[1] = torus_turning_point(p, q, -span, -bend);
-    places[2] = torus_turning_point(p, q, -bend, bend);
-    places[3] = torus_turning_point(p, q, bend, span);
-    places[4] = span;
+    breaks[0] = -span;
+    breaks[1] = torus_turning_point(p, q, -span, -bend);
+    breaks[2] = torus_turning_point(p, q, -bend, bend);
+    breaks[3] = torus_turning_point(p, q, bend, span);
+    breaks[4] = span;
 }
 
 static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
@@ -143,19 +142,19 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
                       vector_dot(direction, axis),
                       major,
                       minor};
-    real places[TORUS_PLACES];
-    torus_places(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), places);
+    real breaks[TORUS_BREAKS];
+    torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
 
     real start = (ray->near - closest_t) * real_sqrt(ray->squared); // of the ray, as s
     real slope, found_s = (real)(LARGEST);
-    real before = torus_distance(&line, places[0], &slope);
+    real before = torus_distance(&line, breaks[0], &slope);
     mask found = mask_none();
-    for (uint i = 0; i + 1 < TORUS_PLACES; i++) {
-        real after = torus_distance(&line, places[i + 1], &slope);
+    for (uint i = 0; i + 1 < TORUS_BREAKS; i++) {
+        real after = torus_distance(&line, breaks[i + 1], &slope);
         mask entering = before > (real)(0);
-        mask crosses = hit & !found & (entering != (after > (real)(0))) & (places[i + 1] > start);
+        mask crosses = hit & !found & (entering != (after > (real)(0))) & (breaks[i + 1] > start);
         if (lanes_any(crosses)) {
-            real s = torus_zero(&line, places[i], places[i + 1], entering);
+            real s = torus_zero(&line, breaks[i], breaks[i + 1], entering);
             mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->near);
             found_s = lanes_select(first, s, found_s);
             found = found | first;
@@ -166,7 +165,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     return found;
 }
 
-static inline Patch torus_patch(const Torus *torus, const Ray *ray, real t)
+static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ray, real t)
 {
     Vector center = vector_of(torus->center_major), axis = vector_of(torus->axis_minor);
     real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
@@ -176,7 +175,7 @@ static inline Patch torus_patch(const Torus *torus, const Ray *ray, real t)
     Vector from_circle = vector_fma(radial, -major, p); // from the nearest point of the circle
     Vector normal = vector_normalize(from_circle);
     Vector position = vector_fma(normal, minor, vector_fma(radial, major, center));
-    return patch_make(position, normal, major + minor + vector_magnitude(center));
+    return surface_point_make(position, normal, major + minor + vector_magnitude(center));
 }
 
 #endif

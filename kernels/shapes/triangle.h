@@ -1,7 +1,7 @@
-// Triangle, watertight: a ray that meets an edge or a vertex shared by triangles meets one of them.
+// Triangle, watertight: a ray through an edge or a vertex that triangles share hits at least one of them.
 //
-// Vertices are taken from the ray's start and turned into a frame whose third axis is the ray; the same
-// vertex gives the same numbers in every triangle. There the signs of three edge functions decide, and
+// Vertices relative to the ray's start are rotated into a frame whose third axis is the ray; a shared vertex
+// gives the same numbers in every triangle. There the signs of three edge functions decide, and
 // product_difference has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
 // JCGT 2(1), 2013; they shear along the direction's largest axis and fall back to double precision where an
 // edge function is 0).
@@ -10,7 +10,7 @@
 
 #include "shapes/plane.h"
 
-// A triangle's three vertices, or what belongs to them. Lanes may have triangles of their own.
+// A triangle's three vertices, or their attributes. Lanes may have different triangles.
 typedef struct {
     Vector a, b, c;
 } Corners;
@@ -56,9 +56,46 @@ static inline Vector triangle_normal(const Triangle *triangle)
     return (Vector){(real)(triangle->a.w), (real)(triangle->b.w), (real)(triangle->c.w)};
 }
 
-// The distance of the triangle's plane. Seen at a low angle both products with the normal cancel, hence twice
-// the precision; compensated, the normal itself is in pairs.
-static inline real triangle_plane_distance(const Triangle *triangle, const Ray *ray, real otherwise)
+// t = height / along is computed in up to three steps, each for the lanes that the one before it leaves. All
+// errors are relative; boxes of the BVH allow 64 u.
+//
+//   plain      products with the stored normal                        30 u where well conditioned
+//   accurate   the same products in twice the precision               5 u / sine of the angle to the plane
+//   clamped    the accurate t between the vertices' and in their box  any angle, edge-on included
+//
+// The compensated precisions start at the second step; double always ends at the third.
+
+// The plain step. Each product is off by at most 2 u of its factors' lengths, u of itself, and u each for the
+// rounding of `to_plane`, from the ray's start to a vertex, and of the normal; by 4 u where the height nearly
+// vanishes.
+typedef struct {
+    real height, along;
+    mask behind;           // the plane lies behind the ray's start
+    mask well_conditioned; // both products exceed a quarter of their factors' lengths
+} TrianglePlane;
+
+static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_plane, const Ray *ray)
+{
+    Vector normal = triangle_normal(triangle);
+    real normal_squared =
+        (real)(triangle->a.w * triangle->a.w + triangle->b.w * triangle->b.w + triangle->c.w * triangle->c.w);
+    const real quarter_squared = (real)(0x1p-4f);
+    const real error_squared = (real)(16 * UNIT_ROUNDOFF * UNIT_ROUNDOFF);
+    TrianglePlane plane;
+    plane.along = vector_dot(normal, ray->direction);
+    plane.height = vector_dot(normal, to_plane);
+    real height_squared = plane.height * plane.height,
+         largest_squared = normal_squared * vector_dot(to_plane, to_plane);
+    mask faced = plane.along * plane.along > quarter_squared * normal_squared * ray->squared;
+    plane.behind =
+        faced & (plane.along * plane.height < (real)(0)) & (height_squared > error_squared * largest_squared);
+    plane.well_conditioned = faced & (height_squared > quarter_squared * largest_squared);
+    return plane;
+}
+
+// The accurate step. At a low angle both products cancel; compensated, the normal itself is in pairs.
+// `in_plane` is the t of rays in the triangle's plane.
+static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray, real in_plane)
 {
     Vector a = vector_of(triangle->a);
     real along, height;
@@ -76,10 +113,10 @@ static inline real triangle_plane_distance(const Triangle *triangle, const Ray *
         height = vector_dot_exactly(normal, vector_subtract(a, ray->origin));
     }
     mask crosses = fabs(height) * (real)(SMALLEST_RATIO) < fabs(along);
-    return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), otherwise);
+    return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), in_plane);
 }
 
-// Where the ray lies between the vertices, and a little beyond them, along one axis.
+// The interval of t between the vertices' least and largest coordinate on one axis, widened by the slack.
 static inline Roots triangle_slab(real a, real b, real c, real slack, real inverse)
 {
     real low = (real_min(real_min(a, b), c) - slack) * inverse;
@@ -87,7 +124,7 @@ static inline Roots triangle_slab(real a, real b, real c, real slack, real inver
     return (Roots){real_min(low, high), real_max(low, high)};
 }
 
-// The largest of their coordinates along each axis.
+// The largest |coordinate| on each axis.
 static inline Vector corners_reach(Corners corners)
 {
     Vector a = corners.a, b = corners.b, c = corners.c;
@@ -96,75 +133,45 @@ static inline Vector corners_reach(Corners corners)
                     real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
 }
 
-static inline real roots_hold(Roots roots, real t)
+static inline real roots_clamp(Roots roots, real t)
 {
     return real_min(real_max(t, roots.near), roots.far);
 }
 
-// A triangle seen edge-on would else be hit far outside itself: the edge functions do not know of the
-// distance, whose error grows as the angle gets lower. It is held between the vertices' distances, and within
-// their box, since the hierarchy looks for hits in boxes alone: its own are larger by four times this slack.
-static inline real triangle_distance_held(const TriangleEdges *edges, const Ray *ray, real plane_t)
+// The clamped step. Edge-on the error of t is unbounded, while the edge functions, which know nothing of t,
+// still report a hit. Clamping to the vertices' own t and to their box keeps that hit on the triangle and
+// within the boxes of the BVH, whose slack is four times this one.
+static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray, real accurate_t)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
     Vector reach = corners_reach((Corners){a, b, c});
     real slack = (real)(16 * UNIT_ROUNDOFF) * vector_magnitude(reach);
-    real t = plane_t;
-    t = roots_hold(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
-    t = roots_hold(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
-    t = roots_hold(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
-    // each of the vertices' distances is off by a few roundings of the largest product in it
+    real t = accurate_t;
+    t = roots_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
+    t = roots_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
+    t = roots_clamp(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
+    // the vertices' t are off by a few roundings of the largest product in them
     Vector along = ray->along;
     real off = (real)(4 * UNIT_ROUNDOFF) *
                (reach.x * fabs(along.x) + reach.y * fabs(along.y) + reach.z * fabs(along.z));
     real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
-    return roots_hold(
+    return roots_clamp(
         (Roots){real_min(real_min(a_t, b_t), c_t) - off, real_max(real_max(a_t, b_t), c_t) + off}, t);
 }
 
-// What plain products with the normal tell: each is off by at most 2 u of its factors' lengths and u of
-// itself, and by u each for the way's rounding and the normal's: where the height nearly vanishes, by 4 u. A
-// quotient of two that are settled is within 30 u, less than half of what boxes allow.
-typedef struct {
-    real along, height; // with the direction, and with the way from the start to the plane
-    mask behind;        // the plane lies behind the start
-    mask settled; // height / along is exact enough: both are more than a quarter of their factors' lengths
-} TriangleView;
-
-static inline TriangleView triangle_view(const Triangle *triangle, Vector way, const Ray *ray)
+// The second and the third step.
+static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdges *edges, const Ray *ray,
+                                     mask hit)
 {
-    Vector normal = triangle_normal(triangle);
-    real normal_squared =
-        (real)(triangle->a.w * triangle->a.w + triangle->b.w * triangle->b.w + triangle->c.w * triangle->c.w);
-    const real quarter_squared = (real)(0x1p-4f);
-    const real error_squared = (real)(16 * UNIT_ROUNDOFF * UNIT_ROUNDOFF);
-    TriangleView view;
-    view.along = vector_dot(normal, ray->direction);
-    view.height = vector_dot(normal, way);
-    real height_squared = view.height * view.height, largest_squared = normal_squared * vector_dot(way, way);
-    mask faced = view.along * view.along > quarter_squared * normal_squared * ray->squared;
-    view.behind =
-        faced & (view.along * view.height < (real)(0)) & (height_squared > error_squared * largest_squared);
-    view.settled = faced & (height_squared > quarter_squared * largest_squared);
-    return view;
-}
-
-// Of any triangle.
-static inline real triangle_distance_careful(const Triangle *triangle, const TriangleEdges *edges,
-                                             const Ray *ray, mask hit)
-{
-    // in the triangle's own plane any place of it will do
-    real otherwise = vector_dot(edges->a, ray->along);
-    real t = triangle_plane_distance(triangle, ray, otherwise);
-    mask held = hit;
-    // At other angles, of a sine of 1/4 or more since the normal's square is 3 at most, the distance is
-    // within 5 u over that sine, a third of what boxes allow. A needle's normal may be worse than that in
-    // double.
+    real t = triangle_t_accurate(triangle, ray, vector_dot(edges->a, ray->along));
+    // Above a sine of 1/4 (the normal's square is 3 at most) the accurate t is within a third of the boxes'
+    // slack. In double a needle's normal may be worse.
+    mask grazing = hit;
     if (!IS_DOUBLE) {
         real facing = vector_dot(triangle_normal(triangle), ray->direction);
-        held = held & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
+        grazing = grazing & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
     }
-    if (lanes_any(held)) t = lanes_select(held, triangle_distance_held(edges, ray, t), t);
+    if (lanes_any(grazing)) t = lanes_select(grazing, triangle_t_clamped(edges, ray, t), t);
     return t;
 }
 
@@ -174,23 +181,22 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     const real zero = (real)(0);
     mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
     mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
-    // both where all are 0
-    mask hit = RAY_ACTIVE(ray) & (all_positive ^ all_negative);
+    mask hit = RAY_ACTIVE(ray) & (all_positive ^ all_negative); // if all are 0, no hit
     if (!lanes_any(hit)) return hit;
-    mask careful = hit;
+    mask remaining = hit;
     if (!IS_COMPENSATED) {
-        TriangleView view = triangle_view(triangle, edges.a, ray);
-        hit = hit & !(view.behind & (ray->near >= zero));
+        TrianglePlane plane = triangle_plane(triangle, edges.a, ray);
+        hit = hit & !(plane.behind & (ray->near >= zero));
         if (!lanes_any(hit)) return hit;
-        careful = hit & !view.settled;
-        *t = real_divide(view.height, lanes_select(view.settled, view.along, (real)(1)));
+        remaining = hit & !plane.well_conditioned;
+        *t = real_divide(plane.height, lanes_select(plane.well_conditioned, plane.along, (real)(1)));
     }
-    if (lanes_any(careful))
-        *t = lanes_select(careful, triangle_distance_careful(triangle, &edges, ray, careful), *t);
+    if (lanes_any(remaining))
+        *t = lanes_select(remaining, triangle_t_robust(triangle, &edges, ray, remaining), *t);
     return hit & (*t > ray->near);
 }
 
-// How much of each vertex the point has where the ray meets the triangle.
+// Barycentric coordinates of the hit point.
 typedef struct {
     real a, b, c;
 } TriangleWeights;
@@ -209,33 +215,33 @@ static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
                       vector_fma(corners.b, weights.b, vector_scale(corners.c, weights.c)));
 }
 
-// Where the ray meets the triangle, its normal of any length.
-static inline Patch triangle_crossing_patch(Corners corners, Vector normal, TriangleWeights weights,
-                                            const Ray *ray, real t)
+// The hit point, blended from the vertices. The normal may have any length.
+static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
+                                                 const Ray *ray, real t)
 {
     Vector unit = vector_normalize(normal), reach = corners_reach(corners);
-    Patch patch = patch_make(triangle_blend(weights, corners), unit, vector_magnitude_along(unit, reach));
+    SurfacePoint point =
+        surface_point_make(triangle_blend(weights, corners), unit, vector_magnitude_along(unit, reach));
     if (IS_COMPENSATED) {
         real magnitude = real_max(real_max(vector_magnitude(corners.a), vector_magnitude(corners.b)),
                                   vector_magnitude(corners.c));
-        patch_move_to_ray(&patch, ray, t, magnitude);
+        surface_point_move_to_ray(&point, ray, t, magnitude);
     }
-    return patch;
+    return point;
 }
 
-static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
+static inline SurfacePoint triangle_surface_point(const Triangle *triangle, const Ray *ray, real t)
 {
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
-    return triangle_crossing_patch(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray,
-                                   t);
+    return corners_surface_point(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray, t);
 }
 
-// Bends the shading normal between the vertices' own; where these are all 0 the triangle is flat.
-static inline void triangle_smooth(Corners normals, TriangleWeights weights, Patch *patch)
+// Interpolates the shading normal from the vertices'; a triangle whose are all 0 is flat.
+static inline void triangle_smooth(Corners normals, TriangleWeights weights, SurfacePoint *point)
 {
     Vector normal = triangle_blend(weights, normals);
     mask bends = vector_dot(normal, normal) > (real)(0);
-    patch->shading_normal = vector_select(bends, vector_normalize(normal), patch->normal);
+    point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
 #endif

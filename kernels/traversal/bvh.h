@@ -103,7 +103,7 @@ typedef struct {
 enum { BEAM_LEAST, BEAM_MOST = 3, BEAM_NEAR = 6, BEAM_LIMIT };
 enum { BEAM_START, BEAM_END = 3 };
 typedef struct {
-    Leasts ways, origins;
+    LaneMinima ways, origins;
 } BeamLeasts;
 
 static inline void beam_axis_gather(BeamLeasts *leasts, uint axis, mask members, real origin, real inverse,
@@ -142,10 +142,10 @@ static inline Beam beam_make(const BoxRays *rays, const Ray *ray, uint lanes, re
     beam_axis_gather(&leasts, 2, members, ray->origin.z, rays->inverse.z, rays->slack, negative_z);
     leasts.ways.all[BEAM_NEAR] = lanes_select(members, rays->near, none);
     leasts.ways.all[BEAM_LIMIT] = lanes_select(members, -limit, none);
-    for (uint i = BEAM_END + 3; i < LEASTS; i++)
+    for (uint i = BEAM_END + 3; i < MINIMA_COUNT; i++)
         leasts.origins.all[i] = none;
-    leasts_find(&leasts.ways);
-    leasts_find(&leasts.origins);
+    lane_minima_reduce(&leasts.ways);
+    lane_minima_reduce(&leasts.origins);
     Beam beam;
     beam.near = leasts.ways.each[BEAM_NEAR];
     // where one does look there, the beam is all of space, unless it is a single ray
@@ -249,7 +249,7 @@ static inline integer laid_rays_meet(LaidRays *laid, const BoxRays *rays, uint l
     integer met_by = (integer)(0);
     *near = (real)(LARGEST);
     for (; lanes != 0; lanes &= lanes - 1) {
-        uint lane = bit_lowest(lanes);
+        uint lane = lowest_bit(lanes);
         real its_near;
         mask its = laid_ray_meets(&laid->rays, lane, boxes, limits.each[lane], &its_near);
         met_by = lanes_select(its, met_by | (integer)((scalar_integer)1 << lane), met_by);

@@ -1,4 +1,4 @@
-// Rays, their hits, and what a surface looks like where one is hit.
+// Rays and hits.
 #ifndef RAY_H
 #define RAY_H
 
@@ -11,12 +11,12 @@ typedef struct {
     real squared;             // direction . direction
     real inverse_squared;
     real near, far; // hits lie strictly between
-    mask active;    // the lanes that carry a ray at all
-    real travelled; // from the eye to the origin, for pictures on surfaces
-    // APEX_…: all lanes' lines pass through one point, within u |direction|; at `fast`, whose compiler may
-    // take the direction apart, within u of the origin
+    mask active;    // lanes that carry a ray
+    real travelled; // distance from the eye to the origin, for texture filtering
+    // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|; at `fast`, whose
+    // compiler may rearrange how the direction was computed, within u of the origin
     uint common_origin;
-    real apex_slack; // what cull_spheres count as larger by for the direction's sake
+    real cull_slack; // enlarges cull spheres by the rounding of the direction
     // by ray_make_frame: 1 / direction, huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
@@ -29,18 +29,14 @@ typedef struct {
     integer object; // its id; -1: nothing hit
 } Hit;
 
-// A point of a surface. `size` is the magnitude of the numbers the point was computed from: its distance from
-// the true surface is below 16 u size + 4 u |position|.
-typedef struct {
-    Vector position;
-    Vector normal;         // unit, of the geometry, either side
-    Vector shading_normal; // unit; differs on smooth triangles
-    real size;
-} Patch;
-
-// A mask from memory, compared anew: then LLVM sees that a bit tells all of a lane, and keeps in mask
-// registers what is made of it. Of a function's result it does not.
+// Compares the mask from memory with 0 anew: LLVM then sees that a lane is all ones or all zeros, and keeps
+// what derives from it in mask registers. Of a function's result it does not.
 #define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
+
+static inline mask hit_found(const Hit *hit)
+{
+    return hit->object >= (integer)(0);
+}
 
 static inline real real_inverse_or_zero(real a)
 {
@@ -48,9 +44,9 @@ static inline real real_inverse_or_zero(real a)
     return lanes_select(zero, (real)(0), real_divide((real)(1), lanes_select(zero, (real)(1), a)));
 }
 
-// 1 / a, huge for 0: the product with a distance then tells its sign. One Newton step makes what a device
-// divides inexactly nearly exact, and exact for powers of two: a box's face is where it is for rays along an
-// axis. The hierarchy can do without.
+// 1 / a, huge for 0, so that its product with a distance keeps the sign. A Newton step makes inexact device
+// division nearly exact, and exact for powers of two: rays along an axis hit a box exactly at its face. BVH
+// boxes, which have slack, do without.
 static inline real real_inverse_or_huge(real a)
 {
     mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
@@ -60,9 +56,9 @@ static inline real real_inverse_or_huge(real a)
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
 
-// Two vectors across another, as long as each other and at right angles, without a branch (Duff et al.,
-// Building an orthonormal basis, revisited, JCGT 6(1), 2017, listing 3; here multiplied by length (length +
-// |z|), which spares the divisions).
+// Two vectors perpendicular to d and to each other, of equal length, without a branch (Duff et al., Building
+// an orthonormal basis, revisited, JCGT 6(1), 2017, listing 3; here times |d| (|d| + |z|), which spares the
+// divisions).
 static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
     real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
@@ -84,14 +80,13 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     ray.travelled = (real)(0);
     ray.common_origin = COMMON_ORIGIN_NONE;
     ray.active = active & (ray.squared > (real)(0));
-    // 0 in lanes without a ray: then of spheres only one around the origin looks closer at them
+    // 0 in inactive lanes: only a sphere around the origin still examines them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
     return ray;
 }
 
-// What boxes, triangles and the hierarchy ask for: rays have it where there are any of those outside the
-// hierarchy, or once they come near the hierarchy.
+// Computes what boxes, triangles and the BVH need, once rays reach the BVH or a box or triangle outside it.
 static inline void ray_make_frame(Ray *ray)
 {
     Vector d = ray->direction;
@@ -102,8 +97,8 @@ static inline void ray_make_frame(Ray *ray)
     ray->along = vector_scale(d, ray->inverse_squared);
 }
 
-// Without an end, along a direction that is unit, or 0: its square is 1 + e with e of a few u, one over that
-// is 1 - e but for the square of e.
+// A ray without far end whose direction is unit, or 0. Its square is 1 + e with e of a few u; the reciprocal
+// is 1 - e within e^2.
 static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 {
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
@@ -112,31 +107,30 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     return ray;
 }
 
-// Once it is settled which lanes carry a ray: those that do not miss all.
-static inline void ray_take_apex(Ray *ray, uint common_origin)
+// Call once ray->active is final: inactive lanes miss every cull sphere.
+static inline void ray_set_common_origin(Ray *ray, uint common_origin)
 {
     ray->common_origin = common_origin;
     real slack = (real)(CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
-    if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // where rays start
-    ray->apex_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
+    if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // rays start exactly there
+    ray->cull_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
 }
 
-// The lines that certainly miss a ball, for rays with an common_origin. A line along d through a point misses
-// a ball around v, seen from there, if (v . d)^2 < p d^2 for the point's power p = v^2 - r^2. The ball counts
-// as larger by 64 u (|v| + |d|): by what a test of the shape in it may be off, by roundings here, and by the
-// line's own way past the common_origin. That is less than 256 u v^2, which p has been lowered by, and 128 u
-// d^2; rays from the eye start there, and need the former alone.
-static inline mask ray_misses_cull_sphere(const Ray *ray, global const CullSphere *ball)
+// Conservative bounding-sphere cull: the lanes whose lines certainly miss it. A line along d through a common
+// origin misses a sphere around v, seen from there, if (v . d)^2 < p d^2 for the origin's power p = v^2 -
+// r^2. The sphere is enlarged by 64 u (|v| + |d|), for the error of the shape's own test, the roundings here
+// and the line's distance from the common origin. That is less than 256 u v^2, which p is lowered by, plus
+// 128 u d^2, the cull slack; rays from the eye start there and need only the former.
+static inline mask ray_misses_cull_sphere(const Ray *ray, global const CullSphere *sphere)
 {
-    global const scalar *center_power = (global const scalar *)ball;
+    global const scalar *center_power = (global const scalar *)sphere;
     real along = real_fma(
         (real)(center_power[0]), ray->direction.x,
         real_fma((real)(center_power[1]), ray->direction.y, (real)(center_power[2]) * ray->direction.z));
-    return real_fma(along, along, ray->apex_slack) < ray->squared * (real)(center_power[3]);
+    return real_fma(along, along, ray->cull_slack) < ray->squared * (real)(center_power[3]);
 }
 
-// The nearer of two crossings, near_t <= far_t, that lies beyond the ray's start: far_t where near_t lies
-// before it.
+// The nearer of two crossings, near_t <= far_t, beyond the ray's start: far_t if near_t lies before it.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {
     return lanes_select(near_t > ray->near, near_t, far_t);
@@ -150,11 +144,11 @@ static inline Vector ray_point(const Ray *ray, real t)
 // start + direction t, rounded about once.
 static inline real ray_coordinate(Pair start, real direction, real t)
 {
-    Pair way = pair_product(direction, t), sum = pair_sum(start.high, way.high);
-    return sum.high + (sum.low + (start.low + way.low));
+    Pair offset = pair_product(direction, t), sum = pair_sum(start.high, offset.high);
+    return sum.high + (sum.low + (start.low + offset.low));
 }
 
-// The same point as seen from another; compensated, it is as exact as t is, however far the ray has come.
+// ray_point minus `from`; compensated, as exact as t is, at any distance.
 static inline Vector ray_point_from(const Ray *ray, Vector from, real t)
 {
     if (!IS_COMPENSATED) return vector_fma(ray->direction, t, vector_subtract(ray->origin, from));
@@ -162,35 +156,6 @@ static inline Vector ray_point_from(const Ray *ray, Vector from, real t)
     return (Vector){ray_coordinate(start.x, ray->direction.x, t),
                     ray_coordinate(start.y, ray->direction.y, t),
                     ray_coordinate(start.z, ray->direction.z, t)};
-}
-
-static inline Patch patch_make(Vector position, Vector normal, real size)
-{
-    return (Patch){position, normal, normal, size};
-}
-
-// Puts the point where the ray is at t, if origin and way there are far smaller than the numbers of the
-// shape, of that magnitude, which its own form would lose bits to: on a planet, meters. For shapes whose t is
-// then exact enough: off by at most 13 u of origin and way along the normal (of a sphere at `single` with a
-// device's worst quotients and roots; 3 u without) and, from what the sums of exact products still lose, 6
-// u^2 of the size.
-static inline void patch_move_to_ray(Patch *patch, const Ray *ray, real t, real magnitude)
-{
-    real way = vector_magnitude(ray->direction) * fabs(t), limit = magnitude * (real)(0x1p-4f);
-    if (RARELY(lanes_any(way < limit))) {
-        real reach = vector_magnitude(ray->origin) + way;
-        mask beside = reach < limit;
-        patch->position = vector_select(beside, ray_point(ray, t), patch->position);
-        patch->size = lanes_select(beside, real_fma((real)(UNIT_ROUNDOFF), magnitude, reach), patch->size);
-    }
-}
-
-static inline void patch_keep(Patch *patch, mask where, const Patch *other)
-{
-    patch->position = vector_select(where, other->position, patch->position);
-    patch->normal = vector_select(where, other->normal, patch->normal);
-    patch->shading_normal = vector_select(where, other->shading_normal, patch->shading_normal);
-    patch->size = lanes_select(where, other->size, patch->size);
 }
 
 #endif

@@ -23,7 +23,7 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
 }
 
 // The face of the axis on which the point lies farthest out, as a part of the box.
-static inline Patch box_patch(const Box *box, const Ray *ray, real t)
+static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
     Vector point = ray_point(ray, t);
@@ -37,7 +37,7 @@ static inline Patch box_patch(const Box *box, const Ray *ray, real t)
     const real zero = (real)(0);
     Vector normal = {lanes_select(on_x, sign(out.x), zero), lanes_select(on_y, sign(out.y), zero),
                      lanes_select(on_z, sign(out.z), zero)};
-    return patch_make(point, normal, TEXTBOOK_SIZE);
+    return surface_point_make(point, normal, TEXTBOOK_SIZE);
 }
 
 #endif

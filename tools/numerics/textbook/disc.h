@@ -13,9 +13,9 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     return hit & (vector_dot(from_center, from_center) <= radius * radius);
 }
 
-static inline Patch disc_patch(const Disc *disc, const Ray *ray, real t)
+static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, real t)
 {
-    return patch_make(ray_point(ray, t), vector_normalize(vector_of(disc->normal)), TEXTBOOK_SIZE);
+    return surface_point_make(ray_point(ray, t), vector_normalize(vector_of(disc->normal)), TEXTBOOK_SIZE);
 }
 
 #endif

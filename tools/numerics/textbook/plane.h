@@ -17,10 +17,10 @@ static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
     return plane_crossing(vector_of(plane->point), vector_of(plane->normal), ray, t);
 }
 
-static inline Patch plane_patch(const Plane *plane, const Ray *ray, real t)
+static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ray, real t)
 {
     Vector unit = vector_scale(vector_of(plane->normal), (real)(plane->normal.w));
-    return patch_make(ray_point(ray, t), unit, TEXTBOOK_SIZE);
+    return surface_point_make(ray_point(ray, t), unit, TEXTBOOK_SIZE);
 }
 
 #endif

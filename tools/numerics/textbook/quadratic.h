@@ -2,9 +2,9 @@
 #ifndef QUADRATIC_H
 #define QUADRATIC_H
 
-#include "ray.h"
+#include "surface_point.h"
 
-// A patch of this size has its secondary rays start 0.0001 off the surface, the books' constant.
+// Secondary rays of a point of this size start 0.0001 off the surface, the books' constant.
 #define TEXTBOOK_SIZE ((real)(1e-4f / (32 * UNIT_ROUNDOFF)))
 
 typedef struct {

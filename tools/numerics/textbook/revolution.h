@@ -68,7 +68,8 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     return nearest.found;
 }
 
-static inline Patch revolution_patch(const Revolution *shape, bool sloped, const Ray *ray, real t)
+static inline SurfacePoint revolution_surface_point(const Revolution *shape, bool sloped, const Ray *ray,
+                                                    real t)
 {
     RevolutionBody body = revolution_body(shape);
     Vector point = ray_point(ray, t);
@@ -83,7 +84,7 @@ static inline Patch revolution_patch(const Revolution *shape, bool sloped, const
         normal = vector_select(at_base, vector_negate(body.axis), normal);
         normal = vector_select(at_end, body.axis, normal);
     }
-    return patch_make(point, normal, TEXTBOOK_SIZE);
+    return surface_point_make(point, normal, TEXTBOOK_SIZE);
 }
 
 static inline mask cylinder_hit(const Cylinder *cylinder, const Ray *ray, real *t)
@@ -91,9 +92,9 @@ static inline mask cylinder_hit(const Cylinder *cylinder, const Ray *ray, real *
     return revolution_hit(cylinder, false, ray, t);
 }
 
-static inline Patch cylinder_patch(const Cylinder *cylinder, const Ray *ray, real t)
+static inline SurfacePoint cylinder_surface_point(const Cylinder *cylinder, const Ray *ray, real t)
 {
-    return revolution_patch(cylinder, false, ray, t);
+    return revolution_surface_point(cylinder, false, ray, t);
 }
 
 static inline mask cone_hit(const Cone *cone, const Ray *ray, real *t)
@@ -101,9 +102,9 @@ static inline mask cone_hit(const Cone *cone, const Ray *ray, real *t)
     return revolution_hit(cone, true, ray, t);
 }
 
-static inline Patch cone_patch(const Cone *cone, const Ray *ray, real t)
+static inline SurfacePoint cone_surface_point(const Cone *cone, const Ray *ray, real t)
 {
-    return revolution_patch(cone, true, ray, t);
+    return revolution_surface_point(cone, true, ray, t);
 }
 
 #endif

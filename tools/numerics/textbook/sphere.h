@@ -18,12 +18,12 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     return hit & (*t > ray->near);
 }
 
-static inline Patch sphere_patch(const Sphere *sphere, const Ray *ray, real t)
+static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector point = ray_point(ray, t);
     Vector normal = vector_scale(vector_subtract(point, vector_of(sphere->center_radius)),
                                  (real)(1 / sphere->center_radius.w));
-    return patch_make(point, normal, TEXTBOOK_SIZE);
+    return surface_point_make(point, normal, TEXTBOOK_SIZE);
 }
 
 #endif

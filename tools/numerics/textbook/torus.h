@@ -80,7 +80,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     return nearest.found;
 }
 
-static inline Patch torus_patch(const Torus *torus, const Ray *ray, real t)
+static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ray, real t)
 {
     Vector axis = vector_of(torus->axis_minor);
     real major = (real)(torus->center_major.w);
@@ -88,7 +88,7 @@ static inline Patch torus_patch(const Torus *torus, const Ray *ray, real t)
     Vector p = vector_subtract(point, vector_of(torus->center_major));
     Vector radial = vector_normalize(vector_fma(axis, -vector_dot(p, axis), p));
     Vector normal = vector_normalize(vector_fma(radial, -major, p));
-    return patch_make(point, normal, TEXTBOOK_SIZE);
+    return surface_point_make(point, normal, TEXTBOOK_SIZE);
 }
 
 #endif

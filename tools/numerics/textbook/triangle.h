@@ -5,7 +5,7 @@
 
 #include "plane.h"
 
-// How much of each vertex the point has where the ray meets the triangle.
+// Barycentric coordinates of the hit point.
 typedef struct {
     real a, b, c;
 } TriangleWeights;
@@ -69,24 +69,23 @@ static inline Vector triangle_normal(const Triangle *triangle)
     return vector_cross(ab, ac);
 }
 
-static inline Patch triangle_crossing_patch(Corners corners, Vector normal, TriangleWeights weights,
-                                            const Ray *ray, real t)
+static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
+                                                 const Ray *ray, real t)
 {
-    return patch_make(ray_point(ray, t), vector_normalize(normal), TEXTBOOK_SIZE);
+    return surface_point_make(ray_point(ray, t), vector_normalize(normal), TEXTBOOK_SIZE);
 }
 
-static inline Patch triangle_patch(const Triangle *triangle, const Ray *ray, real t)
+static inline SurfacePoint triangle_surface_point(const Triangle *triangle, const Ray *ray, real t)
 {
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
-    return triangle_crossing_patch(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray,
-                                   t);
+    return corners_surface_point(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray, t);
 }
 
-static inline void triangle_smooth(Corners normals, TriangleWeights weights, Patch *patch)
+static inline void triangle_smooth(Corners normals, TriangleWeights weights, SurfacePoint *point)
 {
     mask flat = vector_dot(normals.a, normals.a) == (real)(0);
     Vector normal = vector_normalize(triangle_blend(weights, normals));
-    patch->shading_normal = vector_select(flat, patch->normal, normal);
+    point->shading_normal = vector_select(flat, point->normal, normal);
 }
 
 #endif

@@ -2,16 +2,16 @@
 #ifndef QUADRATIC_H
 #define QUADRATIC_H
 
-#include "traversal/ray.h"
+#include "shapes/surface_point.h"
 
 typedef struct {
     real near, far; // near <= far
 } Roots;
 
-// For a = ray->squared, the first root beyond the ray's start, or the far one if only that counts. Without
+// For a = ray->squared, the first root beyond the ray's start, or the far one if only_far. Without
 // cancellation: q = -(b + sign(b) sqrt d), roots c / q and q / a (Press et al., Numerical Recipes, 5.6; here
-// with half of b); d < 0 counts as 0. From outside the first is c / q, and q / a is left out where no lane
-// asks.
+// with half of b); d < 0 counts as 0. From outside the first root is c / q; q / a is computed only if a lane
+// needs it.
 static inline real quadratic_first_root(const Ray *ray, real b, real c, real d, bool only_far)
 {
     real root = real_sqrt(real_max(d, (real)(0)));
@@ -19,7 +19,7 @@ static inline real quadratic_first_root(const Ray *ray, real b, real c, real d, 
     real q = lanes_select(ahead, root - b, -(root + b));
     mask zero = q == (real)(0); // b = d = 0: both roots are 0
     real t = lanes_select(zero, (real)(0), real_divide(c, lanes_select(zero, (real)(1), q)));
-    // ahead c / q is the nearer root, else the farther one
+    // c / q is the nearer root if ahead, else the farther one
     mask other = lanes_select(ahead, !(t > ray->near), ray->near < (real)(0));
     if (only_far) other = ahead;
     if (lanes_any(other)) {
