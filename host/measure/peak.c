@@ -14,16 +14,16 @@ static double launch_length(Peak *peak, const LaunchTime *time)
     return time->trusted ? time->event_seconds : time->host_seconds;
 }
 
-// The best of some launches, each made long enough for its start not to count.
+// The best of several launches, each long enough that its overhead is negligible.
 static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, uint32_t lanes, bool wide)
 {
     const Device *device = compute->device;
-    // a group has to itself what a unit runs at once: one work-item on a CPU
+    // what a compute unit runs concurrently: one work-item on a CPU
     size_t group = device->type == CL_DEVICE_TYPE_CPU ? 1 : 64;
     size_t items = device->compute_units * group * 64;
     size_t scalar_size = wide ? sizeof(double) : sizeof(float);
     cl_mem results = buffer_create(compute, items * scalar_size, NULL, CL_MEM_WRITE_ONLY);
-    // a fixed point near 1, so that no chain overflows or becomes subnormal
+    // converges to a fixed point of 1, so that no chain overflows or becomes subnormal
     const double factor = 0.5, addend = 0.5;
     const float factor_single = 0.5F, addend_single = 0.5F;
     kernel_argument(compute, kernel, 1, scalar_size, wide ? (const void *)&factor : &factor_single);
@@ -54,7 +54,7 @@ static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
     for (cl_uint i = 0; i < 2; i++)
         buffers[i] = buffer_create(compute, bytes, NULL, CL_MEM_READ_WRITE);
     double best = 0, start = clock_seconds();
-    // there and back, so that both have been written before what is read counts
+    // back and forth, so that both buffers have been written before a copy is measured
     for (cl_uint turn = 0; compute_ok(compute) && (turn < 3 || clock_seconds() - start < total_seconds);
          turn++) {
         kernel_argument(compute, kernel, 0, sizeof(cl_mem), &buffers[turn % 2]);
