@@ -36,9 +36,9 @@ pages   := $(sort $(wildcard host/cli/page/*))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
 
-# Each tests/test_*.c and fuzz_*.c is a program; the other files are linked with all of them.
-test_programs := $(sort $(wildcard tests/test_*.c tests/fuzz_*.c))
-test_helpers  := $(filter-out $(test_programs),$(sort $(wildcard tests/*.c tests/oracle/*.c)))
+# Each tests/test_*.c, fuzz_*.c and oracle/*.c is a program; the other files are linked with all of them.
+test_programs := $(sort $(wildcard tests/test_*.c tests/fuzz_*.c tests/oracle/*.c))
+test_helpers  := $(filter-out $(test_programs),$(sort $(wildcard tests/*.c)))
 test_objects  := $(test_helpers:%.c=$(BUILD)/%.o)
 tests         := $(test_programs:%.c=$(BUILD)/%)
 
@@ -83,14 +83,6 @@ features: $(BUILD)/tools/features
 
 $(BUILD)/tools/features: $(BUILD)/tools/features.o $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
-
-# glint verify with its oracle overheard: calls of these functions from other files go through overhear.c.
-overheard := exact_sphere exact_plane exact_cylinder exact_torus exact_highlight exact_judge_surface verify_render
-
-overhear: $(BUILD)/tools/numerics/overhear
-
-$(BUILD)/tools/numerics/overhear: $(BUILD)/tools/numerics/overhear.o $(library)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(overheard:%=-Wl,--wrap=%) $^ $(LIBS) -o $@
 
 # These two change only when what they hold does, and what depends on it is then built anew.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
@@ -142,7 +134,6 @@ CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/numerics/ladder.c \
-          tools/numerics/overhear.c \
           $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
@@ -207,7 +198,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test ladder features overhear bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all tests test ladder features bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d numerics/ladder.d numerics/overhear.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)

@@ -1,9 +1,27 @@
 #!/bin/bash
-# What glint verify carries is what the exact oracle writes. Needs python-flint, from PyPI.
+# The reference that glint verify and the tests compare with, in quadruple precision, against exact arithmetic: the rays of
+# the hard cases, and random ones at every shape. Needs python-flint, from PyPI.
+# With GLINT_LONG_TESTS=1 ten times as many. For the first build alone: the plain build computes the same.
 . "$(dirname "$0")/support.bash"
+build=${BUILD:-build}
 
 python_with flint=python-flint==0.9.0
-write_tables() { "$python" -B tests/oracle/write_tables.py >"$scratch/tables.c"; }
-check "the oracle runs" write_tables
-check "host/verify/tables.c is what it writes" diff "$scratch/tables.c" host/verify/tables.c
+check 'the program that prints answers builds' ${MAKE:-make} -s BUILD="$build" "$build/tests/oracle/answers"
+long= samples=24
+[ "${GLINT_LONG_TESTS-}" != 1 ] || long=--long samples=240
+"$build/tests/oracle/answers" $samples >"$scratch/answers" || fail 'answers are printed'
+certify() { "$python" -B tests/oracle/certify.py "$@" <"$scratch/answers"; }
+if certify $long; then
+    pass
+else
+    fail 'what the reference answers is exact'
+fi
+
+# A reference whose distances err by 2^-50, and margins twice as large, are noticed.
+notices() {
+    ! certify --set "$1" --spoil "$2" >"$scratch/spoiled" && grep -q "$3 is off" "$scratch/spoiled"
+}
+check 'a distance that is off is noticed' notices S5 1/1125899906842624 'sphere: t'
+check 'a normal that is off is noticed' notices C6 1/1125899906842624 'cone: normal'
+check 'a margin that is too large is noticed' notices S5 2 'sphere: margin'
 finish

@@ -1,5 +1,5 @@
 // Pictures of Phong's highlights, from dull to a thousandth of a radian wide.
-#include "host/verify/exact.h"
+#include "host/verify/judge.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -41,8 +41,9 @@ void verify_highlights(VerifyRun *run)
             scene.camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
         }
         Film picture = verify_render(run, &scene, false, 96, 96);
-        LongVector to_light = {-verify_rounded(run, direction.x), -verify_rounded(run, direction.y),
-                               -verify_rounded(run, direction.z)};
+        Quad3 to_light =
+            quad3_unit((Quad3){-verify_rounded(run, direction.x), -verify_rounded(run, direction.y),
+                               -verify_rounded(run, direction.z)});
         size_t seen = 0;
         double brightest = 0;
         for (size_t i = 0; i < film_pixel_count(&picture); i++) {
@@ -51,12 +52,13 @@ void verify_highlights(VerifyRun *run)
             seen += picture.object[i] == 0;
             brightest = fmax(brightest, value);
             if (run->tier == TIER_A || picture.object[i] != 0 || power > owed_power) continue;
-            LongVector normal = long_vector(verify_vector(picture.normal + 3 * i));
-            Long facing = long_dot(normal, to_light);
+            Quad3 normal = quad3_unit(quad3(verify_vector(picture.normal + 3 * i)));
+            Quad3 ray = quad3_unit(quad3(verify_vector(picture.ray + 3 * i)));
+            Quad facing = quad3_dot(normal, to_light);
             // whether light that grazes reaches the surface at all is the shadow's matter
-            if (fabsl(facing) < 16 * (Long)verify_roundoff(run)) continue;
-            Long exact = exact_highlight(normal, to_light, exact_pixel_ray(&picture, i), power);
-            verify_note(run, (double)fabsl(value - exact), owed, "of 1");
+            if (quad_absolute(facing) < 16 * verify_roundoff(run)) continue;
+            Quad exact = reference_highlight(normal, to_light, quad3_scale(ray, -1), power);
+            verify_note(run, (double)quad_absolute(value - exact), owed, "of 1");
         }
         // closely, the highlight's middle lies in the picture's
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);

@@ -1,5 +1,5 @@
 // Pictures of ground up to its horizon.
-#include "host/verify/exact.h"
+#include "host/verify/judge.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -27,7 +27,7 @@ void verify_ground_horizon(VerifyRun *run)
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
         Film picture = verify_render(run, &scene, false, 128, 512);
-        LongVector center = exact_from_eye(run, scene.objects.items[0].as.sphere.center, eye);
+        VerifyTarget ground = verify_target(run, &scene.objects.items[0], eye);
         for (uint32_t column = 0; column < picture.width; column++) {
             uint32_t horizon = column_horizon(run, &picture, column), exact = picture.height;
             for (uint32_t row = picture.height - 1; row > horizon; row--) {
@@ -36,7 +36,7 @@ void verify_ground_horizon(VerifyRun *run)
             }
             while (exact > 0) {
                 size_t pixel = (size_t)(exact - 1) * picture.width + column;
-                if (!exact_sphere(center, 1e6L, exact_pixel_ray(&picture, pixel)).found) break;
+                if (!verify_pixel_hit(&ground, &picture, pixel).found) break;
                 exact--;
             }
             verify_note(run, fabs((double)horizon - (double)exact), 1, "rows");

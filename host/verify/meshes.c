@@ -2,8 +2,8 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
-#include "host/verify/exact.h"
 #include "host/verify/families.h"
+#include "host/verify/judge.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -121,10 +121,10 @@ void verify_facing_triangle(VerifyRun *run)
     scene_free(&scene);
     for (size_t i = 0; i < COUNT; i++) {
         const double *o = rays[i].origin;
-        Long t = 1 - ((Long)o[0] + 2 * (Long)o[1] + 2 * (Long)o[2]) / 9;
+        Quad t = 1 - ((Quad)o[0] + 2 * (Quad)o[1] + 2 * (Quad)o[2]) / 9;
         run->result->leaks += !verify_is_hit(&hits[i]);
         if (verify_is_hit(&hits[i]) && run->tier > TIER_B)
-            verify_note_error(run, (double)fabsl(hits[i].t - t) / verify_ulp(run, (double)t), 4);
+            verify_note_error(run, (double)quad_absolute(hits[i].t - t) / verify_ulp(run, (double)t), 4);
     }
 }
 

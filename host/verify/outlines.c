@@ -2,7 +2,7 @@
 // was traced.
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
-#include "host/verify/exact.h"
+#include "host/verify/judge.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,18 +30,20 @@ static void judge_radial_brightness(VerifyRun *run, const Film *picture)
     }
 }
 
-// Lambert's cosine for light from the eye's side, at each pixel that is hit; the 99.9th percentile counts.
-static void judge_lambert(VerifyRun *run, const Film *picture, LongVector center, double bound)
+// Each pixel; and Lambert's cosine for light from the eye's side, of which the 99.9th percentile counts.
+static void judge_fringe(VerifyRun *run, const Film *picture, const VerifyTarget *sphere)
 {
     float *errors = memory_allocate(film_pixel_count(picture), sizeof *errors);
     size_t count = 0;
     for (size_t i = 0; i < film_pixel_count(picture); i++) {
-        ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(picture, i));
+        ReferenceHit exact = verify_judge_pixel(run, sphere, picture, i);
         if (!exact.found || !verify_pixel_found(picture, i)) continue;
-        Long shade = fmaxl(exact.normal.z, 0);
-        errors[count++] = (float)fabsl(picture->color[3 * i] - shade);
+        double shade = fmax((double)exact.normal.z, 0);
+        errors[count++] = (float)fabs(picture->color[3 * i] - shade);
     }
-    if (count > 0) verify_note(run, percentile_999(errors, count), bound, "of 1");
+    bool near = sphere->distance <= 1e3;
+    if (count > 0 && (near || run->tier > TIER_B))
+        verify_note(run, percentile_999(errors, count), run->tier == TIER_B ? 2e-3 : 1e-5, "of 1");
     free(errors);
 }
 
@@ -55,26 +57,20 @@ void verify_far_fringe(VerifyRun *run)
         const Vector3 eye = {0, 0, distance};
         scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
         Film picture = verify_render(run, &scene, false, 512, 512);
-        LongVector center = exact_from_eye(run, origin, eye);
         judge_radial_brightness(run, &picture);
-        for (size_t i = 0; i < film_pixel_count(&picture) && run->tier != TIER_A; i++) {
-            ExactHit exact = exact_sphere(center, 1, exact_pixel_ray(&picture, i));
-            exact_judge(run, &exact, verify_pixel_found(&picture, i), picture.t[i]);
-        }
-        if (run->tier == TIER_B && distance <= 1e3) judge_lambert(run, &picture, center, 2e-3);
-        if (run->tier > TIER_B) judge_lambert(run, &picture, center, 1e-5);
+        VerifyTarget sphere = verify_target(run, &scene.objects.items[0], eye);
+        if (run->tier != TIER_A) judge_fringe(run, &picture, &sphere);
         film_free(&picture);
     }
     scene_free(&scene);
 }
 
-// Holds each pixel to the oracle.
-#define JUDGE_PIXELS(picture, exact_of_direction)                                                            \
-    for (size_t i = 0; i < film_pixel_count(picture) && run->tier != TIER_A; i++) {                          \
-        LongVector direction = exact_pixel_ray(picture, i);                                                  \
-        ExactHit exact = exact_of_direction;                                                                 \
-        exact_judge(run, &exact, verify_pixel_found(picture, i), (picture)->t[i]);                           \
-    }
+static void judge_pixels(VerifyRun *run, const Film *picture, const Scene *scene)
+{
+    VerifyTarget target = verify_target(run, &scene->objects.items[0], scene->camera.position);
+    for (size_t i = 0; i < film_pixel_count(picture) && run->tier != TIER_A; i++)
+        verify_judge_pixel(run, &target, picture, i);
+}
 
 // Every column has a stretch of pixels without a gap.
 void verify_wire(VerifyRun *run)
@@ -84,10 +80,7 @@ void verify_wire(VerifyRun *run)
     const Vector3 eye = {0, 0, -10};
     scene.camera = verify_camera(eye, origin, 0.293);
     Film picture = verify_render(run, &scene, false, 1024, 64);
-    LongVector center = exact_from_eye(run, origin, eye);
-    const LongVector axis = {1, 0, 0};
-    Long radius = verify_rounded(run, 0.001);
-    JUDGE_PIXELS(&picture, exact_cylinder(center, axis, radius, 1e4, direction))
+    judge_pixels(run, &picture, &scene);
     for (uint32_t column = 0; column < picture.width; column++) {
         size_t stretches = 0;
         for (uint32_t row = 0; row < picture.height; row++) {
@@ -150,8 +143,7 @@ void verify_far_torus(VerifyRun *run)
         scene.camera = verify_camera(eye, origin, 0);
         scene.camera.half_tangent = 1.3 / distances[k];
         Film picture = verify_render(run, &scene, false, 160, 160);
-        LongVector center = exact_from_eye(run, origin, eye);
-        JUDGE_PIXELS(&picture, exact_torus(center, 1, 0.25L, direction))
+        judge_pixels(run, &picture, &scene);
         film_free(&picture);
     }
     scene_free(&scene);
@@ -173,9 +165,9 @@ void verify_tangent_circle(VerifyRun *run)
     verify_trace(run, &scene, false, rays, COUNT, hits);
     for (size_t i = 0; i < COUNT; i++) {
         if (!verify_is_hit(&hits[i])) continue;
-        LongVector point = {-5 + (Long)hits[i].t, 0, rays[i].origin[2]};
-        Long off = exact_surface_distance(run, &scene.objects.items[0], point);
-        run->result->off += off > 16 * verify_roundoff(run);
+        Quad3 point = {-5 + (Quad)hits[i].t, 0, rays[i].origin[2]};
+        ReferenceSurface surface = reference_surface(&scene.objects.items[0], point);
+        run->result->off += reference_surface_distance(&surface) > 16 * verify_roundoff(run);
     }
     scene_free(&scene);
 }
@@ -241,9 +233,7 @@ void verify_thin_ring(VerifyRun *run)
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, origin, views[k].fov);
         Film picture = verify_render(run, &scene, false, views[k].side, views[k].side);
-        LongVector center = exact_from_eye(run, origin, eye);
-        Long minor = verify_rounded(run, 0.001);
-        JUDGE_PIXELS(&picture, exact_torus(center, 1, minor, direction))
+        judge_pixels(run, &picture, &scene);
         if (k == 1) run->result->leaks += count_parts(&picture) != 1;
         film_free(&picture);
     }

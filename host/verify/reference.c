@@ -63,9 +63,10 @@ static void narrow(ReferenceHit *hit, Quad margin)
 // Takes the crossing at `t` if it is the nearest so far. `normal` points outward; it need not be unit.
 static void offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad bend)
 {
+    if (hit->found && t >= hit->t) return;
     Quad inverse = 1 / quad3_length(normal), approach = -quad3_dot(normal, ray->direction) * inverse;
     narrow(hit, 2 * (t - ray->tmin) * approach);
-    if (!(t > ray->tmin && t < ray->tmax) || (hit->found && t >= hit->t)) return;
+    if (!(t > ray->tmin && t < ray->tmax)) return;
     hit->found = true;
     hit->object = 0;
     hit->t = t;
@@ -183,13 +184,16 @@ static void surface_plane(const Object *object, Quad3 point, ReferenceSurface *s
     surface_add(surface, height, normal, UNBOUNDED);
 }
 
+// The nearest place of the rim is as far from the ray's line as from the line that touches the rim there.
 static void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad t;
     if (radius <= 0 || !plane_crossing(ray, center, normal, &t)) return;
     Quad3 from_center = quad3_subtract(reference_point(ray, t), center);
     Quad excess = quad3_dot(from_center, from_center) / (radius * radius) - 1;
-    narrow(hit, excess * radius * plane_cosine(ray, normal));
+    Quad3 across = quad3_cross(ray->direction, quad3_unit(quad3_cross(normal, from_center)));
+    Quad approach = quad3_dot(ray->direction, quad3_unit(normal)), spread = quad3_length(across);
+    narrow(hit, excess * radius * (spread > 0 ? approach / spread : 1));
     if (excess <= 0) offer(hit, ray, t, normal, UNBOUNDED);
 }
 
@@ -217,6 +221,8 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
     Vector3 corners[2] = {object->as.box.min, object->as.box.max};
     const Quad low[3] = {corners[0].x, corners[0].y, corners[0].z};
     const Quad high[3] = {corners[1].x, corners[1].y, corners[1].z};
+    // along an axis a hit is a comparison of given numbers, and nothing is open
+    bool along_axis = (ray->direction.x == 0) + (ray->direction.y == 0) + (ray->direction.z == 0) == 2;
     for (int axis = 0; axis < 3; axis++) {
         Quad3 along = {axis == 0, axis == 1, axis == 2};
         for (int side = 0; side < 2; side++) {
@@ -229,7 +235,7 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
                 at[last] <= high[last])
                 offer(hit, ray, t, quad3_scale(along, side ? 1 : -1), UNBOUNDED);
         }
-        for (int edge = 0; edge < 4; edge++) {
+        for (int edge = 0; edge < 4 && !along_axis; edge++) {
             Vector3 y_and_z = {corners[0].x, corners[edge & 1].y, corners[edge >> 1].z};
             Vector3 z_and_x = {corners[edge & 1].x, corners[0].y, corners[edge >> 1].z};
             Vector3 x_and_y = {corners[edge & 1].x, corners[edge >> 1].y, corners[0].z};
@@ -266,21 +272,22 @@ typedef struct {
 
 static Revolution revolution_of(const Object *object)
 {
-    if (object->kind == SHAPE_CYLINDER) {
-        Quad3 axis = quad3(object->as.cylinder.axis);
+    bool is_cylinder = object->kind == SHAPE_CYLINDER;
+    Quad3 axis = quad3(is_cylinder ? object->as.cylinder.axis : object->as.cone.axis);
+    Quad height = quad3_length(axis);
+    axis = quad3_scale(axis, 1 / height);
+    if (is_cylinder)
         return (Revolution){.from = quad3(object->as.cylinder.from),
-                            .axis = quad3_unit(axis),
+                            .axis = axis,
                             .base = object->as.cylinder.radius,
-                            .height = quad3_length(axis),
+                            .height = height,
                             .finite = object->as.cylinder.finite,
                             .caps = object->as.cylinder.caps,
                             .only_inside = object->as.cylinder.only_inside};
-    }
-    Quad3 axis = quad3(object->as.cone.axis);
-    Quad height = quad3_length(axis), first = object->as.cone.radius[0], second = object->as.cone.radius[1];
+    Quad first = object->as.cone.radius[0], second = object->as.cone.radius[1];
     bool finite = object->as.cone.finite;
     return (Revolution){.from = quad3(object->as.cone.from),
-                        .axis = quad3_unit(axis),
+                        .axis = axis,
                         .base = finite ? first : 0,
                         .slope = finite ? (second - first) / height : object->as.cone.slope,
                         .height = height,
@@ -357,20 +364,21 @@ static void surface_revolution(const Object *object, Quad3 point, ReferenceSurfa
         axis = quad3_scale(axis, -1);
     }
     Quad3 across = quad3_subtract(from, quad3_scale(axis, along));
-    Quad off = quad3_length(across), lean = diagonal(1, body.slope);
+    Quad off = quad3_length(across), cosine = 1 / diagonal(1, body.slope); // of the side with the axis
     Quad3 radial = off > 0 ? quad3_scale(across, 1 / off) : axis;
     Quad end_radius = body.base + body.slope * body.height;
     double largest = (double)quad_maximum(body.base, end_radius), half = (double)body.height / 2;
-    Quad3 middle = quad3_add(body.from, quad3_scale(body.axis, body.finite ? half : 0));
-    surface_measure(surface, quad3_rounded(middle), body.finite ? hypot(largest, half) : largest, largest);
+    if (!body.finite) half = 0;
+    Vector3 middle = vector_add(quad3_rounded(body.from), vector_scale(quad3_rounded(body.axis), half));
+    surface_measure(surface, middle, hypot(largest, half), largest);
 
-    Quad place = (along + body.slope * (off - body.base)) / lean; // along the side's line
-    Quad away = (off - body.base - body.slope * along) / lean;    // from it
-    Quad beyond = body.finite       ? outside(place, 0, body.height * lean)
-                  : body.slope != 0 ? outside(place, 0, UNBOUNDED)
-                                    : 0;
-    Quad3 normal = quad3_scale(quad3_subtract(radial, quad3_scale(axis, body.slope)), 1 / lean);
-    surface_add(surface, diagonal(away, beyond), normal, quad_maximum(off, (Quad)1e-30L) * lean);
+    Quad place = (along + body.slope * (off - body.base)) * cosine; // along the side's line
+    Quad away = (off - body.base - body.slope * along) * cosine;    // from it
+    Quad beyond = 0;
+    if (body.finite) beyond = outside(place, 0, body.height / cosine);
+    if (!body.finite && body.slope != 0) beyond = outside(place, 0, UNBOUNDED);
+    Quad3 normal = quad3_scale(quad3_subtract(radial, quad3_scale(axis, body.slope)), cosine);
+    surface_add(surface, diagonal(away, beyond), normal, quad_maximum(off, (Quad)1e-30L) / cosine);
     if (!body.finite || !body.caps) return;
     surface_add(surface, diagonal(along, outside(off, 0, body.base)), axis, UNBOUNDED);
     surface_add(surface, diagonal(along - body.height, outside(off, 0, end_radius)), axis, UNBOUNDED);
@@ -546,12 +554,6 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
                              sum[1] * sum[1] + 2 * sum[0] - four * (q.x * q.x + q.y * q.y), 2 * sum[1], 1};
     const Quad cubic[4] = {quartic[1], 2 * quartic[2], 3 * quartic[3], 4};
     Quad reach = 4 * (major + minor), turns[3], zeros[4];
-    int turn_count = polynomial_zeros(cubic, 3, -reach, reach, turns);
-    for (int i = 0; i < turn_count; i++) {
-        Quad3 at = quad3_add(p, quad3_scale(q, turns[i]));
-        Quad off = quad_root(at.x * at.x + at.y * at.y) - major;
-        narrow(hit, 2 * (diagonal(off, at.z) - minor));
-    }
     int count = polynomial_zeros(quartic, 4, -reach, reach, zeros);
     for (int i = 0; i < count; i++) {
         if (polynomial_value(sum, 2, zeros[i]) < 0) continue;
@@ -560,6 +562,15 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
         Quad3 normal = quad3_add(quad3_add(quad3_scale(across, at.x * out), quad3_scale(beside, at.y * out)),
                                  quad3_scale(axis, at.z));
         offer(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
+    }
+    // the hit is there because of the turns up to the next behind it
+    int turn_count = polynomial_zeros(cubic, 3, -reach, reach, turns);
+    bool behind = false;
+    for (int i = 0; i < turn_count && !behind; i++) {
+        Quad3 at = quad3_add(p, quad3_scale(q, turns[i]));
+        Quad off = quad_root(at.x * at.x + at.y * at.y) - major;
+        narrow(hit, 2 * (diagonal(off, at.z) - minor));
+        behind = hit->found && closest + turns[i] > hit->t * length;
     }
 }
 

@@ -1,6 +1,6 @@
 // Pictures of shadows: none where nothing stands in the light, and none missing.
 #include "host/base/array.h"
-#include "host/verify/exact.h"
+#include "host/verify/judge.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -28,9 +28,9 @@ void verify_plane_acne(VerifyRun *run)
             scene.camera = verify_camera(eye, point, 60);
             Film picture = verify_render(run, &scene, false, 128, 128);
             Vector3 direction = vector_normalize(scene.lights.items[0].direction);
-            LongVector stored = {verify_rounded(run, direction.x), verify_rounded(run, direction.y),
-                                 verify_rounded(run, direction.z)};
-            Long cosine = -long_dot(long_unit(long_vector(normal)), stored);
+            Quad3 stored = {verify_rounded(run, direction.x), verify_rounded(run, direction.y),
+                            verify_rounded(run, direction.z)};
+            Quad cosine = -quad3_dot(quad3_unit(quad3(normal)), stored);
             double least = INFINITY, most = 0;
             for (size_t i = 0; i < film_pixel_count(&picture); i++) {
                 run->result->leaks += picture.object[i] != 0;
@@ -41,7 +41,9 @@ void verify_plane_acne(VerifyRun *run)
             run->result->wrong += !(least > 0);
             verify_note(run, (most - least) / verify_ulp(run, most), 2, "ulp");
             const double u = verify_roundoff(run);
-            verify_note(run, (double)fmaxl(fabsl(most - cosine), fabsl(least - cosine)) / u, 8, "u");
+            verify_note(run,
+                        (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u,
+                        8, "u");
             film_free(&picture);
             scene_free(&scene);
         }
@@ -79,11 +81,12 @@ void verify_thin_plate(VerifyRun *run)
 
 // Counts a pixel that does not show the nearest of plane 0 and sphere 1. The sphere's rim, and where the two
 // are equally far, are open.
-static void judge_nearest(VerifyRun *run, uint32_t object, const ExactHit *plane, const ExactHit *sphere)
+static void judge_nearest(VerifyRun *run, uint32_t object, const ReferenceHit *plane,
+                          const ReferenceHit *sphere)
 {
-    const Long open = 1e-5L;
-    if (fabsl(sphere->margin) < open) return;
-    if (sphere->found && plane->found && fabsl(sphere->t - plane->t) < open * plane->t) return;
+    const double open = 1e-5;
+    if (sphere->margin < open) return;
+    if (sphere->found && plane->found && quad_absolute(sphere->t - plane->t) < open * plane->t) return;
     bool sphere_first = sphere->found && (!plane->found || sphere->t < plane->t);
     uint32_t nearest = sphere_first ? 1 : plane->found ? 0 : UINT32_MAX;
     run->result->leaks += object == UINT32_MAX && nearest != UINT32_MAX;
@@ -98,8 +101,8 @@ void verify_contact_shadow(VerifyRun *run)
         Vector3 eye;
         double fov;
     } views[] = {{{3, 2, 3}, 60}, {{3, 0.001, 3}, 0.5}, {{0.2, 0.02, 0.2}, 40}};
-    const Vector3 touched = {0, 0, 0}, light = {0, 10, 0}, middle = {0, 1, 0}, up = {0, 1, 0};
-    const Long edge = 10 / sqrtl(80);
+    const Vector3 touched = {0, 0, 0}, light = {0, 10, 0};
+    const double edge = 10 / sqrt(80);
     Scene scene = verify_scene("lights:\n  - point: {position: [0, 10, 0]}\n"
                                "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                                "  - sphere: {center: [0, 1, 0], radius: 1}\n");
@@ -107,23 +110,24 @@ void verify_contact_shadow(VerifyRun *run)
         const Vector3 eye = views[k].eye;
         scene.camera = verify_camera(eye, touched, views[k].fov);
         Film picture = verify_render(run, &scene, false, 384, 384);
-        LongVector to_light = exact_from_eye(run, light, eye), ground = exact_from_eye(run, touched, eye);
-        LongVector center = exact_from_eye(run, middle, eye);
+        Quad3 to_light = quad3(vector_subtract(light, eye)), ground = quad3(vector_subtract(touched, eye));
+        VerifyTarget targets[] = {verify_target(run, &scene.objects.items[0], eye),
+                                  verify_target(run, &scene.objects.items[1], eye)};
         for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            LongVector direction = exact_pixel_ray(&picture, i);
+            Quad3 direction = quad3(verify_vector(&picture.ray[3 * i]));
             bool dark = picture.shadow[i];
-            ExactHit plane = exact_plane(ground, long_vector(up), direction);
-            ExactHit sphere = exact_sphere(center, 1, direction);
+            ReferenceHit plane = verify_pixel_hit(&targets[0], &picture, i);
+            ReferenceHit sphere = verify_pixel_hit(&targets[1], &picture, i);
             judge_nearest(run, picture.object[i], &plane, &sphere);
             if (picture.object[i] == 0 && plane.found) {
-                LongVector p = long_subtract(long_scale(direction, plane.t), ground);
-                Long radius = hypotl(p.x, p.z);
-                run->result->leaks += !dark && radius < edge * (1 - 1e-5L);
-                run->result->wrong += dark && radius > edge * (1 + 1e-5L);
+                Vector3 p = quad3_rounded(quad3_subtract(quad3_scale(direction, plane.t), ground));
+                double radius = hypot(p.x, p.z);
+                run->result->leaks += !dark && radius < edge * (1 - 1e-5);
+                run->result->wrong += dark && radius > edge * (1 + 1e-5);
             } else if (picture.object[i] == 1 && sphere.found) {
-                LongVector p = long_scale(direction, sphere.t);
-                Long facing = long_dot(sphere.normal, long_unit(long_subtract(to_light, p)));
-                run->result->wrong += fabsl(facing) > 1e-5L && dark != (facing < 0);
+                Quad3 p = quad3_scale(direction, sphere.t);
+                Quad facing = quad3_dot(sphere.normal, quad3_unit(quad3_subtract(to_light, p)));
+                run->result->wrong += quad_absolute(facing) > 1e-5 && dark != (facing < 0);
             }
         }
         film_free(&picture);

@@ -5,14 +5,13 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
-#include "host/verify/exact.h"
-#include "host/verify/tables.h"
+#include "host/verify/rays.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { CHECKS_LARGEST = 3, BATCH = 1 << 16 };
+enum { CHECKS_LARGEST = 3 };
 
 // Each has the tables of its name, and its own checks.
 static const struct {
@@ -248,125 +247,6 @@ Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
                     .half_tangent = tan(fov_degrees * (M_PI / 360))};
 }
 
-static void judge(VerifyRun *run, const TraceHit *hit, const Expected *expected)
-{
-    size_t place = verify_is_wide(run) ? 0 : (size_t)run->tier;
-    bool open = expected->open >> place & 1;
-    bool should_hit = expected->object != MISS;
-    if (verify_is_hit(hit) != should_hit) {
-        run->result->wrong += !open;
-        return;
-    }
-    if (!should_hit) return;
-    if (expected->object != ANY_OBJECT && hit->object != expected->object) {
-        run->result->wrong++;
-        return;
-    }
-    double ulp = verify_ulp(run, expected->t);
-    verify_note_error(run, fabs(hit->t - expected->t - expected->rest) / ulp, expected->bounds[place] / ulp);
-}
-
-static void judge_surface(VerifyRun *run, const Scene *scene, const TraceRay *ray, const TraceHit *hit)
-{
-    // in these scenes an object's id is its place in the list
-    if (verify_is_hit(hit)) exact_judge_surface(run, &scene->objects.items[hit->object], ray, hit);
-}
-
-static double nudged(const VerifyRun *run, double value, double toward)
-{
-    return verify_is_wide(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
-}
-
-typedef struct {
-    TraceRay *items;
-    size_t count, capacity;
-} RayList;
-
-// The ray and those beside it. A component of 0 has only subnormal numbers beside it, and stays.
-static void rays_add(RayList *rays, const VerifyRun *run, const PlainRay *plain)
-{
-    TraceRay ray = {.tmin = plain->start, .tmax = INFINITY};
-    memcpy(ray.origin, plain->origin, sizeof ray.origin);
-    memcpy(ray.direction, plain->direction, sizeof ray.direction);
-    verify_round_ray(run, &ray);
-    array_push(*rays, ray);
-    double *const moved[] = {&ray.origin[0], &ray.direction[0]};
-    for (size_t k = 0; k < 2; k++) {
-        double x = *moved[k];
-        if (x == 0) continue;
-        *moved[k] = nudged(run, x, copysign(INFINITY, x));
-        array_push(*rays, ray);
-        *moved[k] = nudged(run, x, 0);
-        array_push(*rays, ray);
-        *moved[k] = x;
-    }
-}
-
-// Rays one by one: hits are exact, and do not depend on the rays' order.
-static void run_rays(VerifyRun *run, const ProbeTable *table, const Scene *scene)
-{
-    RayList rays = {0};
-    for (size_t i = 0; i < table->ray_count; i++)
-        rays_add(&rays, run, &table->rays[i]);
-    size_t width = verify_is_wide(run), count = rays.count;
-    if (count != table->expected_count[width]) fault("case %s has %zu rays", table->name, count);
-    TraceRay *turned = memory_allocate(count, sizeof *turned);
-    for (size_t i = 0; i < count; i++)
-        turned[i] = rays.items[count - 1 - i];
-    TraceHit *hits = memory_allocate(2 * count, sizeof *hits);
-    verify_trace(run, scene, false, rays.items, count, hits);
-    verify_trace(run, scene, true, turned, count, hits + count);
-    for (size_t i = 0; i < count; i++) {
-        judge(run, &hits[i], &table->expected[width][i]);
-        judge_surface(run, scene, &rays.items[i], &hits[i]);
-        run->result->differing += !verify_same_bits(&hits[i], &hits[2 * count - 1 - i]);
-    }
-    free(rays.items);
-    free(turned);
-    free(hits);
-}
-
-static void run_family(VerifyRun *run, const ProbeTable *table, const Scene *scene)
-{
-    size_t width = verify_is_wide(run);
-    TraceRay *rays = memory_allocate(BATCH, sizeof *rays);
-    TraceHit *hits = memory_allocate(BATCH, sizeof *hits);
-    void *opened = run->renderer->open(run->renderer->context, scene, table->scene_make != NULL);
-    for (size_t first = 0; first < table->ray_count; first += BATCH) {
-        size_t count = table->ray_count - first < BATCH ? table->ray_count - first : BATCH;
-        for (size_t i = 0; i < count; i++) {
-            rays[i] = table->family(first + i);
-            verify_round_ray(run, &rays[i]);
-        }
-        verify_trace_opened(run, opened, rays, count, hits);
-        for (size_t i = 0; i < count; i++) {
-            run->result->leaks += table->closed && !verify_is_hit(&hits[i]);
-            if (first + i < table->expected_count[width])
-                judge(run, &hits[i], &table->expected[width][first + i]);
-            judge_surface(run, scene, &rays[i], &hits[i]);
-        }
-    }
-    run->renderer->close(opened);
-    free(rays);
-    free(hits);
-}
-
-static void run_table(VerifyRun *run, const ProbeTable *table)
-{
-    Scene scene;
-    if (table->scene_make) {
-        scene = scene_empty();
-        table->scene_make(&scene);
-    } else {
-        scene = verify_scene(table->scene);
-    }
-    if (table->rays)
-        run_rays(run, table, &scene);
-    else
-        run_family(run, table, &scene);
-    scene_free(&scene);
-}
-
 bool verify_is_case(const char *name)
 {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
@@ -388,8 +268,8 @@ void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyCho
         if (!is_chosen(choice, cases[i].name)) continue;
         VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
         VerifyRun run = {renderer, tier, &result};
-        for (size_t k = 0; k < probe_table_count; k++)
-            if (strcmp(probe_tables[k].name, result.name) == 0) run_table(&run, &probe_tables[k]);
+        for (size_t k = 0; k < verify_rays_count; k++)
+            if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
         if (!sink(context, &result)) return;

@@ -47,11 +47,11 @@ class Beam:
 def grown(shape, by):
     """The solid with its surface moved outward by so much; below 0 inward."""
     if isinstance(shape, exact.Sphere):
-        return exact.Sphere(shape.center, shape.radius + by)
+        return exact.Sphere(shape.center, exact.Fraction(shape.radius) + exact.Fraction(by))
     if isinstance(shape, exact.Box):
         return exact.Box([x - rational(by) for x in shape.low], [x + rational(by) for x in shape.high])
     if isinstance(shape, exact.Torus):
-        return exact.Torus(shape.center, shape.major, as_float(shape.minor) + by, shape.axis)
+        return exact.Torus(shape.center, shape.major, shape.minor + rational(by), shape.axis)
     if isinstance(shape, exact.DoubleCone):
         sine = as_float(shape.slope) / sqrt(1 + as_float(shape.slope) ** 2)
         return exact.DoubleCone(shape.center, shape.axis, shape.slope, -by / sine / length(shape.axis))

@@ -7,7 +7,7 @@ where that changes. Surfaces without an inside (plane, disc, triangle) have one 
 """
 
 from fractions import Fraction
-from math import inf, sqrt
+from math import sqrt
 
 from flint import arb, ctx, fmpq, fmpq_poly
 
@@ -77,7 +77,7 @@ def polynomial_roots(coefficients):
 
 
 class Shape:
-    """center, size: for tolerances; radius: what the distance to the decision's boundary is measured in."""
+    """center, size: for tolerances; radius: of what a ray may just miss."""
 
     def crossings(self, ray):
         """(t, outward normal's cosine with the ray) of each crossing of a line, ascending."""
@@ -102,45 +102,11 @@ class Shape:
     def distance(self, ray):
         return length(subtract(ray.origin, self.center))
 
-    def margin(self, ray):
-        """How deep the ray gets into the solid, as a part of the radius; below 0: how far it passes.
-
-        The largest depth is looked for in double along the line as it runs past the center, which is exact enough to
-        tell which side of a band it is on."""
-        toward = subtract(self.center, ray.origin)
-        squared = dot(ray.direction, ray.direction)
-        nearest = dot(toward, ray.direction) / squared
-        point = floats(subtract(ray.at(nearest), self.center))
-        step = [x / ray.scale for x in floats(ray.direction)]
-        start = max(float(fraction(ray.start - nearest)) * ray.scale, -self.reach)
-
-        def depth(s):
-            return self.depth([x + s * y for x, y in zip(point, step)])
-
-        if start >= self.reach:
-            return -inf
-        count = 400
-        marks = [start + (self.reach - start) * i / count for i in range(count + 1)] + ([0.0] if start < 0 else [])
-        marks.sort()
-        depths = [depth(s) for s in marks]
-        deepest = -inf
-        for i, value in enumerate(depths):
-            left, right = max(i - 1, 0), min(i + 1, len(marks) - 1)
-            if value < max(depths[left], depths[right]):
-                continue
-            low, high = marks[left], marks[right]
-            for _ in range(90):
-                a, b = low + (high - low) / 3, high - (high - low) / 3
-                low, high = (a, high) if depth(a) < depth(b) else (low, b)
-            deepest = max(deepest, value, depth((low + high) / 2))
-        return deepest
-
 
 class Sphere(Shape):
     def __init__(self, center, radius):
         self.center, self.squared = vector(center), rational(radius) ** 2
         self.radius = self.size = float(fraction(rational(radius)))
-        self.reach = 2 * self.radius
 
     def places(self, ray):
         f = subtract(ray.origin, self.center)
@@ -154,9 +120,6 @@ class Sphere(Shape):
     def normal(self, point):
         return subtract(point, self.center)
 
-    def depth(self, p):
-        return 1 - (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (self.radius * self.radius)
-
 
 class Box(Shape):
     def __init__(self, low, high):
@@ -164,7 +127,6 @@ class Box(Shape):
         self.center = [(a + b) / 2 for a, b in zip(self.low, self.high)]
         self.half = floats([(b - a) / 2 for a, b in zip(self.low, self.high)])
         self.size = self.radius = sqrt(sum(x * x for x in self.half))
-        self.reach = 2 * self.size
 
     def places(self, ray):
         return [
@@ -186,15 +148,6 @@ class Box(Shape):
         faces = [min(abs(x - a), abs(x - b)) for a, x, b in zip(self.low, ray.at(t), self.high)]
         return max(abs(float(fraction(d))) for d, face in zip(ray.direction, faces) if face == min(faces)) / ray.scale
 
-    def margin(self, ray):
-        # two zero components leave a comparison of given numbers: nothing is open
-        if sum(d == 0 for d in ray.direction) == 2:
-            return inf
-        return super().margin(ray)
-
-    def depth(self, p):
-        return min((half - abs(x)) / self.radius for half, x in zip(self.half, p))
-
 
 class Revolution(Shape):
     """A cylinder or cone from one point to another, or an infinite cylinder along `axis`. Without caps it is the part of
@@ -208,10 +161,6 @@ class Revolution(Shape):
         self.center = self.base if infinite else [b + a / 2 for b, a in zip(self.base, self.axis)]
         self.radius = float(max(map(fraction, self.radii)))
         self.size = self.radius if infinite else sqrt(self.radius**2 + self.axis_length**2 / 4)
-        self.reach = 4 * self.size
-        self.unit_axis = [x / self.axis_length for x in floats(self.axis)]
-        self.from_base = floats(subtract(self.center, self.base))
-        self.end_radii = floats(self.radii)
 
     def places(self, ray):
         # (|p|^2 - h^2 / |w|^2) = (r + (R - r) h / |w|^2)^2 with h = p . w, times |w|^4
@@ -252,19 +201,6 @@ class Revolution(Shape):
         lean = radius * (self.radii[1] - self.radii[0]) / self.along
         normal = [x - lean * a for x, a in zip(across, self.axis)]
         return normal if any(normal) else self.axis
-
-    def depth(self, p):
-        q = [x + y for x, y in zip(p, self.from_base)]
-        height = sum(x * y for x, y in zip(q, self.unit_axis))
-        across = sum((x - height * y) ** 2 for x, y in zip(q, self.unit_axis))
-        if self.infinite:
-            return 1 - across / self.radius**2
-        start, end = self.end_radii
-        radius = start + (end - start) * height / self.axis_length
-        ends = min(height, self.axis_length - height) / self.radius
-        if ends < 0:
-            return ends
-        return min(ends, 1 - across / max(radius * radius, 1e-300))
 
 
 class DoubleCone(Shape):
@@ -310,10 +246,8 @@ class Torus(Shape):
         self.center, self.major, self.minor = vector(center), rational(major), rational(minor)
         self.axis = vector(axis)
         self.along = dot(self.axis, self.axis)
-        self.unit_axis = [x / length(self.axis) for x in floats(self.axis)]
         self.radius, self.major_radius = floats([self.minor, self.major])
         self.size = self.major_radius + self.radius
-        self.reach = 1.5 * self.size
 
     def places(self, ray):
         # (|p|^2 + R^2 - r^2)^2 = 4 R^2 (|p|^2 - h^2 / |w|^2) with h = p . w
@@ -342,10 +276,51 @@ class Torus(Shape):
         height = dot(p, self.axis) / self.along
         return [x - self.major / across * (x - height * a) for x, a in zip(p, self.axis)]
 
-    def depth(self, p):
-        height = sum(x * y for x, y in zip(p, self.unit_axis))
-        off = sqrt(sum((x - height * y) ** 2 for x, y in zip(p, self.unit_axis))) - self.major_radius
-        return 1 - (off * off + height * height) / self.radius**2
+
+class Paraboloid(Shape):
+    """Of points whose squared distance from the axis is at most 4 f times the height above the apex; without ends or
+    caps as Revolution. The axis' length is rounded to 300 bits."""
+
+    def __init__(self, apex, axis, focal_length, height, infinite=False, caps=True):
+        self.center, self.axis, self.focal_length = vector(apex), vector(axis), rational(focal_length)
+        self.along = dot(self.axis, self.axis)
+        self.unit = middle(arb(self.along).sqrt())
+        self.end, self.infinite, self.caps = rational(height) * self.unit, infinite, caps
+        self.radius = self.size = 2 * float(height if infinite else sqrt(focal_length * height) + height)
+
+    def places(self, ray):
+        # |p|^2 - h^2 / |w|^2 = 4 f h / |w| with h = p . w
+        f, d, w = subtract(ray.origin, self.center), ray.direction, self.axis
+        height = fmpq_poly([dot(f, w), dot(d, w)])
+        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+        found = polynomial_roots((p_p - height * height / self.along - 4 * self.focal_length / self.unit * height).coeffs())
+        if self.has_end() and dot(d, w) != 0:
+            found.append((self.end - dot(f, w)) / dot(d, w))
+        return found
+
+    def has_end(self):
+        return self.caps and not self.infinite
+
+    def crossings(self, ray):
+        found = super().crossings(ray)
+        if self.caps or self.infinite:
+            return found
+        return [t for t in found if dot(subtract(ray.at(t), self.center), self.axis) <= self.end]
+
+    def contains(self, point):
+        p = subtract(point, self.center)
+        height = dot(p, self.axis)
+        if self.has_end() and height > self.end:
+            return False
+        return dot(p, p) - height**2 / self.along <= 4 * self.focal_length / self.unit * height
+
+    def normal(self, point):
+        p = subtract(point, self.center)
+        height = dot(p, self.axis)
+        if self.has_end() and abs(height - self.end) < SAME:
+            return self.axis
+        lean = (height / self.unit + 2 * self.focal_length) / self.unit
+        return [x - lean * a for x, a in zip(p, self.axis)]
 
 
 class Plane(Shape):
@@ -360,9 +335,6 @@ class Plane(Shape):
     def normal(self, point):
         return self.direction
 
-    def margin(self, ray):
-        return inf
-
 
 class Disc(Plane):
     def __init__(self, center, normal, radius):
@@ -376,10 +348,6 @@ class Disc(Plane):
 
     def crossings(self, ray):
         return [t for t in super().crossings(ray) if self.off(ray, t) <= self.squared]
-
-    def margin(self, ray):
-        crossed = super().crossings(ray)
-        return float(fraction(1 - self.off(ray, crossed[0]) / self.squared)) if crossed else 0.0
 
 
 class Triangle(Plane):
@@ -398,11 +366,3 @@ class Triangle(Plane):
     def crossings(self, ray):
         edges = self.edges(ray)
         return [] if min(edges) < 0 < max(edges) else super().crossings(ray)
-
-    def margin(self, ray):
-        """The smallest edge function as a part of the lengths it is made of, in units where 16 u are open."""
-        least = inf
-        for edge, side, vertex in zip(self.edges(ray), self.sides, self.vertices):
-            spread = length(side) * length(subtract(vertex, ray.origin)) * ray.scale
-            least = min(least, abs(float(fraction(edge))) / spread)
-        return least

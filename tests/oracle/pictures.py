@@ -11,10 +11,9 @@ import subprocess
 import sys
 
 import numpy
-import write_tables
 import yaml
 from color import Beam, Rounding, as_float, trace
-from scene import Scene
+from scene import Scene, narrow
 
 STAGE = """
 camera: {position: [0.5, 1.75, 6], look_at: [0, 0.5, 0], fov: 40}
@@ -176,8 +175,8 @@ def main(glint, folder, is_long):
         for name in SHAPES if is_long else SHORT:
             text = STAGE + "".join(f"  - {line}\n" for line in SHAPES[name])
             picture = render(glint, text, precision, size, folder)
-            width = write_tables.WIDE if precision == "double" else write_tables.NARROW
-            compare(Scene(yaml.safe_load(text), width), picture, rounding, tallies, name)
+            scene = Scene(yaml.safe_load(text), float if precision == "double" else narrow)
+            compare(scene, picture, rounding, tallies, name)
         print(precision)
         for kind, tally in tallies.items():
             line = f"  {kind:8}{tally.count:7} compared, {tally.open} open, {tally.wrong} wrong"

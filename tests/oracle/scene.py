@@ -3,9 +3,17 @@
 As docs/verify.md tells it, the eye is subtracted in double, then each number is rounded once to the precision; what is
 left is exact."""
 
+import struct
+
 import exact
 from exact import dot, rational, subtract, vector
 from flint import arb
+
+
+def narrow(number):
+    """As a float has it."""
+    return struct.unpack("f", struct.pack("f", number))[0]
+
 
 class Material:
     def __init__(self, given, rounding):
@@ -110,10 +118,9 @@ def unit(values):
 
 
 class Scene:
-    def __init__(self, given, width):
-        """given: what a scene file says."""
+    def __init__(self, given, rounding):
+        """given: what a scene file says. rounding: to the precision."""
         eye = [float(x) for x in given["camera"]["position"]]
-        rounding = width.rounding
 
         def from_eye(point):
             return vector(rounding(float(x) - e) for x, e in zip(point, eye))

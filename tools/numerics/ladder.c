@@ -33,8 +33,6 @@ static const SpecimenKind ladder_kinds[SHAPES] = {
 
 typedef struct {
     size_t ray_count; // of each shape, over all rungs; 0: no errors are measured
-    size_t
-        sample_count; // not 0: print so many rays of each rung and specimen with what they meet, and no more
     bool hold, time;
     unsigned precisions; // set
     const char *shape;   // NULL: all
@@ -175,33 +173,6 @@ static void tally_add(Tally *tally, const Specimen *specimen, const Rays *rays, 
     if (undecided) return;
     double owed = tier->ulps * ulp + tier->slack * scale / (cosine * vector_length(direction));
     tally->owed = fmax(tally->owed, isfinite(off) ? off / owed : HUGE_VAL);
-}
-
-static void numbers_write(Json *json, const char *key, const double *numbers, size_t count)
-{
-    json_begin_array(json, key);
-    for (size_t i = 0; i < count; i++)
-        json_number(json, NULL, numbers[i]);
-    json_end(json);
-}
-
-// For tools/numerics/certify: a ray, the shape by numbers, and the reference's t as the sum of two doubles.
-static void sample_write(Json *json, const char *shape, const Object *object, const Rays *rays, size_t i)
-{
-    const TraceRay *ray = &rays->rays[i];
-    const ReferenceHit *hit = &rays->hits[i];
-    json_begin_object(json, NULL);
-    json_text(json, "shape", shape);
-    numbers_write(json, "origin", ray->origin, 3);
-    numbers_write(json, "direction", ray->direction, 3);
-    // the members of each shape are doubles in a row; those of finite round ones end after the radii
-    numbers_write(json, "numbers", (const double *)(const void *)&object->as, 9);
-    json_boolean(json, "found", hit->found);
-    double high = hit->found ? (double)hit->t : 0;
-    json_number(json, "t", high);
-    json_number(json, "t_rest", hit->found ? (double)(hit->t - high) : 0);
-    json_number(json, "margin", (double)hit->margin);
-    json_end(json);
 }
 
 static int compare_doubles(const void *a, const void *b)
@@ -364,19 +335,6 @@ static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, 
     return held;
 }
 
-static void shape_samples(const LadderShape *shape, size_t count, Json *json)
-{
-    Random random = {3};
-    for (int rung = 0; rung < RUNG_COUNT; rung++)
-        for (int which = 0; which < SPECIMENS; which++) {
-            const Object *object = &shape->specimens[which].object;
-            Rays rays = rays_make(object, &shape->specimens[which], rungs[rung], count, true, &random);
-            for (size_t i = 0; i < count; i++)
-                sample_write(json, shape->name, object, &rays, i);
-            rays_free(&rays);
-        }
-}
-
 static bool options_read(LadderOptions *options, int argument_count, char **arguments)
 {
     static const struct option names[] = {{"rays", required_argument, NULL, 'r'},
@@ -384,7 +342,6 @@ static bool options_read(LadderOptions *options, int argument_count, char **argu
                                           {"precision", required_argument, NULL, 'p'},
                                           {"hold", no_argument, NULL, 'h'},
                                           {"time", no_argument, NULL, 't'},
-                                          {"samples", required_argument, NULL, 'c'},
                                           {0}};
     *options = (LadderOptions){.ray_count = 1000000};
     int option;
@@ -393,7 +350,6 @@ static bool options_read(LadderOptions *options, int argument_count, char **argu
         if (option == 's') options->shape = optarg;
         if (option == 'h') options->hold = true;
         if (option == 't') options->time = true;
-        if (option == 'c') options->sample_count = strtoul(optarg, NULL, 10);
         for (int i = 0; option == 'p' && i < PRECISION_COUNT; i++)
             if (strcmp(optarg, precision_names[i]) == 0) options->precisions |= 1U << i;
         if (option == '?') return false;
@@ -406,21 +362,8 @@ int main(int argument_count, char **arguments)
 {
     LadderOptions options;
     if (!options_read(&options, argument_count, arguments)) {
-        fputs("usage: ladder [--rays COUNT] [--shape NAME] [--precision P]... [--time] [--hold]\n       "
-              "ladder --samples COUNT\n",
-              stderr);
+        fputs("usage: ladder [--rays COUNT] [--shape NAME] [--precision P]... [--time] [--hold]\n", stderr);
         return EXIT_FAILURE;
-    }
-    if (options.sample_count > 0) {
-        Json *json = json_open();
-        json_begin_array(json, "samples");
-        for (int i = 0; i < SHAPES; i++) {
-            LadderShape shape = shape_make(ladder_kinds[i]);
-            shape_samples(&shape, options.sample_count, json);
-        }
-        json_end(json);
-        json_print(json, stdout);
-        return EXIT_SUCCESS;
     }
     DeviceList devices;
     Compute compute;

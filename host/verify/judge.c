@@ -1,0 +1,185 @@
+#include "host/verify/judge.h"
+
+#include "host/base/memory.h"
+#include <math.h>
+#include <string.h>
+
+int verify_oracle_bits(void)
+{
+    return QUAD_BITS;
+}
+
+static Object object_at_work(const VerifyRun *run, const Object *object)
+{
+    return verify_is_wide(run) ? *object : reference_round_object(object);
+}
+
+static VerifyTarget target_from(const Object *object, Vector3 origin)
+{
+    ReferenceSurface surface = reference_surface(object, quad3(origin));
+    double distance = vector_length(vector_subtract(surface.center, origin));
+    return (VerifyTarget){*object, distance, surface.size, surface.radius};
+}
+
+VerifyTarget verify_target(const VerifyRun *run, const Object *object, Vector3 eye)
+{
+    const Vector3 origin = {0, 0, 0};
+    Object seen = reference_object_from(object, eye);
+    seen = object_at_work(run, &seen);
+    return target_from(&seen, origin);
+}
+
+Object *verify_objects(const VerifyRun *run, const Scene *scene)
+{
+    Object *objects = memory_allocate(scene->objects.count, sizeof *objects);
+    for (size_t i = 0; i < scene->objects.count; i++)
+        objects[i] = object_at_work(run, &scene->objects.items[i]);
+    return objects;
+}
+
+// Whether the tier leaves open that the ray hits the target.
+static bool is_open(const VerifyRun *run, const VerifyTarget *target, const ReferenceHit *exact)
+{
+    const double u = verify_roundoff(run);
+    if (run->tier == TIER_A) return true;
+    if (target->object.kind == SHAPE_TRIANGLE) return exact->margin <= 16 * u * target->distance;
+    if (run->tier == TIER_B) return exact->margin <= 4 * u * fmax(target->distance, target->radius);
+    return exact->margin <= 16 * u * target->radius;
+}
+
+// What t may be off, in its own unit.
+static double bound_of(const VerifyRun *run, const VerifyTarget *target, const ReferenceHit *exact,
+                       double length, const VerifyLimits *limits)
+{
+    const double u = verify_roundoff(run), ulp = verify_ulp(run, (double)exact->t);
+    if (limits && limits->within[run->tier] > 0) return limits->within[run->tier];
+    if (limits && limits->ulps[run->tier] != 0) return fmax(limits->ulps[run->tier], 0) * ulp;
+    if (run->tier == TIER_A) return INFINITY;
+    double cosine = fmax((double)exact->cosine, 1e-30), slope = 1 / (cosine * length);
+    if (run->tier == TIER_B)
+        return 8 * ulp + (cosine < 0.1 ? 16 * u * (target->distance + target->size) * slope : 0);
+    return 4 * ulp + 4 * u * (target->size > 0 ? target->size : target->distance) * slope;
+}
+
+static void judge_distance(VerifyRun *run, const ReferenceHit *exact, double t, double bound)
+{
+    double ulp = verify_ulp(run, (double)exact->t);
+    verify_note_error(run, (double)quad_absolute(t - exact->t) / ulp, bound / ulp);
+}
+
+ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *picture, size_t pixel)
+{
+    const Vector3 eye = {0, 0, 0};
+    ReferenceRay ray = reference_ray(eye, verify_vector(&picture->ray[3 * pixel]));
+    return reference_hit_object(&target->object, &ray);
+}
+
+ReferenceHit verify_judge_pixel(VerifyRun *run, const VerifyTarget *target, const Film *picture, size_t pixel)
+{
+    ReferenceHit exact = verify_pixel_hit(target, picture, pixel);
+    if (verify_pixel_found(picture, pixel) != exact.found) {
+        run->result->wrong += !is_open(run, target, &exact);
+    } else if (exact.found) {
+        double length = vector_length(verify_vector(&picture->ray[3 * pixel]));
+        judge_distance(run, &exact, picture->t[pixel], bound_of(run, target, &exact, length, NULL));
+    }
+    return exact;
+}
+
+ReferenceRay verify_reference_ray(const TraceRay *ray)
+{
+    ReferenceRay exact = reference_ray(verify_vector(ray->origin), verify_vector(ray->direction));
+    exact.tmin = ray->tmin;
+    return exact;
+}
+
+bool verify_is_decided(const VerifyRun *run, const VerifyJudgedRay *judged)
+{
+    return judged->required.must && strchr(judged->required.must, 'A' + (int)run->tier);
+}
+
+VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyJudgedRay *judged,
+                               ReferenceHit exact)
+{
+    const VerifyRay *required = &judged->required;
+    VerifyTarget target = target_from(object, verify_vector(judged->ray.origin));
+    VerifyExpected expected = {exact, is_open(run, &target, &exact), 0};
+    if (!exact.found && required->touch != 0) {
+        expected.exact.found = true;
+        expected.exact.t = required->touch;
+    }
+    double length = vector_length(verify_vector(judged->ray.direction));
+    if (expected.exact.found)
+        expected.bound = bound_of(run, &target, &expected.exact, length, required->limits);
+    return expected;
+}
+
+void verify_judge_ray(VerifyRun *run, const Object *objects, size_t count, const VerifyJudgedRay *judged,
+                      const TraceHit *hit)
+{
+    ReferenceRay ray = verify_reference_ray(&judged->ray);
+    const bool decided = verify_is_decided(run, judged);
+    bool found = false, certain = false, wrong = false;
+    for (size_t i = 0; i < count; i++) {
+        ReferenceHit exact = reference_hit_object(&objects[i], &ray);
+        bool reported = i == hit->object;
+        if (!exact.found && judged->required.touch == 0 && !reported) continue;
+        VerifyExpected expected = verify_expected(run, &objects[i], judged, exact);
+        found |= expected.exact.found;
+        certain |= expected.exact.found && !expected.open;
+        if (reported && expected.exact.found)
+            judge_distance(run, &expected.exact, hit->t, expected.bound);
+        else if (reported)
+            wrong |= !expected.open;
+        else if (verify_is_hit(hit) && !expected.open) // this one may be nearer
+            wrong |= expected.exact.t < hit->t - expected.bound;
+    }
+    if (verify_is_hit(hit))
+        wrong |= decided && !found;
+    else
+        wrong |= certain || (decided && found);
+    run->result->wrong += wrong;
+}
+
+// How far a hit's point may be off the surface.
+static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length, double size)
+{
+    const double u = verify_roundoff(run), *o = ray->origin;
+    double start = fmax(fabs(o[0]), fmax(fabs(o[1]), fabs(o[2])));
+    if (run->tier == TIER_B) return 16 * u * (start + t * length + size);
+    return 2 * verify_ulp(run, t) * length + 8 * u * size;
+}
+
+// The angle between two nearly parallel vectors, the second a unit vector.
+static double turned_by(Quad3 normal, Quad3 exact)
+{
+    Vector3 unit = quad3_rounded(exact);
+    bool opposite = vector_dot(quad3_rounded(normal), unit) < 0;
+    Vector3 change = quad3_rounded((opposite ? quad3_add : quad3_subtract)(normal, exact));
+    return vector_length(vector_cross(change, unit));
+}
+
+void verify_judge_surface(VerifyRun *run, const Object *object, const TraceRay *ray, const TraceHit *hit)
+{
+    if (run->tier == TIER_A || !verify_is_hit(hit)) return;
+    Vector3 origin = verify_vector(ray->origin), direction = verify_vector(ray->direction);
+    Quad3 point = quad3_add(quad3(origin), quad3_scale(quad3(direction), hit->t));
+    ReferenceSurface surface = reference_surface(object, point);
+    Quad distance = reference_surface_distance(&surface);
+    double bound = surface_bound(run, ray, hit->t, vector_length(direction), surface.size);
+    run->result->off += !(distance <= bound);
+    run->result->surface_part = fmax(run->result->surface_part, (double)distance / bound);
+
+    // at an edge the normal may be that of any of the sheets that meet there
+    Quad3 normal = quad3(verify_vector(hit->normal));
+    double least_part = INFINITY;
+    for (int i = 0; i < surface.count; i++) {
+        const ReferenceSheet *sheet = &surface.sheets[i];
+        if (sheet->distance > distance + bound) continue;
+        double turned = turned_by(normal, sheet->normal);
+        double tolerance = 8 * verify_roundoff(run) * surface.condition + bound / (double)sheet->bend;
+        least_part = fmin(least_part, turned / tolerance);
+    }
+    run->result->turned += !(least_part <= 1);
+    run->result->normal_part = fmax(run->result->normal_part, least_part);
+}

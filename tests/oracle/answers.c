@@ -1,0 +1,154 @@
+// Prints rays and what the reference answers (host/verify/reference.h): those of the hard cases, at the width
+// of float and of double, and random ones at random objects. tests/oracle/certify.py checks them in exact
+// arithmetic.
+//
+//     answers [SAMPLES [FURTHER]]
+//
+// SAMPLES: how many random rays at each random object; FURTHER: the last ray, without an answer, to print of
+// each family that is closed. A line is a JSON object: a set's name, then its objects, then its rays.
+#include "host/verify/judge.h"
+#include "tests/specimen.h"
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { OBJECTS_OF_A_KIND = 4 };
+
+static void numbers_print(const char *key, const double *numbers, size_t count)
+{
+    printf("\"%s\": [", key);
+    for (size_t i = 0; i < count; i++)
+        printf("%s%.17g", i > 0 ? ", " : "", numbers[i]);
+    printf("]");
+}
+
+// As a double and the rest.
+static void quad_print(const char *key, Quad number)
+{
+    printf(", ");
+    numbers_print(key, (const double[]){(double)number, (double)(number - (double)number)}, 2);
+}
+
+static const char *json_of(bool value)
+{
+    return value ? "true" : "false";
+}
+
+static void set_print(const char *name, bool wide)
+{
+    printf("{\"set\": \"%s\", \"wide\": %s}\n", name, json_of(wide));
+}
+
+static void object_print(const Object *object)
+{
+    printf("{\"shape\": \"%s\", ", shape_names[object->kind]);
+    const bool *flags = object->kind == SHAPE_CYLINDER     ? &object->as.cylinder.finite
+                        : object->kind == SHAPE_CONE       ? &object->as.cone.finite
+                        : object->kind == SHAPE_PARABOLOID ? &object->as.paraboloid.finite
+                                                           : NULL;
+    if (flags) printf("\"finite\": %s, \"caps\": %s, ", json_of(flags[0]), json_of(flags[1]));
+    // the members of each shape begin with its doubles in a row
+    numbers_print("numbers", (const double *)(const void *)&object->as, 9);
+    printf("}\n");
+}
+
+static void ray_print(const TraceRay *ray)
+{
+    printf("{");
+    numbers_print("origin", ray->origin, 3);
+    printf(", ");
+    numbers_print("direction", ray->direction, 3);
+    printf(", \"start\": %.17g", ray->tmin);
+}
+
+static void hit_print(const ReferenceHit *hit)
+{
+    printf(", \"margin\": %.17g, \"found\": %s", fmin((double)hit->margin, DBL_MAX), json_of(hit->found));
+    if (!hit->found) return;
+    quad_print("t", hit->t);
+    quad_print("cosine", hit->cosine);
+    quad_print("x", hit->normal.x);
+    quad_print("y", hit->normal.y);
+    quad_print("z", hit->normal.z);
+}
+
+// The nearest hit, and what the tiers leave open and allow; where nothing is hit, of the object that is
+// missed by the least.
+static void judged_print(bool wide, const Object *objects, size_t count, const VerifyJudgedRay *judged)
+{
+    ReferenceRay ray = verify_reference_ray(&judged->ray);
+    size_t nearest = 0;
+    ReferenceHit hit = reference_hit_object(&objects[0], &ray);
+    for (size_t i = 1; i < count; i++) {
+        ReferenceHit other = reference_hit_object(&objects[i], &ray);
+        bool nearer = other.found ? !hit.found || other.t < hit.t : !hit.found && other.margin < hit.margin;
+        if (!nearer) continue;
+        nearest = i;
+        hit = other;
+    }
+    ray_print(&judged->ray);
+    hit_print(&hit);
+    printf(", \"object\": %zu, \"tiers\": {", nearest);
+    for (VerifyTier tier = wide ? TIER_D : TIER_A; tier <= (wide ? TIER_D : TIER_C); tier++) {
+        const VerifyRun run = {.tier = tier};
+        VerifyExpected expected = verify_expected(&run, &objects[nearest], judged, hit);
+        printf("%s\"%c\": {\"open\": %s, \"decided\": %s, \"touch\": %s, \"bound\": %.17g}",
+               tier % TIER_D > 0 ? ", " : "", 'A' + (int)tier, json_of(expected.open),
+               json_of(verify_is_decided(&run, judged)), json_of(expected.exact.found && !hit.found),
+               fmin(expected.bound, DBL_MAX));
+    }
+    printf("}}\n");
+}
+
+static void case_print(const VerifyRays *set, bool wide, size_t further)
+{
+    const VerifyRun run = {.tier = wide ? TIER_D : TIER_C};
+    Scene scene = verify_rays_scene(set);
+    Object *objects = verify_objects(&run, &scene);
+    VerifyJudgedRays judged = verify_rays_judged(&run, set);
+    set_print(set->name, wide);
+    for (size_t i = 0; i < scene.objects.count; i++)
+        object_print(&objects[i]);
+    for (size_t i = 0; i < judged.count; i++)
+        judged_print(wide, objects, scene.objects.count, &judged.items[i]);
+    for (size_t i = judged.count; set->closed && i < further; i++) {
+        TraceRay ray = set->family(i);
+        verify_round_ray(&run, &ray);
+        ray_print(&ray);
+        printf("}\n");
+    }
+    free(judged.items);
+    free(objects);
+    scene_free(&scene);
+}
+
+static void specimens_print(SpecimenKind kind, size_t samples)
+{
+    Random random = {kind};
+    for (int i = 0; i < OBJECTS_OF_A_KIND; i++) {
+        Specimen specimen = specimen_make(kind, &random);
+        set_print(specimen_names[kind], true);
+        object_print(&specimen.object);
+        for (size_t k = 0; k < samples; k++) {
+            SpecimenRay given = specimen_ray(&specimen, &random);
+            Vector3 o = given.origin, d = given.direction;
+            TraceRay ray = {{o.x, o.y, o.z}, {d.x, d.y, d.z}, 0, INFINITY};
+            ReferenceRay exact_ray = verify_reference_ray(&ray);
+            ReferenceHit hit = reference_hit_object(&specimen.object, &exact_ray);
+            ray_print(&ray);
+            hit_print(&hit);
+            printf("}\n");
+        }
+    }
+}
+
+int main(int argument_count, char **arguments)
+{
+    size_t samples = argument_count > 1 ? strtoul(arguments[1], NULL, 10) : 0;
+    size_t further = argument_count > 2 ? strtoul(arguments[2], NULL, 10) : 0;
+    for (size_t i = 0; i < verify_rays_count; i++)
+        for (int wide = 0; wide < 2; wide++)
+            case_print(&verify_rays[i], wide, further);
+    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT && samples > 0; kind++)
+        specimens_print(kind, samples);
+    return EXIT_SUCCESS;
+}

@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""Checks the reference (host/verify/reference.h) in exact arithmetic.
+
+usage: answers 24 | certify.py [--long] [--spoil PART] [--set NAME]
+
+tests/oracle/answers.c prints rays of the hard cases and random ones with what the reference answers. Hit or miss has to
+be right wherever the margin is not smaller than quadruple precision resolves; t, the cosine and the normal within a
+thousandth of what `double` could see. The margin, by which tiers leave hit or miss open, must never be larger than what
+decides: a solid grown or shrunk by less answers the same. Nor may it always be small: grown or shrunk by four times as
+much most solids answer otherwise.
+
+Prints what was compared and the worst errors as parts of their bounds; exit status 1 if one is beyond its bound or too
+little was compared. Of large families of rays the first 200 are checked, with --long all that are judged. --spoil: each
+answer is changed by this part of itself first, to show that it is noticed. --set: of these rays alone."""
+
+import argparse
+import json
+import sys
+from collections import Counter
+from fractions import Fraction
+
+import exact
+from color import grown
+from exact import fraction, subtract
+
+PART = Fraction(1, 2**62)
+RESOLVED = 2.0**-80  # margins below this part of the size may be lost in roundings
+BEND = 0.01  # margins up to this part of the radius are proportional to distances
+SHAPES = "sphere", "plane", "disc", "box", "cylinder", "cone", "paraboloid", "triangle", "torus"
+SHORT = 200  # rays of a set
+LEAST = {"hit or miss": 100, "t": 60, "normal": 60}  # of each shape
+
+
+def shape_of(given):
+    kind, n = given["shape"], given["numbers"]
+    if kind == "sphere":
+        return exact.Sphere(n[:3], n[3])
+    if kind == "plane":
+        return exact.Plane(n[:3], n[3:6])
+    if kind == "disc":
+        return exact.Disc(n[:3], n[3:6], n[6])
+    if kind == "box":
+        return exact.Box(n[:3], n[3:6])
+    if kind == "cylinder":
+        return exact.Revolution(n[:3], n[3:6], [n[6]] * 2, not given["finite"], given["caps"])
+    if kind == "cone" and given["finite"]:
+        return exact.Revolution(n[:3], n[3:6], n[6:8], caps=given["caps"])
+    if kind == "cone":
+        return exact.DoubleCone(n[:3], n[3:6], n[8])
+    if kind == "paraboloid":
+        return exact.Paraboloid(n[:3], n[3:6], n[6], n[7], not given["finite"], given["caps"])
+    if kind == "triangle":
+        return exact.Triangle(n[:3], n[3:6], n[6:9])
+    return exact.Torus(n[:3], n[6], n[7], n[3:6])
+
+
+class Set:
+    """A scene and what rays at it should hit."""
+
+    def __init__(self, name, wide):
+        self.name, self.wide, self.given, self.rays = name, wide, [], []
+
+
+def sets_read(stream):
+    sets = []
+    for line in stream:
+        entry = json.loads(line)
+        if "set" in entry:
+            sets.append(Set(entry["set"], entry["wide"]))
+        elif "shape" in entry:
+            sets[-1].given.append(entry)
+        else:
+            sets[-1].rays.append(entry)
+    return sets
+
+
+class Near:
+    """The shapes of a mesh that a ray comes as near to as they are large."""
+
+    def __init__(self, shapes):
+        self.shapes = [(shape, *exact.floats(shape.center), shape.size**2) for shape in shapes]
+
+    def find(self, ray):
+        ox, oy, oz = exact.floats(ray.origin)
+        dx, dy, dz = exact.floats(ray.direction)
+        dd = dx * dx + dy * dy + dz * dz
+        found = []
+        for shape, x, y, z, squared in self.shapes:
+            x, y, z = x - ox, y - oy, z - oz
+            along = x * dx + y * dy + z * dz
+            if x * x + y * y + z * z - along * along / dd <= 1.001 * squared:
+                found.append(shape)
+        return found
+
+
+class Tallies:
+    """How many values of each kind were compared, and the worst error as a part of its bound."""
+
+    def __init__(self, spoil):
+        self.spoil, self.counts, self.worst, self.wrong = spoil, Counter(), {}, 0
+
+    def take(self, kind, error, bound, what):
+        self.counts[kind] += 1
+        part = float(error / bound) if bound > 0 else (float("inf") if error > 0 else 0.0)
+        self.worst[kind] = max(self.worst.get(kind, 0.0), part)
+        if not part <= 1:
+            self.wrong += 1
+            self.counts[f"{kind}: wrong"] += 1
+            if self.counts[f"{kind}: wrong"] <= 3:
+                print(f"  {kind} is off by {part:.3g} of its bound: {what}")
+
+    def spoiled(self, pair):
+        """A number printed as a double and the rest of it."""
+        return (Fraction(pair[0]) + Fraction(pair[1])) * (1 + self.spoil)
+
+
+def check_hit(kind, shapes, ray, given, tallies):
+    hits = [(t, i) for i, t in enumerate(shape.hit(ray) for shape in shapes) if t is not None]
+    size = max((shape.size for shape in shapes), default=1.0) or 1.0
+    if given["margin"] > RESOLVED * size:
+        tallies.take(f"{kind}: hit or miss", int(given["found"] != bool(hits)), 0, given)
+    if not hits or not given["found"]:
+        return
+    t, index = min(hits)
+    shape, cosine = shapes[index], given["cosine"][0]
+    spread = PART * (fraction(t) + Fraction(shape.size or shape.distance(ray)) / Fraction(max(cosine, 1e-25) * ray.scale))
+    tallies.take(f"{kind}: t", abs(tallies.spoiled(given["t"]) - fraction(t)), spread, given)
+    if len(shapes) > 1 or cosine < 1e-6:
+        return  # of triangles that meet any may be the first
+    tallies.take(f"{kind}: cosine", abs(tallies.spoiled(given["cosine"]) - Fraction(shape.cosine(ray, t))), Fraction(1, 2**40), given)
+    outward = shape.normal([exact.middle(x) for x in ray.at(t)])
+    length = (exact.dot(outward, outward) * exact.arb(1)).sqrt()
+    side = -1 if fraction(exact.dot(outward, ray.direction)) > 0 else 1
+    normal = [fraction(side * x / length) for x in outward]
+    off = max(abs(tallies.spoiled(given[axis]) - n) for axis, n in zip("xyz", normal))
+    bend = Fraction(shape.size / shape.radius) if shape.radius else 1
+    # at an edge a box has a normal of each face
+    if not isinstance(shape, exact.Box) or sum(x != 0 for x in outward) == 1:
+        tallies.take(f"{kind}: normal", off, PART * (1 + bend / Fraction(cosine)), given)
+
+
+def check_margin(kind, shape, ray, given, tallies):
+    margin, limit = given["margin"] * float(1 + tallies.spoil), BEND * (shape.radius or 1)
+    if isinstance(shape, exact.Box):
+        limit = BEND * min(shape.half)
+    # of a plane nothing grows, and a paraboloid grows into no paraboloid
+    is_fixed = isinstance(shape, (exact.Plane, exact.Paraboloid))
+    # in a face of a box hit or miss is a comparison of given numbers
+    is_compared = isinstance(shape, exact.Box) and sum(x == 0 for x in ray.direction) == 2
+    if is_fixed or is_compared or margin <= RESOLVED * shape.size:
+        return
+
+    def is_found(by):
+        return grown(shape, by).hit(ray) is not None
+
+    # an edge moves by more than the faces that meet there
+    within = (0.49 if isinstance(shape, (exact.Sphere, exact.Torus)) else 0.2) * min(margin, limit)
+    held = all(is_found(by) == given["found"] for by in (within, -within))
+    tallies.take(f"{kind}: margin", int(not held), 0, given)
+    if margin < limit and not shape.contains(ray.origin):
+        tallies.counts["narrow margins"] += 1
+        tallies.counts["tight margins"] += any(is_found(by) != given["found"] for by in (2 * margin, -2 * margin))
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--spoil", type=Fraction, default=Fraction(0))
+    parser.add_argument("--long", action="store_true")
+    parser.add_argument("--set")
+    options = parser.parse_args()
+    tallies = Tallies(options.spoil)
+    for set_ in sets_read(sys.stdin):
+        if options.set not in (None, set_.name):
+            continue
+        shapes = [shape_of(given) for given in set_.given]
+        kind = set_.given[0]["shape"]
+        near = Near(shapes) if len(shapes) > 1 else None
+        for given in set_.rays[: None if options.long else SHORT]:
+            ray = exact.Ray(given["origin"], given["direction"], given["start"])
+            check_hit(kind, near.find(ray) if near else shapes, ray, given, tallies)
+            if not near:
+                check_margin(kind, shapes[0], ray, given, tallies)
+    for kind, count in sorted(tallies.counts.items()):
+        worst = f", worst {tallies.worst[kind]:.3g} of the bound" if kind in tallies.worst else ""
+        print(f"{kind:24} {count:6} compared{worst}")
+    counts = tallies.counts
+    is_enough = all(counts[f"{shape}: {kind}"] >= least for shape in SHAPES for kind, least in LEAST.items())
+    is_tight = counts["tight margins"] >= counts["narrow margins"] / 2 > 50
+    sys.exit(0 if is_enough and is_tight and tallies.wrong == 0 else 1)
+
+
+if __name__ == "__main__":
+    main()
