@@ -28,6 +28,7 @@
 #define CUBE              "  - box: {min: [-1, -1, -1], max: [1, 1, 1]}\n"
 #define ROUND_TABLE       "  - disc: {center: [10, 20, 30], normal: [1, 1, 1], radius: 2}\n"
 #define INFINITE_CYLINDER "  - cylinder: {point: [0, 0, 0], axis: [0, 0, 1], radius: 1}\n"
+#define BOWL              "  - paraboloid: {apex: [0, 0, 0], axis: [0, 0, 1], radius: 1, height: 1}\n"
 #define RING              "  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: 0.25}\n"
 
 static const VerifyRay s1[] = {
@@ -135,6 +136,31 @@ static const VerifyRay t4[] = {
 };
 static const VerifyRay t5[] = {{{1.0005, 0, -10}, Z}, {{1.0009, 0, -10}, Z}, {{1.0011, 0, -10}, Z}};
 static const VerifyRay t6[] = {{{160.371250, -6.351337, -0.000241}, {0.852793, -0.522249, -0.000020}}};
+static const VerifyRay q1[] = {
+    {{0.3, 0.2, -100}, Z},  {{0.3, 0.2, -1e4}, Z},  {{0.3, 0.2, -1e6}, Z},
+    {{-100, 0.2, 0.5}, X},  {{-1e4, 0.2, 0.5}, X},  {{-1e6, 0.2, 0.5}, X},
+    {{-100, 0.75, 0.5}, X}, {{-1e4, 0.75, 0.5}, X}, {{0.3, 0.2, 1e4}, {0, 0, -1}},
+};
+static const VerifyRay q2[] = {
+    {{0, 0, -5}, Z},
+    {{0.5, 0, -3}, Z},
+    {{2, 1, -3}, Z},
+    {{0.5, 0, -3}, {0x1p-12, 0, 1}},
+    {{0.5, 0, -3}, {0x1p-20, 0, 1}},
+    {{0.5, 0, -3}, {-0.0, -0.0, 1}},
+    {{0, 0, 5}, {0, 0, -1}},
+    {{0.5, 0, 5}, {0x1p-20, 0, -1}},
+};
+static const VerifyRay q3[] = {
+    {{0, 0, 0.5}, X},
+    {{0, 0, 0.5}, Z},
+    {{0, 0, 0.5}, {0, 0, -1}},
+    {{0.3, 0.2, 0.9}, {1, 2, -3}},
+    {{0, 0, 0x1p-20}, X},
+    {{0, 0, 0x1p-20}, {0, 0, -1}},
+    {{0.5, 0, 0.25 + 0x1p-20}, X},
+    {{0.5, 0, 0.25 + 0x1p-20}, {-1, 0, 0}},
+};
 static const VerifyRay m3[] = {{{2e-4 / 3, 2e-4 / 3, -1}, Z}};
 static const VerifyRay m4[] = {{{0.5, 3e-7, 1}, {0, 0, -1}}, {{0.5, 3e-7, 1e3}, {0, 0, -1}}};
 static const VerifyRay m5[] = {
@@ -186,6 +212,10 @@ const VerifyRays verify_rays[] = {
     {"T5", "  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: 0.001}\n", BY_NUMBERS(t5)},
     {"T6", "  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 143, minor: 113.2}\n", BY_NUMBERS(t6),
      .must = "BCD", .limits = LIMITS(.ulps = {0, 16, 16, 0}, .within[TIER_D] = 1e-12)},
+    {"Q1", BOWL, BY_NUMBERS(q1), .must = "BCD", .limits = ULPS(4, 4, 4)},
+    {"Q2", "  - paraboloid: {apex: [0, 0, 0], axis: [0, 0, 1], focal_length: 0.25}\n", BY_NUMBERS(q2),
+     .must = "ABCD", .limits = ULPS(4, 4, 4)},
+    {"Q3", BOWL, BY_NUMBERS(q3), .must = "ABCD"},
     {"M1", .scene_make = scene_icosphere, .family = family_from_within, .ray_count = 1000000,
      .judged_count = JUDGED_IN_MESH, .closed = true, .must = "ABCD"},
     {"M3", "  - triangle: {vertices: [[0, 0, 0], [0.0002, 0, 0], [0, 0.0002, 0]]}\n", BY_NUMBERS(m3),
