@@ -3,6 +3,7 @@
 #define CAMERA_H
 
 #include "scene.h"
+#include "traversal/ray.h"
 
 typedef struct {
     integer x, y; // in the whole image, from the top left

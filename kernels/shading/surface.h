@@ -3,6 +3,7 @@
 #define SURFACE_H
 
 #include "shading/texture.h"
+#include "traversal/traversal.h"
 
 typedef Vector Color3;
 

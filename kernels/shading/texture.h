@@ -5,6 +5,7 @@
 
 #include "numerics/angle.h"
 #include "scene.h"
+#include "shapes/surface_point.h"
 
 // u runs along the texture's rows, v from bottom to top, from 0 to 1; beyond that the texture repeats.
 typedef struct {

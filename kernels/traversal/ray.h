@@ -116,20 +116,6 @@ static inline void ray_set_common_origin(Ray *ray, uint common_origin)
     ray->cull_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
 }
 
-// Conservative bounding-sphere cull: the lanes whose lines certainly miss it. A line along d through a common
-// origin misses a sphere around v, seen from there, if (v . d)^2 < p d^2 for the origin's power p = v^2 -
-// r^2. The sphere is enlarged by 64 u (|v| + |d|), for the error of the shape's own test, the roundings here
-// and the line's distance from the common origin. That is less than 256 u v^2, which p is lowered by, plus
-// 128 u d^2, the cull slack; rays from the eye start there and need only the former.
-static inline mask ray_misses_cull_sphere(const Ray *ray, global const CullSphere *sphere)
-{
-    global const scalar *center_power = (global const scalar *)sphere;
-    real along = real_fma(
-        (real)(center_power[0]), ray->direction.x,
-        real_fma((real)(center_power[1]), ray->direction.y, (real)(center_power[2]) * ray->direction.z));
-    return real_fma(along, along, ray->cull_slack) < ray->squared * (real)(center_power[3]);
-}
-
 // The nearer of two crossings, near_t <= far_t, beyond the ray's start: far_t if near_t lies before it.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {

@@ -1,0 +1,121 @@
+// Rays against the axis-aligned boxes of the BVH.
+//
+// A hit may lie outside its primitive's box, for any shape: each test is off by a few u times the distance
+// between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
+// here adds a few u of the coordinates. Boxes are enlarged by all of that, the `slack`.
+//
+// Products are bounded: |1 / direction| is limited to 2^120 (2^1000) over the coordinates, at which a ray
+// moves by less than the slack along that axis on its way through the scene. That holds while the direction's
+// largest component is well above 2^-100 (2^-950) of the coordinates.
+#ifndef BOXES_H
+#define BOXES_H
+
+#include "scene.h"
+#include "traversal/ray.h"
+
+// Rays prepared for boxes: a ray is between the two planes of an enlarged box across an axis from
+// plane * inverse + to_near to plane * inverse + to_far.
+typedef struct {
+    Vector inverse; // 1 / direction, bounded
+    Vector to_near, to_far;
+    real near;
+    real slack;
+    uint negative_x, negative_y, negative_z; // the lanes whose direction is negative, as bits
+} BoxRays;
+
+static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
+{
+    Vector center = vector_of(bounds);
+    real reach = vector_magnitude(vector_subtract(ray->origin, center)) + (real)(bounds.w);
+    real coordinates = real_fma((real)(2), vector_magnitude(center), reach);
+    real slack = real_fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
+    const real huge = (real)(1 / SMALLEST_RATIO);
+    real largest = real_min(huge * real_inverse_power(coordinates), huge);
+    Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),
+                      real_min(real_max(ray->inverse.y, -largest), largest),
+                      real_min(real_max(ray->inverse.z, -largest), largest)};
+    Vector to_plane = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
+    Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
+    Vector d = ray->direction;
+    BoxRays rays;
+    rays.inverse = inverse;
+    rays.to_near = vector_subtract(to_plane, around);
+    rays.to_far = vector_add(to_plane, around);
+    rays.near = ray->near;
+    rays.slack = slack;
+    rays.negative_x = lanes_bits(d.x < (real)(0));
+    rays.negative_y = lanes_bits(d.y < (real)(0));
+    rays.negative_z = lanes_bits(d.z < (real)(0));
+    return rays;
+}
+
+typedef struct {
+    real enter, leave;
+} BoxInterval;
+
+static inline BoxInterval box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
+{
+    return (BoxInterval){
+        real_min(real_fma((real)(low), inverse, to_near), real_fma((real)(high), inverse, to_near)),
+        real_max(real_fma((real)(low), inverse, to_far), real_fma((real)(high), inverse, to_far))};
+}
+
+// The rays, in any octant, that meet a box between near and limit.
+static inline mask box_rays_meet(const BoxRays *rays, scalar4 low, scalar4 high, real limit)
+{
+    Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
+    BoxInterval x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
+    BoxInterval y = box_rays_between(low.y, high.y, inverse.y, to_near.y, to_far.y);
+    BoxInterval z = box_rays_between(low.z, high.z, inverse.z, to_near.z, to_far.z);
+    return real_max(real_max(x.enter, y.enter), real_max(z.enter, rays->near)) <=
+           real_min(real_min(x.leave, y.leave), real_min(z.leave, limit));
+}
+
+// Which of a node's planes rays of one octant enter and leave a box by.
+typedef struct {
+    uint near_x, near_y, near_z, far_x, far_y, far_z;
+} Octant;
+
+static inline Octant octant_make(bool negative_x, bool negative_y, bool negative_z)
+{
+    uint x = negative_x ? BVH_HIGH : BVH_LOW, y = negative_y ? BVH_HIGH : BVH_LOW,
+         z = negative_z ? BVH_HIGH : BVH_LOW;
+    const uint both = BVH_LOW + BVH_HIGH;
+    return (Octant){x, 1 + y, 2 + z, both - x, 1 + both - y, 2 + both - z};
+}
+
+static inline Octant octant_of_lane(const BoxRays *rays, uint lane)
+{
+    return octant_make(rays->negative_x >> lane & 1, rays->negative_y >> lane & 1,
+                       rays->negative_z >> lane & 1);
+}
+
+// The lanes whose directions have the signs of the first one's.
+static inline uint box_rays_same_octant(const BoxRays *rays, uint lanes)
+{
+    uint x = rays->negative_x, y = rays->negative_y, z = rays->negative_z, first = lanes & -lanes;
+    return lanes & (x & first ? x : ~x) & (y & first ? y : ~y) & (z & first ? z : ~z);
+}
+
+static inline real box_plane(global const scalar *box, uint plane)
+{
+    return (real)(box[plane * BVH_WIDTH]);
+}
+
+// The rays, all of one octant, that meet a child's box between near and limit; *near is where. `box`: the
+// child's scalar in the node's first plane.
+static inline mask box_rays_meet_child(const BoxRays *rays, Octant octant, global const scalar *box,
+                                       real limit, real *near)
+{
+    Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
+    real near_x = real_fma(box_plane(box, octant.near_x), inverse.x, to_near.x);
+    real near_y = real_fma(box_plane(box, octant.near_y), inverse.y, to_near.y);
+    real near_z = real_fma(box_plane(box, octant.near_z), inverse.z, to_near.z);
+    real far_x = real_fma(box_plane(box, octant.far_x), inverse.x, to_far.x);
+    real far_y = real_fma(box_plane(box, octant.far_y), inverse.y, to_far.y);
+    real far_z = real_fma(box_plane(box, octant.far_z), inverse.z, to_far.z);
+    *near = real_max(real_max(near_x, near_y), real_max(near_z, rays->near));
+    return *near <= real_min(real_min(far_x, far_y), real_min(far_z, limit));
+}
+
+#endif

@@ -1,0 +1,76 @@
+// Intersects packets with primitives: the leaves of the BVH, and what is not in it.
+#ifndef PRIMITIVES_H
+#define PRIMITIVES_H
+
+#include "shapes/disc.h"
+#include "shapes/paraboloid.h"
+#include "shapes/plane.h"
+#include "shapes/revolution.h"
+#include "shapes/sphere.h"
+#include "shapes/torus.h"
+#include "shapes/triangle.h"
+#include "traversal/cull_sphere.h"
+#include "traversal/query.h"
+
+// Prefetches what shading reads of the closest hit.
+static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
+{
+    memory_prefetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
+    if (HAS_TRIANGLES && kind == KIND_TRIANGLES && id.y > 0)
+        memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
+}
+
+// Intersects primitives first .. last - 1 of one kind; `cull_spheres`, if not 0, are theirs. One function per
+// kind: if one function tested all kinds, Mesa, which inlines before it knows the kind asked for, would
+// compile them all at each call.
+#define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
+    static inline void intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
+                                         uint first, uint last, global const CullSphere *cull_spheres)       \
+    {                                                                                                        \
+        for (uint i = first; i < last; i++) {                                                                \
+            if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
+            if (i == last) break;                                                                            \
+            Type shape = scene->names[i];                                                                    \
+            real t = ray->far;                                                                               \
+            mask found = name##_hit(&shape, ray, &t);                                                        \
+            if (!lanes_any(found)) continue;                                                                 \
+            traversal_record(traversal, scene, found, t, shape.id.x);                                        \
+            if (traversal->query != OCCLUSION)                                                               \
+                object_prefetch(scene, KIND_##feature, shape.id);                                            \
+            else if (!lanes_any(traversal->active))                                                          \
+                break;                                                                                       \
+        }                                                                                                    \
+    }
+SHAPE_LIST(INTERSECT_SHAPES)
+
+// A leaf is count << 8 | kind (BvhNode.what) and its first primitive.
+static inline void intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
+                                  uint first)
+{
+    uint kind = leaf & 0xff, last = first + (leaf >> 8);
+#define INTERSECT_LEAF(feature, Type, name, names)                                                           \
+    if (HAS_##feature && kind == KIND_##feature) intersect_##names(traversal, scene, ray, first, last, 0);
+    SHAPE_LIST(INTERSECT_LEAF)
+}
+
+// Intersects all primitives outside the BVH: the unbounded ones, or every one in a scene without a BVH.
+static inline void intersect_unbounded(Traversal *traversal, const Scene *scene, Ray *ray)
+{
+    global const uint *counts = (global const uint *)scene->header->counts;
+    global const uint *bounded_counts = (global const uint *)scene->header->bounded_counts;
+    uint boxes = HAS_BOXES ? counts[KIND_BOXES] - bounded_counts[KIND_BOXES] : 0;
+    uint triangles = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bounded_counts[KIND_TRIANGLES] : 0;
+    if (boxes + triangles > 0) ray_make_frame(ray);
+    global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
+    if (cull_spheres) cull_spheres++; // the first is the BVH's
+#define INTERSECT_UNBOUNDED(feature, Type, name, names)                                                      \
+    if (HAS_##feature && lanes_any(traversal->active)) {                                                     \
+        uint first = bounded_counts[KIND_##feature], last = counts[KIND_##feature];                          \
+        bool has_cull_spheres = cull_spheres && KIND_##feature != KIND_PLANES;                               \
+        intersect_##names(traversal, scene, ray, first, last, has_cull_spheres ? cull_spheres : 0);          \
+        if (has_cull_spheres) cull_spheres += last - first;                                                  \
+    }
+    SHAPE_LIST(INTERSECT_UNBOUNDED)
+}
+
+#endif

@@ -1,0 +1,85 @@
+// What a traversal searches for, and what it has found.
+#ifndef QUERY_H
+#define QUERY_H
+
+#include "scene.h"
+#include "traversal/ray.h"
+
+typedef enum {
+    CLOSEST_HIT,
+    CLOSEST_OPAQUE_HIT, // ignores objects that transmit light
+    OCCLUSION           // any hit; transparent objects reduce the light that passes
+} Query;
+
+typedef struct {
+    Query query;
+    mask active; // lanes still searching
+    Hit hit;
+    integer optical_depth; // for OCCLUSION, of the objects hit so far
+} Traversal;
+
+// Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_LARGEST is that of opaque objects.
+#if IS_DOUBLE
+#define OPTICAL_DEPTH_STEPS   0x1p48
+#define LN_2                  0x1.62e42fefa39efp-1
+#define OPTICAL_DEPTH_LARGEST 0x7f000000000000L
+#else
+#define OPTICAL_DEPTH_STEPS   0x1p24f
+#define LN_2                  0x1.62e43p-1f
+#define OPTICAL_DEPTH_LARGEST OPAQUE
+#endif
+
+static inline integer object_optical_depth(const Scene *scene, uint id)
+{
+    uint4 steps = scene->materials[scene->objects[id].kind_index_material.z].optical_depth;
+#if IS_DOUBLE
+    return (integer)(steps.x == OPAQUE ? OPTICAL_DEPTH_LARGEST : upsample(as_int(steps.z), steps.y));
+#else
+    return (integer)((scalar_integer)steps.x);
+#endif
+}
+
+static inline bool object_is_opaque(const Scene *scene, uint id)
+{
+    return scene->materials[scene->objects[id].kind_index_material.z].reflection_transmission_ior.y == 0;
+}
+
+// Reduces the light of the lanes that hit an object; those without light are done.
+static inline void traversal_occlude(Traversal *traversal, const Scene *scene, mask found, uint id)
+{
+    if (!HAS_TRANSMISSION) {
+        traversal->active = traversal->active & !found;
+        return;
+    }
+    integer optical_depth = object_optical_depth(scene, id);
+    const integer largest = (integer)(OPTICAL_DEPTH_LARGEST);
+    integer saturated_sum = lanes_select(traversal->optical_depth < largest - optical_depth,
+                                         traversal->optical_depth + optical_depth, largest);
+    traversal->optical_depth = lanes_select(found, saturated_sum, traversal->optical_depth);
+    traversal->active = traversal->active & (traversal->optical_depth < largest);
+}
+
+// Records crossings in the lanes `found`. Of equally near ones the lowest id counts, so that the image does
+// not depend on the order of objects.
+static inline void traversal_record(Traversal *traversal, const Scene *scene, mask found, real t, uint id)
+{
+    Hit *hit = &traversal->hit;
+    if (traversal->query == OCCLUSION) {
+        traversal_occlude(traversal, scene, found & traversal->active & (t < hit->t), id);
+        return;
+    }
+    if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(scene, id)) return;
+    integer object = (integer)((scalar_integer)id);
+    mask tie = (t == hit->t) & (object < hit->object);
+    mask closer = found & ((t < hit->t) | tie);
+    hit->t = lanes_select(closer, t, hit->t);
+    hit->object = lanes_select(closer, object, hit->object);
+}
+
+// Per-lane far limit, below LARGEST; -LARGEST for lanes that are done.
+static inline real traversal_limit(const Traversal *traversal)
+{
+    return lanes_select(traversal->active, real_min(traversal->hit.t, (real)(LARGEST / 2)), (real)(-LARGEST));
+}
+
+#endif
