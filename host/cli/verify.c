@@ -3,12 +3,10 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
-#include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
-#include "host/compile/camera_basis.h"
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
@@ -45,93 +43,6 @@ typedef struct {
     bool lean;          // each scene has kernels of its own
     VerifyChoice cases; // none named: all
 } VerifyOptions;
-
-// The renderer as the cases see it.
-typedef struct {
-    Compute *compute;
-    const VerifyOptions *options;
-    Precision precision;
-    uint64_t trace_kernel, render_kernel; // the last ones' hashes
-    uint32_t lanes;                       // the last one's
-} Prober;
-
-// With every feature built in, so that one program serves all scenes; lean, with what a scene needs, and, of
-// explicit rays, what becomes of them there.
-static Renderer *scene_open_renderer(Prober *prober, const Scene *scene, bool hierarchy, uint32_t width,
-                                     uint32_t height)
-{
-    bool picture = width > 0;
-    const FeatureSet lean_features = picture ? 0 : FEATURE_REFLECTION | FEATURE_TRANSMISSION;
-    RenderSettings settings =
-        settings_whole(&prober->options->common, picture ? width : 1, picture ? height : 1);
-    settings.precision = prober->precision;
-    settings.bvh = hierarchy ? BVH_ON : BVH_OFF;
-    settings.bounce_count = picture ? BOUNCES_DEFAULT : 0;
-    settings.shift_to_eye = picture;
-    settings.extra_features = prober->options->lean ? lean_features : FEATURE_ALL;
-    MessageList messages = {0};
-    Renderer *renderer = renderer_open(prober->compute, scene, &settings, &messages);
-    messages_print(&messages, NULL);
-    if (!renderer && compute_ok(prober->compute)) fault("a hard case does not fit the device");
-    if (renderer) prober->lanes = renderer_report(renderer)->lanes;
-    return renderer;
-}
-
-typedef struct {
-    Prober *prober;
-    Renderer *renderer;
-} OpenScene;
-
-static void *prober_open(void *context, const Scene *scene, bool hierarchy)
-{
-    OpenScene *opened = memory_allocate(1, sizeof *opened);
-    *opened = (OpenScene){context, scene_open_renderer(context, scene, hierarchy, 0, 0)};
-    return opened;
-}
-
-static void prober_trace(void *opened, const TraceRay *rays, size_t count, TraceHit *hits)
-{
-    const OpenScene *scene = opened;
-    if (scene->renderer && renderer_trace(scene->renderer, rays, count, hits))
-        scene->prober->trace_kernel = renderer_report(scene->renderer)->kernel_hash;
-    else
-        memset(hits, 0, count * sizeof *hits); // of a device that failed no case is reported
-}
-
-static void prober_close(void *opened)
-{
-    OpenScene *scene = opened;
-    renderer_close(scene->renderer);
-    free(scene);
-}
-
-static Film prober_render(void *context, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height)
-{
-    Prober *prober = context;
-    Renderer *renderer = scene_open_renderer(prober, scene, hierarchy, width, height);
-    Film film;
-    if (renderer && renderer_render_film(renderer, AOVS_ALL, &film))
-        prober->render_kernel = renderer_report(renderer)->kernel_hash;
-    else
-        film = film_allocate(width, height, (uint32_t)scene->lights.count, AOVS_ALL);
-    renderer_close(renderer);
-    return film;
-}
-
-static void prober_camera_axes(const Camera *camera, Vector3 axes[3])
-{
-    CameraBasis basis = camera_basis(camera, 640, 480);
-    axes[0] = basis.forward;
-    axes[1] = basis.right;
-    axes[2] = basis.up;
-}
-
-static const VerifyTier tier_of[PRECISION_COUNT] = {
-    [PRECISION_FAST] = TIER_A,
-    [PRECISION_SINGLE] = TIER_B,
-    [PRECISION_STRICT] = TIER_C,
-    [PRECISION_DOUBLE] = TIER_D,
-};
 
 typedef struct {
     const Compute *compute;
@@ -204,12 +115,10 @@ static bool result_take(void *context, const VerifyResult *result)
 static size_t precision_verify(Compute *compute, const VerifyOptions *options, Precision precision,
                                Json *json)
 {
-    Prober prober = {.compute = compute, .options = options, .precision = precision};
-    // perturbed, a device is inexact: `single` cannot meet its bounds, `strict` corrects the errors
-    bool inexact = options->common.perturb_seed > 0 && precision < PRECISION_STRICT;
-    const VerifyRenderer renderer = {&prober,       prober_open,        prober_trace, prober_close,
-                                     prober_render, prober_camera_axes, inexact};
-    VerifyTier tier = inexact ? TIER_A : tier_of[precision];
+    VerifySettings settings = {.render = settings_whole(&options->common, 1, 1), .lean = options->lean};
+    settings.render.precision = precision;
+    settings.render.bounce_count = BOUNCES_DEFAULT;
+    const VerifyTier tier = verify_tier(&settings.render);
     if (tier == TIER_D && verify_oracle_bits() < 64)
         fprintf(stderr,
                 "glint: verify: a long double has %d bits here, so that the pictures of tier D are judged by "
@@ -227,13 +136,14 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     } else {
         printf("%s\n", name);
     }
-    verify_run(&renderer, tier, options->cases.count > 0 ? &options->cases : NULL, result_take, &report);
+    const VerifyChoice *choice = options->cases.count > 0 ? &options->cases : NULL;
+    const VerifyKernels kernels = verify_run(compute, &settings, choice, result_take, &report);
     double seconds = clock_seconds() - start;
     if (json) {
         json_end(json);
-        json_integer(json, "lanes", prober.lanes);
-        hash_json(json, "trace_kernel", prober.trace_kernel);
-        hash_json(json, "render_kernel", prober.render_kernel);
+        json_integer(json, "lanes", kernels.lanes);
+        hash_json(json, "trace_kernel", kernels.trace_hash);
+        hash_json(json, "render_kernel", kernels.render_hash);
         json_integer(json, "passed", (int64_t)report.held);
         json_integer(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
@@ -241,8 +151,8 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     } else if (compute_ok(compute)) {
         printf("  tier %c: %zu of %zu cases held, in %.1f s; kernels: trace %016" PRIx64
                ", render %016" PRIx64 "\n",
-               report.tier, report.held, report.held + report.failed, seconds, prober.trace_kernel,
-               prober.render_kernel);
+               report.tier, report.held, report.held + report.failed, seconds, kernels.trace_hash,
+               kernels.render_hash);
     }
     return report.failed;
 }

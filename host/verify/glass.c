@@ -102,7 +102,7 @@ static void judge_straight_rays(VerifyRun *run, const char *object, unsigned see
     }
     Scene scene = matched_scene(object);
     scene.objects.items[0].as.plane.point.z = 1e6; // out of the way
-    void *opened = run->renderer->open(run->renderer->context, &scene, false);
+    Renderer *opened = verify_open(run, &scene, false);
     verify_trace_opened(run, opened, rays, COUNT, first);
     for (size_t i = 0; i < COUNT; i++) {
         inner[i] = rays[i];
@@ -114,7 +114,7 @@ static void judge_straight_rays(VerifyRun *run, const char *object, unsigned see
         verify_round_ray(run, &inner[i]);
     }
     verify_trace_opened(run, opened, inner, COUNT, second);
-    run->renderer->close(opened);
+    renderer_close(opened);
     scene_free(&scene);
     size_t entered = 0;
     for (size_t i = 0; i < COUNT; i++) {
@@ -130,7 +130,7 @@ static void judge_straight_rays(VerifyRun *run, const char *object, unsigned see
         Vector3 off = quad3_rounded(quad3_subtract(refracted, d));
         double largest = fmax(fabs(off.x), fmax(fabs(off.y), fabs(off.z)));
         // two cosines, roots each, and a unit vector, a root and a quotient
-        double bound = run->renderer->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
+        double bound = run->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
         verify_note(run, largest / verify_roundoff(run), bound, "u");
     }
     // most of the places aimed at lie within the body

@@ -116,7 +116,7 @@ void verify_scaled_scenes(VerifyRun *run)
 }
 
 // Whether a ray, or one turned by a few roundings, meets the object.
-static bool meets_nearby(VerifyRun *run, void *opened, const double direction[3], uint32_t object)
+static bool meets_nearby(VerifyRun *run, Renderer *opened, const double direction[3], uint32_t object)
 {
     enum { COUNT = 27 };
     // A tier leaves open 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 (exact_is_open): as
@@ -150,7 +150,7 @@ static bool shadow_edge_beside(const Film *picture, size_t pixel, size_t light)
 
 // The scene with its axes exchanged. An object may differ where the other one is met within a few roundings
 // of the ray, a shadow at its edge; where neither does, colors are the same within 1e-5.
-static void judge_turned(VerifyRun *run, void *opened, const Film *picture, const Film *turned)
+static void judge_turned(VerifyRun *run, Renderer *opened, const Film *picture, const Film *turned)
 {
     for (size_t i = 0; i < film_pixel_count(picture); i++) {
         bool same = picture->object[i] == turned->object[i];
@@ -207,14 +207,14 @@ void verify_mirrored_scenes(VerifyRun *run)
     Scene scene = plain_scene(), turned = plain_scene();
     Film picture = verify_render(run, &scene, false, 256, 192);
     demand_every_object(run, &scene, &picture);
-    void *opened = run->renderer->open(run->renderer->context, &scene, false);
+    Renderer *opened = verify_open(run, &scene, false);
     for (unsigned turns = 1; turns < 3; turns++) {
         scene_turn_axes(&turned);
         Film other = verify_render(run, &turned, false, 256, 192);
         judge_turned(run, opened, &picture, &other);
         film_free(&other);
     }
-    run->renderer->close(opened);
+    renderer_close(opened);
     film_free(&picture);
     scene_free(&scene);
     scene_free(&turned);

@@ -23,7 +23,7 @@ void verify_far_mesh(VerifyRun *run)
     TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
     Scene scene = scene_empty();
     scene_far_sphere(&scene);
-    void *opened = run->renderer->open(run->renderer->context, &scene, true);
+    Renderer *opened = verify_open(run, &scene, true);
     for (uint64_t batch = 0; batch < BATCHES; batch++) {
         for (uint64_t i = 0; i < COUNT; i++) {
             uint64_t index = batch * COUNT + i;
@@ -35,7 +35,7 @@ void verify_far_mesh(VerifyRun *run)
         for (size_t i = 0; i < COUNT; i++)
             run->result->leaks += !verify_is_hit(&hits[i]);
     }
-    run->renderer->close(opened);
+    renderer_close(opened);
     scene_free(&scene);
     free(rays);
     free(hits);
@@ -313,8 +313,8 @@ void verify_hierarchy(VerifyRun *run)
     TraceHit *hits = memory_allocate(CROWD_RAYS, sizeof *hits),
              *plain = memory_allocate(CROWD_RAYS, sizeof *plain);
     Scene scene = crowd_make();
-    void *tree = run->renderer->open(run->renderer->context, &scene, true);
-    void *list = run->renderer->open(run->renderer->context, &scene, false);
+    Renderer *tree = verify_open(run, &scene, true);
+    Renderer *list = verify_open(run, &scene, false);
     const double parts[] = {INFINITY, 1 - 2 * verify_roundoff(run), 1 + 2 * verify_roundoff(run)};
     for (uint64_t batch = 0; batch < CROWD_BATCHES; batch++) {
         crowd_rays(run, &scene, batch * CROWD_RAYS, NULL, rays);
@@ -334,8 +334,8 @@ void verify_hierarchy(VerifyRun *run)
             }
         }
     }
-    run->renderer->close(tree);
-    run->renderer->close(list);
+    renderer_close(tree);
+    renderer_close(list);
     scene_free(&scene);
     free(rays);
     free(hits);

@@ -119,7 +119,7 @@ void verify_apex(VerifyRun *run)
             const double u = verify_roundoff(run);
             double length = vector_length(verify_vector(picture.normal + 3 * i));
             // a root and a quotient more
-            verify_note(run, fabs(length - 1) / u, run->renderer->inexact ? 4 + 6 + 4 : 4, "u");
+            verify_note(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
         }
         film_free(&picture);
         scene_free(&scene);

@@ -101,7 +101,7 @@ static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene
     Object *objects = verify_objects(run, scene);
     TraceRay *rays = memory_allocate(BATCH, sizeof *rays);
     TraceHit *hits = memory_allocate(BATCH, sizeof *hits);
-    void *opened = run->renderer->open(run->renderer->context, scene, set->scene_make != NULL);
+    Renderer *opened = verify_open(run, scene, set->scene_make != NULL);
     for (size_t first = 0; first < set->ray_count; first += BATCH) {
         size_t count = set->ray_count - first < BATCH ? set->ray_count - first : BATCH;
         for (size_t i = 0; i < count; i++) {
@@ -116,7 +116,7 @@ static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene
             judge_surface(run, objects, &rays[i], &hits[i]);
         }
     }
-    run->renderer->close(opened);
+    renderer_close(opened);
     free(judged.items);
     free(objects);
     free(rays);

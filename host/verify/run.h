@@ -4,9 +4,12 @@
 #include "host/verify/verify.h"
 
 typedef struct {
-    const VerifyRenderer *renderer;
+    Compute *compute;
+    const VerifySettings *settings;
     VerifyTier tier;
+    bool inexact; // quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp
     VerifyResult *result;
+    VerifyKernels *kernels;
 } VerifyRun;
 
 // What of a case is not in the tables. Counts what is wrong in the run's result.
@@ -60,12 +63,15 @@ static inline bool verify_is_hit(const TraceHit *hit)
     return hit->object != UINT32_MAX;
 }
 
-// Hits of rays at a scene, the hierarchy used or not. The sound ones are told from the others, which are
-// counted.
-void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const TraceRay *rays, size_t count,
+// A scene ready for rays, as it is, with or without a BVH; renderer_close closes it. NULL: the device failed.
+Renderer *verify_open(VerifyRun *run, const Scene *scene, bool bvh);
+// Hits of rays in an open scene; counts the unsound ones. They are zeros once the device has failed, when no
+// result is reported.
+void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays, size_t count,
+                         TraceHit *hits);
+// The same in a scene that is opened for these rays alone.
+void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count,
                   TraceHit *hits);
-// The same at a scene that is open already.
-void verify_trace_opened(VerifyRun *run, void *opened, const TraceRay *rays, size_t count, TraceHit *hits);
 bool verify_same_bits(const TraceHit *a, const TraceHit *b); // object, distance and normal
 
 // Notes an error of t, in ulp of it, and counts it as wrong where it is beyond the bound.
@@ -78,8 +84,9 @@ void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 Scene verify_scene(const char *objects);
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
-// Renders a picture, all of it kept, and counts what is unsound in it; film_free frees it.
-Film verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height);
+// Renders all layers of a film and counts the unsound pixels; film_free frees it. Zeros once the device
+// failed.
+Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height);
 
 static inline bool verify_pixel_found(const Film *picture, size_t pixel)
 {

@@ -97,7 +97,7 @@ static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned g
 
 // From where the first ray met the sphere: half of the rays leave it, none may meet it again; half run into
 // it, and come to its other side.
-static void leave_sphere(VerifyRun *run, const Scene *scene, void *opened, size_t sphere,
+static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, size_t sphere,
                          const TraceHit *first)
 {
     static TraceRay rays[2 * DIRECTIONS];
@@ -131,11 +131,11 @@ void verify_leaving_spheres(VerifyRun *run)
         TraceHit hits[SPHERES];
         Scene scene = spheres_of_all_sizes(run, group);
         rays_at_spheres(run, &scene, group, rays);
-        void *opened = run->renderer->open(run->renderer->context, &scene, false);
+        Renderer *opened = verify_open(run, &scene, false);
         verify_trace_opened(run, opened, rays, SPHERES, hits);
         for (size_t i = 0; i < SPHERES; i++)
             if (hits[i].object == i) leave_sphere(run, &scene, opened, i, &hits[i]);
-        run->renderer->close(opened);
+        renderer_close(opened);
         scene_free(&scene);
     }
 }

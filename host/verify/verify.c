@@ -157,9 +157,40 @@ static void hash_hit(VerifyRun *run, const TraceHit *hit)
     hash_numbers(run, &hit->transmission, 1);
 }
 
-void verify_trace_opened(VerifyRun *run, void *opened, const TraceRay *rays, size_t count, TraceHit *hits)
+// With every feature built in, so that one program serves all scenes; lean, with what an image of the scene
+// needs, and, of rays, what becomes of them there. Width 0: for rays.
+static Renderer *scene_open_renderer(const VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
+                                     uint32_t height)
 {
-    run->renderer->trace(opened, rays, count, hits);
+    const bool image = width > 0;
+    const FeatureSet lean_features = image ? 0 : FEATURE_REFLECTION | FEATURE_TRANSMISSION;
+    RenderSettings settings = run->settings->render;
+    settings.width = settings.region_width = image ? width : 1;
+    settings.height = settings.region_height = image ? height : 1;
+    settings.bvh = bvh ? BVH_ON : BVH_OFF;
+    if (!image) settings.bounce_count = 0;
+    settings.shift_to_eye = image;
+    settings.extra_features = run->settings->lean ? lean_features : FEATURE_ALL;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(run->compute, scene, &settings, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!renderer && compute_ok(run->compute)) fault("a hard case does not fit the device");
+    if (renderer) run->kernels->lanes = renderer_report(renderer)->lanes;
+    return renderer;
+}
+
+Renderer *verify_open(VerifyRun *run, const Scene *scene, bool bvh)
+{
+    return scene_open_renderer(run, scene, bvh, 0, 0);
+}
+
+void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays, size_t count, TraceHit *hits)
+{
+    if (opened && renderer_trace(opened, rays, count, hits))
+        run->kernels->trace_hash = renderer_report(opened)->kernel_hash;
+    else
+        memset(hits, 0, count * sizeof *hits);
     run->result->ray_count += count;
     for (size_t i = 0; i < count; i++) {
         run->result->unsound += !is_sound(run, &rays[i], &hits[i]);
@@ -167,12 +198,12 @@ void verify_trace_opened(VerifyRun *run, void *opened, const TraceRay *rays, siz
     }
 }
 
-void verify_trace(VerifyRun *run, const Scene *scene, bool hierarchy, const TraceRay *rays, size_t count,
+void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count,
                   TraceHit *hits)
 {
-    void *opened = run->renderer->open(run->renderer->context, scene, hierarchy);
+    Renderer *opened = verify_open(run, scene, bvh);
     verify_trace_opened(run, opened, rays, count, hits);
-    run->renderer->close(opened);
+    renderer_close(opened);
 }
 
 static bool is_pixel_sound(const VerifyRun *run, const Film *picture, size_t i)
@@ -186,21 +217,27 @@ static bool is_pixel_sound(const VerifyRun *run, const Film *picture, size_t i)
     return run->tier == TIER_A || is_unit(run, normal);
 }
 
-Film verify_render(VerifyRun *run, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height)
+Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height)
 {
-    Film picture = run->renderer->render(run->renderer->context, scene, hierarchy, width, height);
-    const size_t pixels = film_pixel_count(&picture);
+    Film film;
+    Renderer *renderer = scene_open_renderer(run, scene, bvh, width, height);
+    if (renderer && renderer_render_film(renderer, AOVS_ALL, &film))
+        run->kernels->render_hash = renderer_report(renderer)->kernel_hash;
+    else
+        film = film_allocate(width, height, (uint32_t)scene->lights.count, AOVS_ALL);
+    renderer_close(renderer);
+    const size_t pixels = film_pixel_count(&film);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
-        run->result->unsound += !is_pixel_sound(run, &picture, i);
-    const double *const vectors[] = {picture.color, picture.normal, picture.position, picture.ray};
-    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-        hash_numbers(run, vectors[i], 3 * pixels);
-    hash_numbers(run, picture.t, pixels);
-    hash_integers(run, picture.object, pixels);
-    hash_integers(run, picture.shadow, pixels * picture.light_count);
-    hash_integers(run, picture.path, pixels);
-    return picture;
+        run->result->unsound += !is_pixel_sound(run, &film, i);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        const size_t count = pixels * film_components(&film, layer);
+        if (layer_types[layer] == LAYER_TYPE_INTEGER)
+            hash_integers(run, film.layers[layer], count);
+        else
+            hash_numbers(run, film.layers[layer], count);
+    }
+    return film;
 }
 
 bool verify_same_bits(const TraceHit *a, const TraceHit *b)
@@ -264,17 +301,41 @@ static bool is_chosen(const VerifyChoice *choice, const char *name)
     return !choice;
 }
 
-void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
-                void *context)
+// Whether quotients and roots err as OpenCL C allows.
+static bool is_inexact(const RenderSettings *settings)
 {
+    return settings->perturb_seed > 0 && settings->precision < PRECISION_STRICT;
+}
+
+VerifyTier verify_tier(const RenderSettings *settings)
+{
+    static const VerifyTier tiers[PRECISION_COUNT] = {
+        [PRECISION_FAST] = TIER_A,
+        [PRECISION_SINGLE] = TIER_B,
+        [PRECISION_STRICT] = TIER_C,
+        [PRECISION_DOUBLE] = TIER_D,
+    };
+    return is_inexact(settings) ? TIER_A : tiers[settings->precision];
+}
+
+VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
+                         VerifySink sink, void *context)
+{
+    VerifyKernels kernels = {0};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         if (!is_chosen(choice, cases[i].name)) continue;
         VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
-        VerifyRun run = {renderer, tier, &result};
+        VerifyRun run = {.compute = compute,
+                         .settings = settings,
+                         .tier = verify_tier(&settings->render),
+                         .inexact = is_inexact(&settings->render),
+                         .result = &result,
+                         .kernels = &kernels};
         for (size_t k = 0; k < verify_rays_count; k++)
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
-        if (!sink(context, &result)) return;
+        if (!sink(context, &result)) break;
     }
+    return kernels;
 }

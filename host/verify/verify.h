@@ -1,32 +1,30 @@
 // The hard cases: scenes and rays on which ray tracers go wrong, run through the renderer that ships, each
-// held to a bound. Expected hits are exact (tests/oracle). docs/verify.md says what each case is.
+// within a bound. Expected hits are exact (tests/oracle). docs/verify.md says what each case is.
 #pragma once
 
-#include "host/render/film.h"
-#include "host/render/trace.h"
-#include "host/scene/scene.h"
+#include "host/render/renderer.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-// What is owed: A is hygiene and holds at every precision; B, C and D are accuracy at `single`, `strict` and
-// `double`, and hold A as well.
+// What is required: A is hygiene, at every precision; B, C and D are A and accuracy at `single`, `strict` and
+// `double`.
 typedef enum { TIER_A, TIER_B, TIER_C, TIER_D, TIER_COUNT } VerifyTier;
 
-// The renderer under test, at one precision.
+// How the scenes are rendered.
 typedef struct {
-    void *context;
-    // A scene ready for rays, taken as it is, its hierarchy used or not.
-    void *(*open)(void *context, const Scene *scene, bool hierarchy);
-    void (*trace)(void *opened, const TraceRay *rays, size_t count, TraceHit *hits);
-    void (*close)(void *opened);
-    // Renders an image of the scene, with all its layers.
-    Film (*render)(void *context, const Scene *scene, bool hierarchy, uint32_t width, uint32_t height);
-    // The forward axis, and those along the picture's width and height, of a camera.
-    void (*camera_axes)(const Camera *camera, Vector3 axes[3]);
-    // Whether quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp.
-    bool inexact;
-} VerifyRenderer;
+    RenderSettings render; // precision, lanes, bounce_count, no_cache and perturb_…; each scene sets the rest
+    bool lean;             // build kernels of what each scene needs alone, not one for all scenes
+} VerifySettings;
+
+// `single` need not meet tier B on a device that is perturbed; `strict` corrects the perturbation.
+VerifyTier verify_tier(const RenderSettings *settings);
+
+// The last kernels that ran.
+typedef struct {
+    uint32_t lanes;
+    uint64_t trace_hash, render_hash;
+} VerifyKernels;
 
 // How one case went.
 typedef struct {
@@ -63,5 +61,5 @@ bool verify_is_case(const char *name);
 int verify_oracle_bits(void);
 
 // Runs the cases in turn, until the sink ends it.
-void verify_run(const VerifyRenderer *renderer, VerifyTier tier, const VerifyChoice *choice, VerifySink sink,
-                void *context);
+VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
+                         VerifySink sink, void *context);
