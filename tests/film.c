@@ -9,6 +9,12 @@
 
 #include <cmocka.h>
 
+bool tests_are_long(void)
+{
+    const char *value = getenv("GLINT_LONG_TESTS");
+    return value && strcmp(value, "1") == 0;
+}
+
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision)
 {
     return (RenderSettings){.width = width,
@@ -18,6 +24,7 @@ RenderSettings film_settings(uint32_t width, uint32_t height, Precision precisio
                             .sample_count = 1,
                             .bounce_count = 5,
                             .precision = precision,
+                            .extra_features = tests_are_long() ? 0 : FEATURE_ALL,
                             .shift_to_eye = true};
 }
 

@@ -2,8 +2,13 @@
 #pragma once
 
 #include "host/render/renderer.h"
+#include <stdbool.h>
 
-// The whole image, one sample per pixel, with the defaults of glint render.
+// GLINT_LONG_TESTS=1: tests take minutes instead of seconds.
+bool tests_are_long(void);
+
+// The whole image, one sample per pixel, with the defaults of glint render, but for the features: unless
+// tests are long all are built in, so that all tests of a run share one program per precision.
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
 
 // Renders what the settings say; fails the test where they do not fit the device.

@@ -1,6 +1,6 @@
 #!/bin/bash
-# Pictures and traces of every shape under Oclgrind: no access outside a buffer, no data race, no value used before it is
-# set, no wrong OpenCL call. Whatever it reports is a failure.
+# Images and traces of every shape under Oclgrind: no access outside a buffer, no data race, no value used before it is
+# set, no wrong OpenCL call. Whatever it reports is a failure. More pixels with GLINT_LONG_TESTS=1: it interprets kernels.
 . "$(dirname "$0")/support.bash"
 command -v oclgrind >/dev/null || skip_all 'Oclgrind is not here'
 is_sanitized && skip_all 'a sanitized program does not run under Oclgrind'
@@ -28,12 +28,14 @@ clean() {
 }
 
 scene=tests/scenes/every_shape.yaml
+size=8x5 small=4x3
+is_long && size=16x9 small=7x5
 printf '0 1 -9 0 0 1\n-5 1 0 1 0 0\n1 9 -2 0 -1 0\n' >"$scratch/rays"
 for lanes in 1 4; do
-    clean "render at $lanes lanes" render $scene --size 16x9 --lanes $lanes --quiet -o "$scratch/a.png"
-    clean "strict, samples and AOVs at $lanes lanes" render $scene --size 7x5 --samples 2 --precision strict --lanes $lanes \
-        --quiet --aov t,normal,position,object,shadow,ray,path -o "$scratch/b.png"
+    clean "render at $lanes lanes" render $scene --size $size --lanes $lanes --quiet -o "$scratch/a.png"
+    clean "strict, samples and AOVs at $lanes lanes" render $scene --size $small --samples 2 --precision strict \
+        --lanes $lanes --quiet --aov t,normal,position,object,shadow,ray,path -o "$scratch/b.png"
     clean "trace at $lanes lanes" trace $scene --rays "$scratch/rays" --lanes $lanes -o "$scratch/c.csv"
 done
-clean 'double' render $scene --size 7x5 --precision double --lanes 1 --quiet -o "$scratch/d.npy"
+clean 'double' render $scene --size $small --precision double --lanes 1 --quiet -o "$scratch/d.npy"
 finish

@@ -70,6 +70,7 @@ python_with() {
     fi
     exec {lock}>&-
 }
+is_long() { [ "${GLINT_LONG_TESTS-}" = 1 ]; }
 is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
 
 # npy_same A B WIDTH: both hold the same bytes, else says at which of their pixels (three floats each) they differ first.
