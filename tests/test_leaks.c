@@ -25,6 +25,11 @@ enum { SANITIZED = 0 };
 typedef enum { NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM, COMPUTE } Forgotten;
 enum { NO_DEVICE = 77, LEAKED = 23 };
 
+static void cl_must(cl_int status)
+{
+    if (status != CL_SUCCESS) abort();
+}
+
 // Launches a kernel, so that the driver has compiled it and started its threads, and releases all but one
 // thing.
 static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
