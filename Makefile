@@ -75,7 +75,7 @@ $(BUILD)/tests/test_opencl_failure: private LDFLAGS += $(opencl_calls:%=-Wl,--wr
 
 ladder: $(BUILD)/tools/numerics/ladder
 
-$(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/specimen.o) $(library)
+$(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/random_ray.o) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 # What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.

@@ -1,5 +1,5 @@
 #include "tests/reference_color.h"
-#include "tests/specimen.h"
+#include "host/compile/random_shape.h"
 
 // A shadow ray leaves out this part of its way at either end: far over the rounding of quadruple precision,
 // far under any gap that a scene's doubles can express at its own scale.
@@ -109,7 +109,7 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
 
 static Quad3 random_offset(Random *random, double size)
 {
-    return quad3(vector_scale(random_in_ball(random), size));
+    return quad3(vector_scale(random_in_sphere(random), size));
 }
 
 // What a ray met; moved along the surface and turned by up to `blur`.

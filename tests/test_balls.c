@@ -2,9 +2,9 @@
 // without them, as the hierarchy makes the difference): none that a line meets, or comes nearer to than a
 // shape's test may be off, is passed over, and those that it misses clearly are.
 #include "host/base/memory.h"
+#include "host/compile/random_shape.h"
 #include "host/compile/stages.h"
 #include "tests/probe.h"
-#include "tests/specimen.h"
 #include <float.h>
 #include <math.h>
 #include <setjmp.h>
@@ -52,17 +52,12 @@ static Vector3 trial_vector_rounded(const Trial *trial, Vector3 v)
     return (Vector3){trial_rounded(trial, v.x), trial_rounded(trial, v.y), trial_rounded(trial, v.z)};
 }
 
-static double random_power(Random *random, double low, double high)
-{
-    return pow(10, random_between(random, low, high));
-}
-
 // A line through the apex, and a sphere that it just meets or just misses, on either side of the apex.
 static void line_make(Trial *trial, size_t index, bool from_eye)
 {
     Random *random = &trial->random;
     Vector3 way =
-        vector_scale(vector_normalize(random_in_ball(random)), trial->scale * random_power(random, -2, 4));
+        vector_scale(vector_normalize(random_in_sphere(random)), trial->scale * random_power(random, -2, 4));
     Vector3 origin =
         from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, vector_subtract(trial->apex, way));
     Vector3 direction =
@@ -75,7 +70,7 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
     double radius = trial_rounded(trial, trial->scale * random_power(random, -3, 3));
     double off =
         random_power(random, trial->wide ? -15 : -8, 1) * (random_between(random, -1, 1) < 0 ? -1 : 1);
-    Vector3 across = vector_normalize(vector_cross(direction, random_in_ball(random)));
+    Vector3 across = vector_normalize(vector_cross(direction, random_in_sphere(random)));
     Vector3 point = vector_add(trial->apex, vector_scale(vector_normalize(direction), along));
     Vector3 center =
         trial_vector_rounded(trial, vector_add(point, vector_scale(across, radius * fmax(0, 1 + off))));
@@ -92,7 +87,7 @@ static void trial_open(Trial *trial, bool from_eye)
     // elsewhere float's fourth powers of lengths vanish or are infinite, and nothing is passed over
     trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 16));
     Vector3 apex =
-        vector_scale(random_in_ball(&trial->random), trial->scale * random_power(&trial->random, -2, 4));
+        vector_scale(random_in_sphere(&trial->random), trial->scale * random_power(&trial->random, -2, 4));
     trial->apex = from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, apex);
     ((FlatLight *)arrays[FLAT_LIGHTS].items)->position =
         (scalar4){trial->apex.x, trial->apex.y, trial->apex.z, 0};

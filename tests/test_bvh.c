@@ -3,6 +3,8 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/bvh_widen.h"
+#include "host/compile/random_shape.h"
+#include "host/compile/shapes.h"
 #include "tests/probe.h"
 #include <math.h>
 #include <setjmp.h>
@@ -11,35 +13,12 @@
 
 #include <cmocka.h>
 
-// splitmix64 (Steele, Lea, Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
-static uint64_t random_state;
-
-static uint64_t random_bits(void)
-{
-    uint64_t z = random_state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-}
-
-static double random_between(double low, double high)
-{
-    return low + (high - low) * ldexp((double)(random_bits() >> 11), -53);
-}
+static Random random_state;
 
 static Vector3 random_in_cube(double half)
 {
-    double x = random_between(-half, half), y = random_between(-half, half);
-    return (Vector3){x, y, random_between(-half, half)};
-}
-
-static Vector3 random_direction(void)
-{
-    Vector3 v;
-    do
-        v = random_in_cube(1);
-    while (vector_dot(v, v) > 1 || vector_is_zero(v));
-    return vector_normalize(v);
+    double x = random_between(&random_state, -half, half), y = random_between(&random_state, -half, half);
+    return (Vector3){x, y, random_between(&random_state, -half, half)};
 }
 
 static size_t few_or_many(size_t few, size_t many)
@@ -168,7 +147,7 @@ static Bounds box_of_set(int set, size_t index, size_t count)
     case HUGE_AMONG_TINY:
         return index == 0 ? cube_around(nothing, 1e6) : cube_around(random_in_cube(1), 1e-4);
     case MANY_BINADES: {
-        double size = exp2(random_between(-60, 60));
+        double size = exp2(random_between(&random_state, -60, 60));
         return cube_around(random_in_cube(size), size / 16);
     }
     case NESTED: // each beside the next, which is smaller: a split leaves one behind
@@ -176,10 +155,11 @@ static Bounds box_of_set(int set, size_t index, size_t count)
     case ON_A_LINE:
         return cube_around((Vector3){part, 0, 0}, 0);
     case FLAT:
-        return bounds_around((Vector3){random_between(-1, 1), 7, random_between(-1, 1)},
-                             (Vector3){0.01, 0, 0.01});
+        return bounds_around(
+            (Vector3){random_between(&random_state, -1, 1), 7, random_between(&random_state, -1, 1)},
+            (Vector3){0.01, 0, 0.01});
     default:
-        return cube_around(random_in_cube(10), random_between(0, 0.5));
+        return cube_around(random_in_cube(10), random_between(&random_state, 0, 0.5));
     }
 }
 
@@ -195,7 +175,7 @@ static void any_boxes_make_a_tree(void **state)
             boxes[i] = box_of_set(set, i, count);
         tree_check(boxes, kinds, count);
         for (size_t i = 0; i < count; i++)
-            kinds[i] = (uint8_t)(random_bits() % KIND_COUNT);
+            kinds[i] = (uint8_t)(random_bits(&random_state) % KIND_COUNT);
         tree_check(boxes, kinds, count);
         free(boxes);
         free(kinds);
@@ -242,109 +222,61 @@ static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const 
     trace_lanes(scene, precision, bvh, 0, rays, count, hits);
 }
 
-static Object random_object(ShapeKind kind, double size)
+// Along a world axis, and a box without thickness.
+static Object aligned_object(size_t index, Vector3 center, double size)
 {
-    Object object = {.kind = kind};
-    Vector3 center = random_in_cube(10),
-            axis = vector_scale(random_direction(), random_between(0.1, 1) * size);
-    double radius = random_between(0.05, 0.5) * size;
-    bool turned = random_bits() & 1; // else along a coordinate axis
-    if (!turned) axis = (Vector3){0, size, 0};
-    switch (kind) {
-    case SHAPE_SPHERE:
-        object.as.sphere.center = center;
-        object.as.sphere.radius = radius;
-        break;
-    case SHAPE_PLANE:
-        object.as.plane.point = (Vector3){0, -14, 0};
-        object.as.plane.normal = axis;
-        break;
-    case SHAPE_DISC:
-        object.as.disc.center = center;
-        object.as.disc.normal = axis;
-        object.as.disc.radius = radius;
-        break;
-    case SHAPE_BOX:
-        object.as.box.min = center;
-        object.as.box.max = vector_add(center, (Vector3){radius, fabs(axis.y), turned ? radius : 0});
-        break;
-    case SHAPE_CYLINDER:
-        object.as.cylinder.from = center;
-        object.as.cylinder.axis = axis;
-        object.as.cylinder.radius = radius;
-        object.as.cylinder.finite = true;
-        object.as.cylinder.caps = random_bits() & 1;
-        break;
-    case SHAPE_CONE:
-        object.as.cone.from = center;
-        object.as.cone.axis = axis;
-        object.as.cone.radius[0] = radius;
-        object.as.cone.radius[1] = random_bits() & 1 ? radius / 3 : 0;
-        object.as.cone.finite = true;
-        object.as.cone.caps = random_bits() & 1;
-        break;
-    case SHAPE_TORUS:
-        object.as.torus.center = center;
-        object.as.torus.axis = axis;
-        object.as.torus.major = radius;
-        object.as.torus.minor = radius / random_between(1.5, 8);
-        break;
+    const Vector3 up = {0, size, 0};
+    switch (index % 4) {
+    case 0:
+        return (Object){.kind = SHAPE_BOX, .as.box = {center, vector_add(center, (Vector3){size, size, 0})}};
+    case 1:
+        return (Object){.kind = SHAPE_DISC, .as.disc = {center, up, size / 2}};
+    case 2:
+        return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {center, up, size / 3, true, true, false}};
     default:
-        for (int corner = 0; corner < 3; corner++)
-            object.as.triangle.vertices[corner] = vector_add(center, random_in_cube(size));
+        return (Object){.kind = SHAPE_CONE, .as.cone = {center, up, {size / 2, 0}, 0, true, true, false}};
     }
-    return object;
 }
 
-// Every shape, mostly small ones, and a few without end.
+// Every bounded form of every shape, mostly small ones, a third triangles, and a plane.
 static Scene random_scene(size_t count)
 {
-    static const ShapeKind kinds[] = {SHAPE_SPHERE, SHAPE_DISC,     SHAPE_BOX,     SHAPE_CYLINDER,
-                                      SHAPE_CONE,   SHAPE_TRIANGLE, SHAPE_TRIANGLE};
+    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    const size_t form_count = shape_forms(forms);
+    const ShapeForm triangle = {.kind = SHAPE_TRIANGLE};
     Scene scene = {0};
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
     // what a ray passes twice takes light from it twice
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .transmission = 0.75, .ior = 1}));
-    for (size_t i = 0; i < count; i++) {
-        double size = exp2(random_between(-5, 0));
-        ShapeKind kind = i % 16 == 15 ? SHAPE_TORUS : kinds[i % (sizeof kinds / sizeof *kinds)];
-        Object object = random_object(kind, size);
-        object.material = i % 3 == 0;
+    for (size_t i = 0; scene.objects.count < count; i++) {
+        const ShapeForm *form = i % 3 == 0 ? &triangle : &forms[random_bits(&random_state) % form_count];
+        if (i % 3 > 0 && !form->bounded) continue;
+        double size = exp2(random_between(&random_state, -5, 0));
+        Vector3 center = random_in_cube(10);
+        Object object = i % 3 == 1 ? aligned_object(i / 3, center, size)
+                                   : random_shape_at(form, center, size / 2, &random_state).object;
+        object.material = random_bits(&random_state) % 3 == 0;
         array_push(scene.objects, object);
     }
-    array_push(scene.objects, random_object(SHAPE_PLANE, 1));
+    array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, -14, 0}, {0, 1, 0}}}));
     return scene;
 }
 
-// A point where rounding matters: a vertex, an edge's point, a center, a corner of a box, a rim's.
-static Vector3 telling_point(const Scene *scene)
+// A point where rounding matters: a triangle's vertex or edge; a corner of a box around another shape, or a
+// point where the shape may touch the box.
+static Vector3 delicate_point(const Scene *scene)
 {
-    const Object *object = &scene->objects.items[random_bits() % scene->objects.count];
-    double part = random_between(0, 1);
-    switch (object->kind) {
-    case SHAPE_SPHERE:
-        return vector_add(object->as.sphere.center, (Vector3){object->as.sphere.radius, 0, 0});
-    case SHAPE_BOX:
-        return random_bits() & 1
-                   ? object->as.box.min
-                   : (Vector3){object->as.box.max.x, object->as.box.min.y, object->as.box.max.z};
-    case SHAPE_TRIANGLE: {
-        Vector3 a = object->as.triangle.vertices[0], b = object->as.triangle.vertices[1];
-        if (random_bits() & 1) return a;
-        return vector_add(a, vector_scale(vector_subtract(b, a), part));
+    const Object *object = &scene->objects.items[random_bits(&random_state) % scene->objects.count];
+    double part = random_coin(&random_state) ? 0 : random_between(&random_state, 0, 1);
+    if (object->kind == SHAPE_TRIANGLE) {
+        const Vector3 *vertices = object->as.triangle.vertices;
+        return vector_add(vertices[0], vector_scale(vector_subtract(vertices[1], vertices[0]), part));
     }
-    case SHAPE_DISC:
-        return vector_add(object->as.disc.center, (Vector3){0, 0, object->as.disc.radius});
-    case SHAPE_CYLINDER:
-        return vector_add(object->as.cylinder.from, vector_scale(object->as.cylinder.axis, part));
-    case SHAPE_CONE:
-        return vector_add(object->as.cone.from, object->as.cone.axis);
-    case SHAPE_TORUS:
-        return vector_add(object->as.torus.center,
-                          (Vector3){object->as.torus.major + object->as.torus.minor, 0, 0});
-    default:
-        return random_in_cube(10);
-    }
+    Bounds box;
+    if (!shape_ops[object->kind]->bounds(scene, object, &box)) return random_in_cube(10);
+    if (random_coin(&random_state)) return (Vector3){box.max.x, box.min.y, box.max.z};
+    Vector3 center = vector_scale(vector_add(box.min, box.max), 0.5);
+    return (Vector3){box.max.x, center.y, center.z};
 }
 
 static TraceRay ray_of(Vector3 origin, Vector3 direction)
@@ -352,26 +284,27 @@ static TraceRay ray_of(Vector3 origin, Vector3 direction)
     return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
 }
 
-// A quarter each: any, along an axis with components of exactly 0 or -0, at a telling point, from far away.
+// A quarter each: any, along an axis with components of exactly 0 or -0, at a delicate point, from far away.
 static void rays_fill(TraceRay *rays, size_t count, const Scene *scene)
 {
     for (size_t i = 0; i < count; i++) {
-        Vector3 target = random_bits() & 1 ? telling_point(scene) : random_in_cube(10);
+        Vector3 target = random_coin(&random_state) ? delicate_point(scene) : random_in_cube(10);
         Vector3 origin = random_in_cube(12), direction = vector_subtract(target, origin);
         if (i % 4 == 1) {
             double axes[3] = {0, -0.0, 0}, from[3] = {target.x, target.y, target.z};
-            uint64_t axis = random_bits() % 3;
-            axes[axis] = random_bits() & 1 ? 1 : -1;
+            uint64_t axis = random_bits(&random_state) % 3;
+            axes[axis] = random_coin(&random_state) ? 1 : -1;
             from[axis] = -12 * axes[axis];
             rays[i] = ray_of((Vector3){from[0], from[1], from[2]}, (Vector3){axes[0], axes[1], axes[2]});
             continue;
         }
-        if (i % 4 == 2) direction = vector_subtract(telling_point(scene), origin);
+        if (i % 4 == 2) direction = vector_subtract(delicate_point(scene), origin);
         if (i % 4 == 3) {
-            origin = vector_scale(random_direction(), exp2(random_between(5, 20)));
+            origin =
+                vector_scale(random_unit_vector(&random_state), exp2(random_between(&random_state, 5, 20)));
             direction = vector_subtract(target, origin);
         }
-        rays[i] = ray_of(origin, vector_scale(direction, exp2(random_between(-3, 3))));
+        rays[i] = ray_of(origin, vector_scale(direction, exp2(random_between(&random_state, -3, 3))));
     }
 }
 
@@ -384,7 +317,7 @@ static void no_hit_depends_on_the_tree(void **state)
     } runs[] = {{PRECISION_SINGLE, 60000, 1000000},
                 {PRECISION_STRICT, 20000, 200000},
                 {PRECISION_DOUBLE, 20000, 200000}};
-    random_state = 1;
+    random_state.state = 1;
     size_t all_different = 0;
     Scene scene = random_scene(few_or_many(1000, 10000));
     size_t most = few_or_many(runs[0].few, runs[0].many);
@@ -430,18 +363,18 @@ static void rays_behind_fill(TraceRay *rays, const Scene *scene)
 {
     static const double nears[] = {-30, -4, -1e-3, 0, 1};
     for (size_t packet = 0; packet < PACKETS; packet++) {
-        Vector3 origin = random_in_cube(8), target = telling_point(scene);
+        Vector3 origin = random_in_cube(8), target = delicate_point(scene);
         Vector3 ahead = vector_normalize(vector_subtract(target, origin));
-        bool looks_behind = random_bits() & 1; // each of its rays, at what lies there
+        bool looks_behind = random_coin(&random_state); // each of its rays, at what lies there
         if (looks_behind) ahead = vector_scale(ahead, -1);
         for (size_t lane = 0; lane < PACKET; lane++) {
             bool goes_along = packet % 3 == 0 || (packet % 3 == 1 && lane % 4 != 0);
-            Vector3 direction = random_direction();
+            Vector3 direction = random_unit_vector(&random_state);
             if (goes_along) direction = vector_add(ahead, vector_scale(direction, 0.03));
             TraceRay *ray = &rays[packet * PACKET + lane];
             *ray = ray_of(vector_add(origin, random_in_cube(0.1)), direction);
-            ray->tmin = nears[random_bits() % (looks_behind ? 3 : sizeof nears / sizeof *nears)];
-            if (random_bits() & 1) ray->tmax = ray->tmin + random_between(1, 20);
+            ray->tmin = nears[random_bits(&random_state) % (looks_behind ? 3 : sizeof nears / sizeof *nears)];
+            if (random_coin(&random_state)) ray->tmax = ray->tmin + random_between(&random_state, 1, 20);
         }
     }
 }
@@ -467,7 +400,7 @@ static void rays_may_look_behind_their_start(void **state)
 {
     (void)state;
     static const uint32_t lane_counts[] = {1, 4, 8, 16};
-    random_state = 7;
+    random_state.state = 7;
     Scene scene = random_scene(4000);
     const uint32_t plane = (uint32_t)scene.objects.count - 1;
     enum { COUNT = PACKETS * PACKET };
@@ -561,8 +494,8 @@ static Scene closed_scene(Vector3 center, double radius)
     assert_int_equal(mesh.triangle_count, CLOSED_TRIANGLES);
     assert_int_equal(mesh.vertex_count, CLOSED_VERTICES);
     for (size_t i = 0; i < CLOSED_VERTICES; i++)
-        mesh.vertices[i] =
-            vector_add(center, vector_scale(mesh.vertices[i], radius * random_between(0.8, 1.2)));
+        mesh.vertices[i] = vector_add(
+            center, vector_scale(mesh.vertices[i], radius * random_between(&random_state, 0.8, 1.2)));
     Scene scene = {0};
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
     array_push(scene.meshes, mesh);
@@ -574,7 +507,7 @@ static Scene closed_scene(Vector3 center, double radius)
 static void rays_at_seams(TraceRay *rays, size_t count, const Mesh *mesh, Vector3 center, bool wide)
 {
     for (size_t i = 0; i < count; i++) {
-        const uint32_t *corners = mesh->triangles[random_bits() % mesh->triangle_count];
+        const uint32_t *corners = mesh->triangles[random_bits(&random_state) % mesh->triangle_count];
         Vector3 a = mesh->vertices[corners[0]], b = mesh->vertices[corners[1]];
         Vector3 origin = vector_add(center, random_in_cube(0.15));
         if (!wide) {
@@ -583,8 +516,9 @@ static void rays_at_seams(TraceRay *rays, size_t count, const Mesh *mesh, Vector
             origin = (Vector3){(float)origin.x, (float)origin.y, (float)origin.z};
         }
         Vector3 target = a;
-        if (i % 5 > 1) target = vector_add(a, vector_scale(vector_subtract(b, a), random_between(0, 1)));
-        Vector3 direction = i % 5 == 4 ? random_direction() : vector_subtract(target, origin);
+        if (i % 5 > 1)
+            target = vector_add(a, vector_scale(vector_subtract(b, a), random_between(&random_state, 0, 1)));
+        Vector3 direction = i % 5 == 4 ? random_unit_vector(&random_state) : vector_subtract(target, origin);
         rays[i] = ray_of(origin, direction);
     }
 }
@@ -594,7 +528,7 @@ static void closed_meshes_do_not_leak(void **state)
     (void)state;
     static const Vector3 centers[] = {{0, 0, 0}, {148376, 1234, -223423}};
     static const double radii[] = {1, 2};
-    random_state = 31;
+    random_state.state = 31;
     size_t count = few_or_many(6000, 1000000), plain_count = few_or_many(320, 20000);
     TraceRay *rays = memory_allocate(count, sizeof *rays);
     TraceHit *hits = memory_allocate(count, sizeof *hits);

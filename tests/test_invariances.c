@@ -1,10 +1,10 @@
 // Random scenes of every shape, light and kind of material: what must not change a picture nor what lies
 // behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
 #include "host/base/array.h"
+#include "host/compile/random_shape.h"
 #include "host/compile/transform.h"
 #include "tests/film.h"
 #include "tests/probe.h"
-#include "tests/specimen.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -29,7 +29,7 @@ typedef struct {
 
 static Vector3 random_place(Random *random, double least, double most)
 {
-    Vector3 way = vector_normalize(random_in_ball(random));
+    Vector3 way = vector_normalize(random_in_sphere(random));
     return vector_scale(way, random_between(random, least, most));
 }
 
@@ -57,24 +57,24 @@ static Material random_material(Random *random, size_t index)
     return material;
 }
 
-// One of each kind, then bounded ones; none so large that it hides the rest.
+static ShapeForm forms[SHAPE_FORMS_LARGEST];
+static size_t form_count;
+
+// One of each form, then bounded ones; none so large that it hides the rest.
 static Object random_object(Random *random, size_t index)
 {
     for (;;) {
-        SpecimenKind kind = index < SPECIMEN_COUNT ? (SpecimenKind)index
-                                                   : (SpecimenKind)random_between(random, 0, SPECIMEN_COUNT);
-        bool unbounded =
-            kind == SPECIMEN_PLANE || kind == SPECIMEN_CYLINDER_INFINITE || kind == SPECIMEN_CONE_INFINITE;
-        Specimen specimen = specimen_make(kind, random);
-        if (specimen.reach > 3 || (unbounded && index >= SPECIMEN_COUNT)) continue;
+        const bool first = index < form_count;
+        const ShapeForm *form = &forms[first ? index : (size_t)random_between(random, 0, (double)form_count)];
+        RandomShape shape = random_shape(form, random);
+        if (shape.reach > 3 || (!form->bounded && !first)) continue;
+        Object *object = &shape.object;
         // a plane behind the objects and a narrow cone beside them, not across the view
-        if (kind == SPECIMEN_PLANE)
-            specimen.object.as.plane.point = vector_scale(specimen.object.as.plane.normal, 0x1p5);
-        if (kind == SPECIMEN_CONE_INFINITE) specimen.object.as.cone.slope *= 0x1p-4;
-        // the order of a triangle's vertices tells glass from air, and the mirror turns it round
-        bool triangle = specimen.object.kind == SHAPE_TRIANGLE;
-        specimen.object.material = triangle ? (uint32_t)index % 2 : (uint32_t)index % 4;
-        return specimen.object;
+        if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
+        if (form->kind == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
+        // the order of a triangle's vertices distinguishes glass from air, and the mirror reverses it
+        object->material = (uint32_t)index % (form->kind == SHAPE_TRIANGLE ? 2 : 4);
+        return *object;
     }
 }
 
@@ -88,7 +88,10 @@ static Scene random_scene(uint64_t seed)
     for (size_t i = 0; i < OBJECTS; i++)
         array_push(scene.objects, random_object(&random, i));
     // from where the plane is not in the way
-    Vector3 up = vector_normalize(scene.objects.items[SPECIMEN_PLANE].as.plane.normal);
+    size_t plane = 0;
+    while (forms[plane].kind != SHAPE_PLANE)
+        plane++;
+    Vector3 up = vector_normalize(scene.objects.items[plane].as.plane.normal);
     Vector3 position = vector_subtract(random_place(&random, 10, 13), vector_scale(up, 6));
     scene.camera = (Camera){.position = position,
                             .look_at = random_place(&random, 0, 2),
@@ -309,6 +312,7 @@ static void double_holds(void **state)
 
 int main(void)
 {
+    form_count = shape_forms(forms);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fast_holds),
         cmocka_unit_test(single_holds),

@@ -3,8 +3,8 @@
 // bit.
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/compile/random_shape.h"
 #include "tests/probe.h"
-#include "tests/specimen.h"
 #include <float.h>
 #include <math.h>
 #include <setjmp.h>

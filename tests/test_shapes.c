@@ -1,7 +1,7 @@
 // Every shape at every precision against the reference: hit or miss, distance and normal.
 #include "host/verify/reference.h"
 #include "tests/probe.h"
-#include "tests/specimen.h"
+#include "tests/random_ray.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,15 +9,18 @@
 
 #include <cmocka.h>
 
-enum { SPECIMENS_OF_A_KIND = 3, RAYS_PER_SPECIMEN = 2000, CROWD = 40, CROWD_COUNT = 3 };
+enum { SHAPES_OF_A_FORM = 3, RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SCENE_COUNT = 3 };
 
 static const uint32_t lane_counts[] = {1, 4, 8, 16};
+
+static ShapeForm forms[SHAPE_FORMS_LARGEST];
+static size_t form_count;
 
 typedef struct {
     Vector3 center;
     double reach;
-    TraceRay rays[RAYS_PER_SPECIMEN];
-    ReferenceHit hits[RAYS_PER_SPECIMEN];
+    TraceRay rays[RAYS_PER_SHAPE];
+    ReferenceHit hits[RAYS_PER_SHAPE];
 } Trial;
 
 // What a precision owes, with u its unit roundoff, S the distance from the ray's origin to the far side of
@@ -104,7 +107,7 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, Preci
 
 // A ray from next to where one meets the scene, off it to either side by a hundredth to a hundred thousandth
 // of the reach, to anywhere.
-static SpecimenRay move_beside(const SpecimenRay *given, const Scene *scene, double reach, Random *random)
+static RandomRay move_beside(const RandomRay *given, const Scene *scene, double reach, Random *random)
 {
     ReferenceRay ray = reference_ray(given->origin, given->direction);
     ReferenceHit hit = reference_hit(scene, &ray);
@@ -114,18 +117,18 @@ static SpecimenRay move_beside(const SpecimenRay *given, const Scene *scene, dou
     double height = side * reach * pow(10, random_between(random, -5, -2));
     Vector3 normal = {(double)hit.normal.x, (double)hit.normal.y, (double)hit.normal.z};
     Vector3 place = {(double)p.x, (double)p.y, (double)p.z};
-    return (SpecimenRay){vector_add(place, vector_scale(normal, height)), random_in_ball(random)};
+    return (RandomRay){vector_add(place, vector_scale(normal, height)), random_in_sphere(random)};
 }
 
 // Rays and what they should hit; `wide`: taken in double, else what a float holds of them; `beside`: from
 // next to the surface.
-static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size_t aim_count, bool wide,
+static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, size_t aim_count, bool wide,
                     bool beside, Random *random)
 {
     for (size_t i = 0; !wide && i < scene->objects.count; i++)
         scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
-    for (size_t i = 0; i < RAYS_PER_SPECIMEN; i++) {
-        SpecimenRay given = specimen_ray(&aims[i % aim_count], random);
+    for (size_t i = 0; i < RAYS_PER_SHAPE; i++) {
+        RandomRay given = random_ray(&aims[i % aim_count], random);
         if (beside) given = move_beside(&given, scene, trial->reach, random);
         ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
                                 : reference_ray_rounded(given.origin, given.direction);
@@ -144,11 +147,11 @@ static void prepare(Trial *trial, const Scene *scene, const Specimen *aims, size
 static void hold_at(const Trial *trial, const Scene *scene, Precision precision, uint32_t lanes,
                     const char *what)
 {
-    static TraceHit hits[RAYS_PER_SPECIMEN];
+    static TraceHit hits[RAYS_PER_SHAPE];
     if (!probe_has(precision)) return;
-    assert_true(probe_trace(scene, precision, lanes, trial->rays, RAYS_PER_SPECIMEN, hits));
+    assert_true(probe_trace(scene, precision, lanes, trial->rays, RAYS_PER_SHAPE, hits));
     Tally tally = {0};
-    for (size_t i = 0; i < RAYS_PER_SPECIMEN; i++)
+    for (size_t i = 0; i < RAYS_PER_SHAPE; i++)
         compare(trial, i, &hits[i], precision, &tally);
     bool right = tally.wrong == 0 && tally.t <= 1 && tally.normal <= 1 && tally.length <= 1;
     if (!right)
@@ -156,23 +159,23 @@ static void hold_at(const Trial *trial, const Scene *scene, Precision precision,
             "%s, %s, lanes %u: %zu of %zu wrong; of what is owed: t %.2f, normal %.2f, its length %.2f\n",
             what, precision_names[precision], lanes, tally.wrong, tally.compared, tally.t, tally.normal,
             tally.length);
-    assert_true(tally.compared > RAYS_PER_SPECIMEN / 2);
+    assert_true(tally.compared > RAYS_PER_SHAPE / 2);
     assert_true(right);
 }
 
-static void hold(const Specimen *specimens, size_t count, Vector3 center, double reach, bool beside,
+static void hold(const RandomShape *shapes, size_t count, Vector3 center, double reach, bool beside,
                  const char *what, Random *random)
 {
     static Trial trial;
-    Object objects[CROWD];
+    Object objects[SHAPES_IN_SCENE];
     Material material;
     Scene scene = scene_of(objects, count, &material);
     trial.center = center;
     trial.reach = reach;
     for (int wide = 0; wide < 2; wide++) {
         for (size_t i = 0; i < count; i++)
-            objects[i] = specimens[i].object;
-        prepare(&trial, &scene, specimens, count, wide, beside, random);
+            objects[i] = shapes[i].object;
+        prepare(&trial, &scene, shapes, count, wide, beside, random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
             if (wide != (precision == PRECISION_DOUBLE)) continue;
             hold_at(&trial, &scene, precision, 1, what);
@@ -183,31 +186,31 @@ static void hold(const Specimen *specimens, size_t count, Vector3 center, double
 
 static void hits_each_shape(void **state)
 {
-    const SpecimenKind kind = *(const SpecimenKind *)*state;
-    Random random = {kind};
-    for (int i = 0; i < SPECIMENS_OF_A_KIND; i++) {
-        Specimen specimen = specimen_make(kind, &random);
-        hold(&specimen, 1, specimen.center, specimen.reach, false, specimen_names[kind], &random);
+    const ShapeForm *form = *state;
+    Random random = {(uint64_t)(form - forms)};
+    for (int i = 0; i < SHAPES_OF_A_FORM; i++) {
+        RandomShape shape = random_shape(form, &random);
+        hold(&shape, 1, shape.center, shape.reach, false, form->name, &random);
     }
 }
 
-static void hits_the_nearest_of_a_crowd(void **state)
+static void hits_the_nearest_of_many(void **state)
 {
     (void)state;
-    Random random = {SPECIMEN_COUNT};
-    for (int crowd = 0; crowd < CROWD_COUNT; crowd++) {
-        Specimen specimens[CROWD];
+    Random random = {form_count};
+    for (int scene = 0; scene < SCENE_COUNT; scene++) {
+        RandomShape shapes[SHAPES_IN_SCENE];
         double reach = 0;
-        for (int i = 0; i < CROWD; i++) {
-            specimens[i] = specimen_make((SpecimenKind)(i % SPECIMEN_COUNT), &random);
-            reach = fmax(reach, vector_length(specimens[i].center) + specimens[i].reach);
+        for (size_t i = 0; i < SHAPES_IN_SCENE; i++) {
+            shapes[i] = random_shape(&forms[i % form_count], &random);
+            reach = fmax(reach, vector_length(shapes[i].center) + shapes[i].reach);
         }
-        hold(specimens, CROWD, (Vector3){0, 0, 0}, reach, false, "crowd", &random);
+        hold(shapes, SHAPES_IN_SCENE, (Vector3){0, 0, 0}, reach, false, "many shapes", &random);
     }
 }
 
 // A cone of 32 times the slope; its axis ends on a float still.
-static void make_steep(Specimen *cone)
+static void make_steep(RandomShape *cone)
 {
     cone->object.as.cone.slope *= 32;
     cone->object.as.cone.axis = vector_scale(cone->object.as.cone.axis, 0x1p-5);
@@ -217,12 +220,13 @@ static void make_steep(Specimen *cone)
 static void hits_from_beside_the_side(void **state)
 {
     (void)state;
-    Random random = {SPECIMEN_COUNT + 2};
-    for (SpecimenKind kind = SPECIMEN_CYLINDER_CAPPED; kind <= SPECIMEN_CONE_INFINITE; kind++) {
-        for (int i = 0; i < SPECIMENS_OF_A_KIND; i++) {
-            Specimen specimen = specimen_make(kind, &random);
-            if (i == 0 && specimen.object.kind == SHAPE_CONE) make_steep(&specimen);
-            hold(&specimen, 1, specimen.center, specimen.reach, true, specimen_names[kind], &random);
+    Random random = {form_count + 2};
+    for (const ShapeForm *form = forms; form < forms + form_count; form++) {
+        if (form->kind != SHAPE_CYLINDER && form->kind != SHAPE_CONE) continue;
+        for (int i = 0; i < SHAPES_OF_A_FORM; i++) {
+            RandomShape shape = random_shape(form, &random);
+            if (i == 0 && form->kind == SHAPE_CONE) make_steep(&shape);
+            hold(&shape, 1, shape.center, shape.reach, true, form->name, &random);
         }
     }
 }
@@ -238,23 +242,22 @@ static void gives_the_same_bits_at_every_width(void **state)
 {
     (void)state;
     static Trial trial;
-    static TraceHit hits[2][RAYS_PER_SPECIMEN];
-    Random random = {SPECIMEN_COUNT + 1};
-    Specimen specimens[SPECIMEN_COUNT];
-    Object objects[SPECIMEN_COUNT];
-    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
-        specimens[kind] = specimen_make(kind, &random);
-        objects[kind] = specimens[kind].object;
+    static TraceHit hits[2][RAYS_PER_SHAPE];
+    Random random = {form_count + 1};
+    RandomShape shapes[SHAPE_FORMS_LARGEST];
+    Object objects[SHAPE_FORMS_LARGEST];
+    for (size_t i = 0; i < form_count; i++) {
+        shapes[i] = random_shape(&forms[i], &random);
+        objects[i] = shapes[i].object;
     }
     Material material;
-    Scene scene = scene_of(objects, SPECIMEN_COUNT, &material);
-    prepare(&trial, &scene, specimens, SPECIMEN_COUNT, false, false, &random);
+    Scene scene = scene_of(objects, form_count, &material);
+    prepare(&trial, &scene, shapes, form_count, false, false, &random);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         for (size_t width = 0; width < sizeof lane_counts / sizeof *lane_counts; width++) {
             TraceHit *seen = hits[width > 0];
-            assert_true(
-                probe_trace(&scene, precision, lane_counts[width], trial.rays, RAYS_PER_SPECIMEN, seen));
-            for (size_t i = 0; width > 0 && i < RAYS_PER_SPECIMEN; i++)
+            assert_true(probe_trace(&scene, precision, lane_counts[width], trial.rays, RAYS_PER_SHAPE, seen));
+            for (size_t i = 0; width > 0 && i < RAYS_PER_SHAPE; i++)
                 if (!same_bits(&hits[0][i], &seen[i]))
                     fail_msg("%s: ray %zu differs between 1 and %u lanes", precision_names[precision], i,
                              lane_counts[width]);
@@ -264,14 +267,12 @@ static void gives_the_same_bits_at_every_width(void **state)
 
 int main(void)
 {
-    SpecimenKind kinds[SPECIMEN_COUNT];
-    struct CMUnitTest tests[SPECIMEN_COUNT + 3];
-    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
-        kinds[kind] = kind;
-        tests[kind] = (struct CMUnitTest){specimen_names[kind], hits_each_shape, NULL, NULL, &kinds[kind]};
-    }
-    tests[SPECIMEN_COUNT] = (struct CMUnitTest)cmocka_unit_test(hits_the_nearest_of_a_crowd);
-    tests[SPECIMEN_COUNT + 1] = (struct CMUnitTest)cmocka_unit_test(gives_the_same_bits_at_every_width);
-    tests[SPECIMEN_COUNT + 2] = (struct CMUnitTest)cmocka_unit_test(hits_from_beside_the_side);
+    struct CMUnitTest tests[SHAPE_FORMS_LARGEST + 3] = {0};
+    form_count = shape_forms(forms);
+    for (size_t i = 0; i < form_count; i++)
+        tests[i] = (struct CMUnitTest){forms[i].name, hits_each_shape, NULL, NULL, &forms[i]};
+    tests[form_count] = (struct CMUnitTest)cmocka_unit_test(hits_the_nearest_of_many);
+    tests[form_count + 1] = (struct CMUnitTest)cmocka_unit_test(gives_the_same_bits_at_every_width);
+    tests[form_count + 2] = (struct CMUnitTest)cmocka_unit_test(hits_from_beside_the_side);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -3,11 +3,14 @@
 
 #include "host/compile/compiled_scene.h"
 #include "host/compile/flatten.h"
+#include "host/compile/random_shape.h"
 
 typedef struct {
     Vector3 center;
     double radius; // infinite around what is unbounded
 } BoundingSphere;
+
+enum { SHAPE_OPS_FORMS = 4 };
 
 // An Object is the scene's, in double and in world coordinates; a primitive is the flat struct of
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
@@ -21,6 +24,12 @@ typedef struct {
     bool (*bounds)(const Scene *scene, const Object *object, Bounds *bounds);
     // Adds its primitives (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
+
+    // What a random one can be, up to the first NULL, and one of a form, of about made->reach around
+    // made->center, with made->axis if it has an axis or normal. Sets the object's shape, and the reach and
+    // the axis where they are others.
+    const char *forms[SHAPE_OPS_FORMS];
+    void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
     // As `bounds`; NULL: always unbounded.
     bool (*primitive_bounds)(const void *primitive, Bounds *bounds);

@@ -1,6 +1,7 @@
 // Checks of triangles, and of the hierarchy, that no table holds.
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/compile/random_shape.h"
 #include "host/import/load.h"
 #include "host/verify/families.h"
 #include "host/verify/judge.h"
@@ -203,67 +204,22 @@ void verify_degenerate_meshes(VerifyRun *run)
     free(clean);
 }
 
-enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 50, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 16 };
+enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 20, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 16 };
 
-static void add_other(Scene *scene, ShapeKind kind, uint64_t index)
-{
-    Object object = {.kind = kind};
-    Vector3 a = random_point(68, index, 0);
-    double size = 0.02 + 0.08 * random_at(68, index, 3);
-    Vector3 axis = vector_scale(random_unit(68, index, 4), size);
-    switch (kind) {
-    case SHAPE_SPHERE:
-        object.as.sphere.center = a;
-        object.as.sphere.radius = size;
-        break;
-    case SHAPE_DISC:
-        object.as.disc.center = a;
-        object.as.disc.normal = axis;
-        object.as.disc.radius = size;
-        break;
-    case SHAPE_BOX:
-        object.as.box.min = a;
-        object.as.box.max = (Vector3){a.x + size, a.y + fabs(axis.y), a.z + fabs(axis.z)};
-        break;
-    case SHAPE_CYLINDER:
-        object.as.cylinder.from = a;
-        object.as.cylinder.axis = axis;
-        object.as.cylinder.radius = size / 3;
-        object.as.cylinder.finite = true;
-        object.as.cylinder.caps = index % 2;
-        break;
-    case SHAPE_CONE:
-        object.as.cone.from = a;
-        object.as.cone.axis = axis;
-        object.as.cone.radius[0] = size / 2;
-        object.as.cone.finite = true;
-        object.as.cone.caps = index % 2;
-        break;
-    case SHAPE_TORUS:
-        object.as.torus.center = a;
-        object.as.torus.axis = axis;
-        object.as.torus.major = size;
-        object.as.torus.minor = size / 4;
-        break;
-    case SHAPE_PLANE: // without end, so in no hierarchy
-    case SHAPE_TRIANGLE:
-    case SHAPE_PARABOLOID:
-    case SHAPE_MESH: // as CROWD_TRIANGLES
-    case SHAPE_COUNT:
-        return;
-    }
-    array_push(scene->objects, object);
-}
-
+// Triangles, and some of every bounded form of every shape.
 static Scene crowd_make(void)
 {
-    static const ShapeKind others[] = {SHAPE_SPHERE,   SHAPE_DISC, SHAPE_BOX,
-                                       SHAPE_CYLINDER, SHAPE_CONE, SHAPE_TORUS};
+    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    const size_t form_count = shape_forms(forms);
     Scene scene = scene_empty();
     add_random_triangles(&scene, CROWD_TRIANGLES, 0.05);
-    for (size_t k = 0; k < sizeof others / sizeof *others; k++)
-        for (uint64_t i = 0; i < CROWD_OTHERS; i++)
-            add_other(&scene, others[k], k * CROWD_OTHERS + i);
+    Random random = {68};
+    for (size_t i = 0; i < form_count * CROWD_OTHERS; i++) {
+        Vector3 center = random_point(68, i, 0);
+        RandomShape shape =
+            random_shape_at(&forms[i % form_count], center, random_between(&random, 0.02, 0.1), &random);
+        if (forms[i % form_count].bounded) array_push(scene.objects, shape.object);
+    }
     return scene;
 }
 

@@ -7,7 +7,7 @@
 // SAMPLES: how many random rays at each random object; FURTHER: the last ray, without an answer, to print of
 // each family that is closed. A line is a JSON object: a set's name, then its objects, then its rays.
 #include "host/verify/judge.h"
-#include "tests/specimen.h"
+#include "tests/random_ray.h"
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -121,19 +121,19 @@ static void case_print(const VerifyRays *set, bool wide, size_t further)
     scene_free(&scene);
 }
 
-static void specimens_print(SpecimenKind kind, size_t samples)
+static void shapes_print(const ShapeForm *form, uint64_t seed, size_t samples)
 {
-    Random random = {kind};
+    Random random = {seed};
     for (int i = 0; i < OBJECTS_OF_A_KIND; i++) {
-        Specimen specimen = specimen_make(kind, &random);
-        set_print(specimen_names[kind], true);
-        object_print(&specimen.object);
+        RandomShape shape = random_shape(form, &random);
+        set_print(form->name, true);
+        object_print(&shape.object);
         for (size_t k = 0; k < samples; k++) {
-            SpecimenRay given = specimen_ray(&specimen, &random);
+            RandomRay given = random_ray(&shape, &random);
             Vector3 o = given.origin, d = given.direction;
             TraceRay ray = {{o.x, o.y, o.z}, {d.x, d.y, d.z}, 0, INFINITY};
             ReferenceRay exact_ray = verify_reference_ray(&ray);
-            ReferenceHit hit = reference_hit_object(&specimen.object, &exact_ray);
+            ReferenceHit hit = reference_hit_object(&shape.object, &exact_ray);
             ray_print(&ray);
             hit_print(&hit);
             printf("}\n");
@@ -148,7 +148,9 @@ int main(int argument_count, char **arguments)
     for (size_t i = 0; i < verify_rays_count; i++)
         for (int wide = 0; wide < 2; wide++)
             case_print(&verify_rays[i], wide, further);
-    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT && samples > 0; kind++)
-        specimens_print(kind, samples);
+    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    const size_t form_count = shape_forms(forms);
+    for (size_t i = 0; i < form_count && samples > 0; i++)
+        shapes_print(&forms[i], i, samples);
     return EXIT_SUCCESS;
 }

@@ -6,9 +6,10 @@
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
+#include "host/compile/random_shape.h"
 #include "host/render/renderer.h"
 #include "host/verify/reference.h"
-#include "tests/specimen.h"
+#include "tests/random_ray.h"
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,16 +20,10 @@ static const double rungs[] = {1.0001, 1.01, 1.1, 2, 10, 100, 1e3, 1e4, 1e5, 1e6
 
 enum {
     RUNG_COUNT = sizeof rungs / sizeof *rungs,
-    SHAPES = 8,
-    SPECIMENS = 6,  // of each shape, of which each rung's rays are shared out
+    INSTANCES = 6,  // of each shape, among which each rung's rays are divided
     COPIES = 64,    // of a shape in the scene whose time tells a test's
     TIMED_RUNS = 5, // of which the shortest counts
     TIMED_RAYS = 1 << 17
-};
-
-static const SpecimenKind ladder_kinds[SHAPES] = {
-    SPECIMEN_SPHERE,          SPECIMEN_PLANE,       SPECIMEN_DISC,     SPECIMEN_BOX,
-    SPECIMEN_CYLINDER_CAPPED, SPECIMEN_CONE_CAPPED, SPECIMEN_TRIANGLE, SPECIMEN_TORUS,
 };
 
 typedef struct {
@@ -38,7 +33,7 @@ typedef struct {
     const char *shape;   // NULL: all
 } LadderOptions;
 
-// Rays of one rung at one specimen, and what they should meet.
+// Rays of one rung at one aim, and what they should meet.
 typedef struct {
     TraceRay *rays;
     ReferenceHit *hits;
@@ -80,13 +75,12 @@ static Vector3 vector_from(const double parts[3])
 }
 
 // From so many radii away towards a random point of the ball, a fiftieth larger, that holds the shape.
-static SpecimenRay ladder_ray(const Specimen *specimen, double rung, Random *random)
+static RandomRay ladder_ray(const RandomShape *aim, double rung, Random *random)
 {
-    Vector3 out = vector_normalize(random_in_ball(random));
-    Vector3 eye = vector_add(specimen->center, vector_scale(out, rung * specimen->reach));
-    Vector3 target =
-        vector_add(specimen->center, vector_scale(random_in_ball(random), 1.02 * specimen->reach));
-    return (SpecimenRay){eye, vector_normalize(vector_subtract(target, eye))};
+    Vector3 out = vector_normalize(random_in_sphere(random));
+    Vector3 eye = vector_add(aim->center, vector_scale(out, rung * aim->reach));
+    Vector3 target = vector_add(aim->center, vector_scale(random_in_sphere(random), 1.02 * aim->reach));
+    return (RandomRay){eye, vector_normalize(vector_subtract(target, eye))};
 }
 
 static void rays_free(Rays *rays)
@@ -96,14 +90,14 @@ static void rays_free(Rays *rays)
     free(rays->answers);
 }
 
-static Rays rays_make(const Object *object, const Specimen *specimen, double rung, size_t count, bool wide,
+static Rays rays_make(const Object *object, const RandomShape *aim, double rung, size_t count, bool wide,
                       Random *random)
 {
     Rays rays = {memory_allocate(count + 1, sizeof(TraceRay)),
                  memory_allocate(count + 1, sizeof(ReferenceHit)),
                  memory_allocate(count + 1, sizeof(TraceHit)), count};
     for (size_t i = 0; i < count; i++) {
-        SpecimenRay given = ladder_ray(specimen, rung, random);
+        RandomRay given = ladder_ray(aim, rung, random);
         ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
                                 : reference_ray_rounded(given.origin, given.direction);
         rays.rays[i] = (TraceRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
@@ -143,7 +137,7 @@ static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision pre
     return renderer;
 }
 
-static void tally_add(Tally *tally, const Specimen *specimen, const Rays *rays, size_t i, Precision precision)
+static void tally_add(Tally *tally, const RandomShape *aim, const Rays *rays, size_t i, Precision precision)
 {
     const ReferenceHit *expected = &rays->hits[i];
     const TraceHit *hit = &rays->answers[i];
@@ -151,12 +145,12 @@ static void tally_add(Tally *tally, const Specimen *specimen, const Rays *rays, 
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
-    double distance = vector_length(vector_subtract(origin, specimen->center)) + specimen->reach;
+    double distance = vector_length(vector_subtract(origin, aim->center)) + aim->reach;
     // a plane may be hit far beyond the reach
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
-    double scale = u * (tier->of_size ? specimen->reach : distance);
+    double scale = u * (tier->of_size ? aim->reach : distance);
     // flat shapes have no compensated edges; a triangle's are open below 16 u of edge and distance
-    double flat = specimen->kind == SPECIMEN_TRIANGLE ? 16 : 4;
+    double flat = aim->object.kind == SHAPE_TRIANGLE ? 16 : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
 
     tally->compared++;
@@ -219,16 +213,16 @@ static double trace_seconds(Renderer *renderer, const Rays *rays)
 }
 
 // A shape's test costs what a scene with 64 more copies of it takes longer, for rays of all rungs.
-static double test_seconds(Compute *compute, const Specimen *specimen, Precision precision)
+static double test_seconds(Compute *compute, const RandomShape *aim, Precision precision)
 {
     bool wide = precision == PRECISION_DOUBLE;
-    Object object = wide ? specimen->object : reference_round_object(&specimen->object);
+    Object object = wide ? aim->object : reference_round_object(&aim->object);
     Rays all = {memory_allocate(TIMED_RAYS, sizeof(TraceRay)), NULL,
                 memory_allocate(TIMED_RAYS, sizeof(TraceHit)), 0};
     Random random = {2};
     for (int rung = 0; rung < RUNG_COUNT; rung++)
         for (int i = 0; i < TIMED_RAYS / RUNG_COUNT; i++) {
-            SpecimenRay ray = ladder_ray(specimen, rungs[rung], &random);
+            RandomRay ray = ladder_ray(aim, rungs[rung], &random);
             all.rays[all.count++] = (TraceRay){{ray.origin.x, ray.origin.y, ray.origin.z},
                                                {ray.direction.x, ray.direction.y, ray.direction.z},
                                                0,
@@ -251,24 +245,25 @@ static double test_seconds(Compute *compute, const Specimen *specimen, Precision
 }
 
 typedef struct {
-    Specimen specimens[SPECIMENS];
-    Renderer *renderers[SPECIMENS][PRECISION_COUNT]; // opened when first needed
+    RandomShape instances[INSTANCES];
+    Renderer *renderers[INSTANCES][PRECISION_COUNT]; // opened when first needed
     const char *name;
 } LadderShape;
 
-static LadderShape shape_make(SpecimenKind kind)
+// Of the shape's first form.
+static LadderShape shape_make(ShapeKind kind)
 {
-    LadderShape shape = {0};
+    LadderShape shape = {.name = shape_names[kind]};
+    const ShapeForm form = {.kind = kind};
     Random random = {1};
-    for (int i = 0; i < SPECIMENS; i++)
-        shape.specimens[i] = specimen_make(kind, &random);
-    shape.name = shape_names[shape.specimens[0].object.kind];
+    for (int i = 0; i < INSTANCES; i++)
+        shape.instances[i] = random_shape(&form, &random);
     return shape;
 }
 
 static void shape_close(LadderShape *shape)
 {
-    for (int i = 0; i < SPECIMENS; i++)
+    for (int i = 0; i < INSTANCES; i++)
         for (int precision = 0; precision < PRECISION_COUNT; precision++)
             renderer_close(shape->renderers[i][precision]);
 }
@@ -289,22 +284,22 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
 static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, const LadderOptions *options,
                      Json *json)
 {
-    size_t count = options->ray_count / (RUNG_COUNT * SPECIMENS) + 1;
+    size_t count = options->ray_count / (RUNG_COUNT * INSTANCES) + 1;
     Tally tallies[PRECISION_COUNT] = {0};
     Random random = {3 + (uint64_t)rung};
     for (int precision = 0; precision < PRECISION_COUNT; precision++) {
-        tallies[precision].steep.ulps = memory_allocate(count * SPECIMENS, sizeof(double));
-        tallies[precision].grazing.ulps = memory_allocate(count * SPECIMENS, sizeof(double));
+        tallies[precision].steep.ulps = memory_allocate(count * INSTANCES, sizeof(double));
+        tallies[precision].grazing.ulps = memory_allocate(count * INSTANCES, sizeof(double));
     }
-    for (int which = 0; which < SPECIMENS; which++) {
-        const Specimen *specimen = &shape->specimens[which];
-        Object object = wide ? specimen->object : reference_round_object(&specimen->object);
-        Rays rays = rays_make(&object, specimen, rungs[rung], count, wide, &random);
+    for (int which = 0; which < INSTANCES; which++) {
+        const RandomShape *aim = &shape->instances[which];
+        Object object = wide ? aim->object : reference_round_object(&aim->object);
+        Rays rays = rays_make(&object, aim, rungs[rung], count, wide, &random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
             if (!(options->precisions >> precision & 1) || wide != (precision == PRECISION_DOUBLE)) continue;
             shape_trace(shape, which, precision, compute, &object, &rays);
             for (size_t i = 0; i < count; i++)
-                tally_add(&tallies[precision], specimen, &rays, i, precision);
+                tally_add(&tallies[precision], aim, &rays, i, precision);
         }
         rays_free(&rays);
     }
@@ -380,8 +375,8 @@ int main(int argument_count, char **arguments)
     Json *json = json_open();
     json_text(json, "device", device->name);
     json_begin_array(json, "rungs");
-    for (int i = 0; options.ray_count > 0 && i < SHAPES; i++) {
-        LadderShape shape = shape_make(ladder_kinds[i]);
+    for (int i = 0; options.ray_count > 0 && i < SHAPE_MESH; i++) {
+        LadderShape shape = shape_make((ShapeKind)i);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
         for (int rung = 0; rung < RUNG_COUNT; rung++)
             for (int wide = 0; wide < 2; wide++)
@@ -390,8 +385,8 @@ int main(int argument_count, char **arguments)
     }
     json_end(json);
     json_begin_array(json, "tests");
-    for (int i = 0; options.time && i < SHAPES; i++) {
-        LadderShape shape = shape_make(ladder_kinds[i]);
+    for (int i = 0; options.time && i < SHAPE_MESH; i++) {
+        LadderShape shape = shape_make((ShapeKind)i);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
             if (!(options.precisions >> precision & 1)) continue;
@@ -399,7 +394,7 @@ int main(int argument_count, char **arguments)
             json_text(json, "shape", shape.name);
             json_text(json, "precision", precision_names[precision]);
             // milliseconds of a million are nanoseconds of one
-            json_number(json, "ms_per_million", 1e9 * test_seconds(&compute, &shape.specimens[0], precision));
+            json_number(json, "ms_per_million", 1e9 * test_seconds(&compute, &shape.instances[0], precision));
             json_end(json);
         }
     }

@@ -28,12 +28,25 @@ static bool box_primitive_bounds(const void *primitive, Bounds *bounds)
     return true;
 }
 
+static void box_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form;
+    Vector3 half = {random_between(random, 0.2, 1), random_between(random, 0.2, 1),
+                    random_between(random, 0.2, 1)};
+    half = vector_scale(half, made->reach);
+    made->object.as.box.min = vector_subtract(made->center, half);
+    made->object.as.box.max = vector_add(made->center, half);
+    made->reach = vector_length(half);
+}
+
 const ShapeOps box_ops = {
     .kind = KIND_BOXES,
     .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)},
     .restore = box_restore,
     .bounds = box_bounds,
     .flatten = box_flatten,
+    .forms = {"box"},
+    .randomize = box_randomize,
     .primitive_bounds = box_primitive_bounds,
     .test_flops = 22,
 };

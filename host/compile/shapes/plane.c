@@ -29,11 +29,20 @@ static double plane_reach(const void *primitive)
     return fabs(vector_dot(vector_normalize(vector3_of(&plane->normal)), vector3_of(&plane->point)));
 }
 
+static void plane_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form, (void)random;
+    made->object.as.plane.point = made->center;
+    made->object.as.plane.normal = made->axis;
+}
+
 const ShapeOps plane_ops = {
     .kind = KIND_PLANES,
     .vectors = {offsetof(Object, as.plane.point), offsetof(Object, as.plane.normal)},
     .bounds = plane_bounds,
     .flatten = plane_flatten,
+    .forms = {"plane"},
+    .randomize = plane_randomize,
     .plane = plane_plane,
     .reach = plane_reach,
     .test_flops = 14,

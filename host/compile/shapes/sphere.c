@@ -28,12 +28,21 @@ static bool sphere_primitive_bounds(const void *primitive, Bounds *bounds)
     return true;
 }
 
+static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form, (void)random;
+    made->object.as.sphere.center = made->center;
+    made->object.as.sphere.radius = made->reach;
+}
+
 const ShapeOps sphere_ops = {
     .kind = KIND_SPHERES,
     .vectors = {offsetof(Object, as.sphere.center)},
     .lengths = {offsetof(Object, as.sphere.radius)},
     .bounds = sphere_bounds,
     .flatten = sphere_flatten,
+    .forms = {"sphere"},
+    .randomize = sphere_randomize,
     .primitive_bounds = sphere_primitive_bounds,
     .bounding_sphere = sphere_bounding_sphere,
     .test_flops = 17,

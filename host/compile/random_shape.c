@@ -1,0 +1,96 @@
+#include "host/compile/random_shape.h"
+
+#include "host/base/fault.h"
+#include "host/compile/shapes.h"
+
+// SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
+uint64_t random_bits(Random *random)
+{
+    uint64_t z = random->state += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+bool random_coin(Random *random)
+{
+    return random_bits(random) >> 63;
+}
+
+double random_between(Random *random, double low, double high)
+{
+    return low + (high - low) * (double)(random_bits(random) >> 11) * 0x1p-53;
+}
+
+double random_power(Random *random, double low, double high)
+{
+    return pow(10, random_between(random, low, high));
+}
+
+Vector3 random_in_sphere(Random *random)
+{
+    for (;;) {
+        Vector3 point = {random_between(random, -1, 1), random_between(random, -1, 1),
+                         random_between(random, -1, 1)};
+        if (vector_dot(point, point) <= 1) return point;
+    }
+}
+
+Vector3 random_unit_vector(Random *random)
+{
+    return vector_normalize(random_in_sphere(random));
+}
+
+Vector3 random_world_axis(Random *random)
+{
+    double parts[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++)
+        if (random_coin(random)) parts[i] = -0.0;
+    parts[random_bits(random) % 3] = random_coin(random) ? 1 : -1;
+    return (Vector3){parts[0], parts[1], parts[2]};
+}
+
+Vector3 vector_on_grid(Vector3 point)
+{
+    const double cells = 0x1p18;
+    return (Vector3){rint(point.x * cells) / cells, rint(point.y * cells) / cells,
+                     rint(point.z * cells) / cells};
+}
+
+size_t shape_forms(ShapeForm forms[SHAPE_FORMS_LARGEST])
+{
+    size_t count = 0;
+    for (ShapeKind kind = 0; kind < SHAPE_MESH; kind++) {
+        const ShapeOps *shape = shape_ops[kind];
+        for (unsigned form = 0; form < SHAPE_OPS_FORMS && shape->forms[form]; form++) {
+            if (count == SHAPE_FORMS_LARGEST) fault("more than %d forms of shapes", SHAPE_FORMS_LARGEST);
+            ShapeForm *entry = &forms[count++];
+            *entry = (ShapeForm){kind, form, shape->forms[form], false};
+            Bounds bounds;
+            RandomShape one = random_shape(entry, &(Random){0});
+            entry->bounded = shape->bounds(NULL, &one.object, &bounds);
+        }
+    }
+    return count;
+}
+
+static RandomShape shape_make(const ShapeForm *form, Vector3 center, double size, Vector3 axis,
+                              Random *random)
+{
+    RandomShape made = {.object.kind = form->kind, .center = center, .reach = size, .axis = axis};
+    shape_ops[form->kind]->randomize(&made, form->form, random);
+    return made;
+}
+
+RandomShape random_shape(const ShapeForm *form, Random *random)
+{
+    double size = random_power(random, -1, 1);
+    Vector3 center = vector_scale(random_in_sphere(random), 8);
+    Vector3 axis = vector_on_grid(vector_scale(random_unit_vector(random), random_power(random, -1, 1)));
+    return shape_make(form, center, size, axis, random);
+}
+
+RandomShape random_shape_at(const ShapeForm *form, Vector3 center, double size, Random *random)
+{
+    return shape_make(form, center, size, vector_on_grid(random_unit_vector(random)), random);
+}
