@@ -1,5 +1,6 @@
 // The reference itself, against roots known by hand or from certified interval arithmetic.
 #include "tests/reference_color.h"
+#include "tests/specimen.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -363,6 +364,56 @@ static void finds_the_nearest(void **state)
     assert_near(reference_ulp(-3, 53), 0x1p-51, 0);
 }
 
+// A point off the surface along the exact normal is as far from it as it was moved, and the normal is there.
+static void measures_distances(void **state)
+{
+    (void)state;
+    size_t measured = 0;
+    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
+        Random random = {kind};
+        Specimen specimen = specimen_make(kind, &random);
+        for (int i = 0; i < 50; i++) {
+            SpecimenRay given = specimen_ray(&specimen, &random);
+            ReferenceRay ray = reference_ray(given.origin, given.direction);
+            ReferenceHit hit = reference_hit_object(&specimen.object, &ray);
+            double height = (i % 2 ? 1e-9 : -1e-9) * specimen.reach;
+            // near an edge another part of the surface may be nearer
+            if (!hit.found || hit.margin < 1e-6 * specimen.reach || hit.cosine < 1e-3) continue;
+            Quad3 point = quad3_add(reference_point(&ray, hit.t), quad3_scale(hit.normal, height));
+            ReferenceSurface surface = reference_surface(&specimen.object, point);
+            double distance = (double)reference_surface_distance(&surface);
+            bool normal_found = false;
+            for (int k = 0; k < surface.count; k++) {
+                const ReferenceSheet *sheet = &surface.sheets[k];
+                double turned = (double)quad3_length(quad3_cross(sheet->normal, hit.normal));
+                normal_found |= sheet->distance <= 2 * fabs(height) && turned < 1e-7;
+            }
+            // to first order, of a paraboloid
+            if (fabs(distance - fabs(height)) > 1e-7 * fabs(height) || !normal_found)
+                fail_msg("%s: %g off the surface, not %g", specimen_names[kind], distance, height);
+            measured++;
+        }
+    }
+    assert_true(measured > 15 * SPECIMEN_COUNT);
+}
+
+static void knows_highlights(void **state)
+{
+    (void)state;
+    const Quad3 normal = {0, 0, 1}, to_eye = {0, 0, 1};
+    const double exponents[] = {0, 1, 10, 1e3, 1e6}, angles[] = {0, 1e-4, 1e-3, 0.1, 1};
+    for (size_t i = 0; i < COUNT(exponents); i++)
+        for (size_t k = 0; k < COUNT(angles); k++) {
+            // the light mirrored lies at its own angle with the eye
+            Quad3 to_light = {sinl(angles[k]), 0, cosl(angles[k])};
+            double versine = 2 * sin(angles[k] / 2) * sin(angles[k] / 2);
+            double expected = exp(exponents[i] * log1p(-versine));
+            double value = (double)reference_highlight(normal, to_light, to_eye, exponents[i]);
+            assert_near(value, expected, 1e-12);
+        }
+    assert_near((double)reference_highlight(normal, (Quad3){0, 0, -1}, to_eye, 0), 0, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -372,6 +423,7 @@ int main(void)
         cmocka_unit_test(shades_as_phong),     cmocka_unit_test(casts_shadows),
         cmocka_unit_test(lays_checkers),       cmocka_unit_test(aims_cameras),
         cmocka_unit_test(rounds_every_number), cmocka_unit_test(finds_the_nearest),
+        cmocka_unit_test(measures_distances),  cmocka_unit_test(knows_highlights),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

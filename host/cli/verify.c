@@ -119,12 +119,11 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     settings.render.precision = precision;
     settings.render.bounce_count = BOUNCES_DEFAULT;
     const VerifyTier tier = verify_tier(&settings.render);
-    if (tier == TIER_D && verify_oracle_bits() < 64)
+    if (tier == TIER_D && verify_reference_bits() < 64)
         fprintf(stderr,
-                "glint: verify: a long double has %d bits here, so that the pictures of tier D are judged by "
-                "their "
-                "like; rays have exact answers\n",
-                verify_oracle_bits());
+                "glint: verify: the reference has %d bits here: tier D is judged by numbers of its own "
+                "precision\n",
+                verify_reference_bits());
     double start = clock_seconds();
     Report report = {.compute = compute, .json = json, .tier = (char)('A' + tier), .start = start};
     const char *name = precision_names[precision];
@@ -162,7 +161,7 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
 {
     json_integer(json, "schema", 3);
     json_text(json, "glint", glint_version());
-    json_integer(json, "reference_bits", verify_oracle_bits());
+    json_integer(json, "reference_bits", verify_reference_bits());
     json_begin_object(json, "device");
     device_json(json, device);
     json_end(json);

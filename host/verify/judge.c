@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-int verify_oracle_bits(void)
+int verify_reference_bits(void)
 {
     return QUAD_BITS;
 }

@@ -56,9 +56,8 @@ typedef struct {
 
 bool verify_is_case(const char *name);
 
-// The bits of the numbers in which pictures are judged. Where a long double is no more than a double,
-// pictures at `double` are judged by their like; rays have exact answers all the same.
-int verify_oracle_bits(void);
+// The bits of the reference's numbers: 113, or those of a long double where the compiler has no more.
+int verify_reference_bits(void);
 
 // Runs the cases in turn, until the sink ends it.
 VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,

@@ -38,14 +38,27 @@ static void set_print(const char *name, bool wide)
     printf("{\"set\": \"%s\", \"wide\": %s}\n", name, json_of(wide));
 }
 
+static void flags_print(bool finite, bool caps)
+{
+    printf("\"finite\": %s, \"caps\": %s, ", json_of(finite), json_of(caps));
+}
+
 static void object_print(const Object *object)
 {
     printf("{\"shape\": \"%s\", ", shape_names[object->kind]);
-    const bool *flags = object->kind == SHAPE_CYLINDER     ? &object->as.cylinder.finite
-                        : object->kind == SHAPE_CONE       ? &object->as.cone.finite
-                        : object->kind == SHAPE_PARABOLOID ? &object->as.paraboloid.finite
-                                                           : NULL;
-    if (flags) printf("\"finite\": %s, \"caps\": %s, ", json_of(flags[0]), json_of(flags[1]));
+    switch (object->kind) {
+    case SHAPE_CYLINDER:
+        flags_print(object->as.cylinder.finite, object->as.cylinder.caps);
+        break;
+    case SHAPE_CONE:
+        flags_print(object->as.cone.finite, object->as.cone.caps);
+        break;
+    case SHAPE_PARABOLOID:
+        flags_print(object->as.paraboloid.finite, object->as.paraboloid.caps);
+        break;
+    default:
+        break;
+    }
     // the members of each shape begin with its doubles in a row
     numbers_print("numbers", (const double *)(const void *)&object->as, 9);
     printf("}\n");

@@ -21,7 +21,7 @@ from fractions import Fraction
 
 import exact
 from color import grown
-from exact import fraction, subtract
+from exact import fraction
 
 PART = Fraction(1, 2**62)
 RESOLVED = 2.0**-80  # margins below this part of the size may be lost in roundings
@@ -29,29 +29,6 @@ BEND = 0.01  # margins up to this part of the radius are proportional to distanc
 SHAPES = "sphere", "plane", "disc", "box", "cylinder", "cone", "paraboloid", "triangle", "torus"
 SHORT = 200  # rays of a set
 LEAST = {"hit or miss": 100, "t": 60, "normal": 60}  # of each shape
-
-
-def shape_of(given):
-    kind, n = given["shape"], given["numbers"]
-    if kind == "sphere":
-        return exact.Sphere(n[:3], n[3])
-    if kind == "plane":
-        return exact.Plane(n[:3], n[3:6])
-    if kind == "disc":
-        return exact.Disc(n[:3], n[3:6], n[6])
-    if kind == "box":
-        return exact.Box(n[:3], n[3:6])
-    if kind == "cylinder":
-        return exact.Revolution(n[:3], n[3:6], [n[6]] * 2, not given["finite"], given["caps"])
-    if kind == "cone" and given["finite"]:
-        return exact.Revolution(n[:3], n[3:6], n[6:8], caps=given["caps"])
-    if kind == "cone":
-        return exact.DoubleCone(n[:3], n[3:6], n[8])
-    if kind == "paraboloid":
-        return exact.Paraboloid(n[:3], n[3:6], n[6], n[7], not given["finite"], given["caps"])
-    if kind == "triangle":
-        return exact.Triangle(n[:3], n[3:6], n[6:9])
-    return exact.Torus(n[:3], n[6], n[7], n[3:6])
 
 
 class Set:
@@ -172,7 +149,7 @@ def main():
     for set_ in sets_read(sys.stdin):
         if options.set not in (None, set_.name):
             continue
-        shapes = [shape_of(given) for given in set_.given]
+        shapes = [exact.shape_of(given) for given in set_.given]
         kind = set_.given[0]["shape"]
         near = Near(shapes) if len(shapes) > 1 else None
         for given in set_.rays[: None if options.long else SHORT]:

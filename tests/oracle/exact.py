@@ -366,3 +366,27 @@ class Triangle(Plane):
     def crossings(self, ray):
         edges = self.edges(ray)
         return [] if min(edges) < 0 < max(edges) else super().crossings(ray)
+
+
+def shape_of(given):
+    """A shape by its numbers and flags, as answers.c prints them."""
+    kind, n = given["shape"], given["numbers"]
+    if kind == "sphere":
+        return Sphere(n[:3], n[3])
+    if kind == "plane":
+        return Plane(n[:3], n[3:6])
+    if kind == "disc":
+        return Disc(n[:3], n[3:6], n[6])
+    if kind == "box":
+        return Box(n[:3], n[3:6])
+    if kind == "cylinder":
+        return Revolution(n[:3], n[3:6], [n[6]] * 2, not given["finite"], given["caps"])
+    if kind == "cone" and given["finite"]:
+        return Revolution(n[:3], n[3:6], n[6:8], caps=given["caps"])
+    if kind == "cone":
+        return DoubleCone(n[:3], n[3:6], n[8])
+    if kind == "paraboloid":
+        return Paraboloid(n[:3], n[3:6], n[6], n[7], not given["finite"], given["caps"])
+    if kind == "triangle":
+        return Triangle(n[:3], n[3:6], n[6:9])
+    return Torus(n[:3], n[6], n[7], n[3:6])
