@@ -15,8 +15,8 @@ typedef struct {
 static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, scalar dx, scalar dy,
                              mask active)
 {
-    real x = real_from_integer(pixels.x * 2 + 1 - (integer)((scalar_integer)header->picture.x)) + dx;
-    real y = real_from_integer((integer)((scalar_integer)header->picture.y) - 1 - pixels.y * 2) + dy;
+    real x = real_from_integer(pixels.x * 2 + 1 - (integer)((scalar_integer)header->image.x)) + dx;
+    real y = real_from_integer((integer)((scalar_integer)header->image.y) - 1 - pixels.y * 2) + dy;
     Vector direction = vector_fma(vector_of(header->right), x,
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
     const Vector eye = {(real)(0), (real)(0), (real)(0)};

@@ -26,7 +26,7 @@ static KERNEL_BODY void tile_render(const Scene *scene, const Tile *tile, global
         lost = vector_subtract(vector_subtract(next, sum), color);
         sum = next;
     }
-    uint count = scene->header->picture.z;
+    uint count = scene->header->image.z;
     if (last_sample < count) film_store_color(losses, tile, lost);
     if (count > 1 && last_sample == count) {
         real divisor = (real)((scalar)count);

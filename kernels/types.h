@@ -233,7 +233,7 @@ typedef struct {
     // where none does
     scalar4 contact_low, contact_high;
     scalar4 sample;                      // x: width of a sample's share of a pixel, at distance 1
-    uint4 picture;                       // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 image;                         // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                       // x: largest depth
     uint4 cull_spheres;                  // x: number per common origin, 0: none
     uint4 counts[KIND_QUARTETS];         // of each KIND_…, in that order

@@ -32,7 +32,7 @@ typedef struct {
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, contact_low)                    \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, contact_high)                    \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, picture)                     \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, image)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, cull_spheres)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \

@@ -32,7 +32,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .contact_low = scalar4_within_floats(compiled->contact.min),
         .contact_high = scalar4_within_floats(compiled->contact.max),
         .sample.x = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count),
-        .picture = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
+        .image = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,
     };

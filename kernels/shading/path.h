@@ -11,7 +11,7 @@ static inline Color3 surface_color(const Scene *scene, const Surface *surface)
 {
     Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
     Color3 color = color_multiply(ambient, surface->color);
-    for (uint i = 0; i < scene->header->picture.w; i++) {
+    for (uint i = 0; i < scene->header->image.w; i++) {
         mask shadowed;
         color = vector_add(color, phong_light(scene, surface, i, &shadowed));
     }

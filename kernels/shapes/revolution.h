@@ -100,7 +100,7 @@ static inline RevolutionQuadric revolution_quadric_select(mask condition, Revolu
 
 // For lanes that start next to the side. Those that leave it outward have no crossing ahead and are rejected.
 static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
-                                                  bool sloped, const Ray *ray, mask beside)
+                                                  bool sloped, const Ray *ray, mask near_side)
 {
     // a > 0 and c well beyond their roundings, which grow with the slope; b may have any sign within its own
     real reach = vector_length(vector_subtract(ray->origin, vector_of(shape->base_radius)));
@@ -108,12 +108,12 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
     real least_c =
         (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * reach * vector_length(quadric->m);
     real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
-    mask leaves = beside & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
+    mask leaves = near_side & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
                   (ray->near >= (real)(0));
     quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
-    beside = beside & !leaves;
-    if (!lanes_any(beside)) return;
-    *quadric = revolution_quadric_select(beside, revolution_quadric_exactly(shape, sloped, ray), *quadric);
+    near_side = near_side & !leaves;
+    if (!lanes_any(near_side)) return;
+    *quadric = revolution_quadric_select(near_side, revolution_quadric_exactly(shape, sloped, ray), *quadric);
 }
 
 // Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would break the horizon of
@@ -123,10 +123,10 @@ static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool
     if (IS_COMPENSATED) return revolution_quadric_exactly(shape, sloped, ray);
     RevolutionQuadric quadric = revolution_quadric_plainly(shape, sloped, ray);
     real size = vector_dot(quadric.m, quadric.m);
-    mask beside = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
-    if (RARELY(lanes_any(beside))) {
+    mask near_side = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
+    if (RARELY(lanes_any(near_side))) {
         RevolutionQuadric refined = quadric; // its address would keep `quadric` itself out of registers
-        revolution_quadric_refine(&refined, shape, sloped, ray, beside);
+        revolution_quadric_refine(&refined, shape, sloped, ray, near_side);
         quadric = refined;
     }
     return quadric;
@@ -242,9 +242,9 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
 {
     scalar first = shape->base_radius.w;
     scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
-    Vector way = vector_scale(ray->direction, t);
-    real size =
-        vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_magnitude(way);
+    Vector offset = vector_scale(ray->direction, t);
+    real size = vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) +
+                vector_magnitude(offset);
     real error = (real)(8 * UNIT_ROUNDOFF * shape->range.y) * size;
     return vector_length(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
 }

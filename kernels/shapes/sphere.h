@@ -23,14 +23,14 @@ static inline SphereCoefficients sphere_coefficients(PairVector to_center, real 
 }
 
 // From rounded b and c, off by 2 u (b^2 + |a c|): for rays that start near the closest approach.
-static inline real sphere_discriminant_beside(SphereCoefficients exact, const Ray *ray)
+static inline real sphere_discriminant_near(SphereCoefficients exact, const Ray *ray)
 {
     return product_difference(exact.b, exact.b, ray->squared, exact.c);
 }
 
 // a r^2 - |E|^2 for the line's moment E = f x d (Lagrange's identity): off by some 10 u a r^2 at any
 // distance.
-static inline real sphere_discriminant_afar(Vector moment, real radius, const Ray *ray)
+static inline real sphere_discriminant_far(Vector moment, real radius, const Ray *ray)
 {
     return real_fma(ray->squared * radius, radius, -vector_dot(moment, moment));
 }
@@ -38,10 +38,10 @@ static inline real sphere_discriminant_afar(Vector moment, real radius, const Ra
 // The more accurate of the two.
 static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, real radius, const Ray *ray)
 {
-    real discriminant = sphere_discriminant_afar(moment, radius, ray);
-    mask beside = exact.b * exact.b < ray->squared * radius * radius;
-    if (lanes_any(beside))
-        discriminant = lanes_select(beside, sphere_discriminant_beside(exact, ray), discriminant);
+    real discriminant = sphere_discriminant_far(moment, radius, ray);
+    mask near_surface = exact.b * exact.b < ray->squared * radius * radius;
+    if (lanes_any(near_surface))
+        discriminant = lanes_select(near_surface, sphere_discriminant_near(exact, ray), discriminant);
     return discriminant;
 }
 
@@ -84,17 +84,17 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
         real half_chord_squared = real_fma(radius, radius, -vector_dot(l, l));
         discriminant = ray->squared * half_chord_squared;
-        mask meets = half_chord_squared >= (real)(0),
-             beside = hit & (fabs(c) < (real)(0.5f) * squared_distance);
-        if (RARELY(lanes_any(beside))) {
+        mask hits = half_chord_squared >= (real)(0),
+             near_surface = hit & (fabs(c) < (real)(0.5f) * squared_distance);
+        if (RARELY(lanes_any(near_surface))) {
             PairVector to_center = pair_vector_difference(center, ray->origin);
             SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
-            b = lanes_select(beside, exact.b, b);
-            c = lanes_select(beside, exact.c, c);
-            discriminant = lanes_select(beside, sphere_discriminant_beside(exact, ray), discriminant);
-            meets = lanes_select(beside, discriminant >= (real)(0), meets);
+            b = lanes_select(near_surface, exact.b, b);
+            c = lanes_select(near_surface, exact.c, c);
+            discriminant = lanes_select(near_surface, sphere_discriminant_near(exact, ray), discriminant);
+            hits = lanes_select(near_surface, discriminant >= (real)(0), hits);
         }
-        hit = hit & meets;
+        hit = hit & hits;
     }
     *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & ONLY_INSIDE);
     return hit & (*t > ray->near);

@@ -28,9 +28,9 @@ static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray
     real path_length = vector_magnitude(ray->direction) * fabs(t), limit = magnitude * (real)(0x1p-4f);
     if (RARELY(lanes_any(path_length < limit))) {
         real reach = vector_magnitude(ray->origin) + path_length;
-        mask beside = reach < limit;
-        point->position = vector_select(beside, ray_point(ray, t), point->position);
-        point->size = lanes_select(beside, real_fma((real)(UNIT_ROUNDOFF), magnitude, reach), point->size);
+        mask close = reach < limit;
+        point->position = vector_select(close, ray_point(ray, t), point->position);
+        point->size = lanes_select(close, real_fma((real)(UNIT_ROUNDOFF), magnitude, reach), point->size);
     }
 }
 

@@ -60,8 +60,8 @@ static inline BoxInterval box_rays_between(scalar low, scalar high, real inverse
         real_max(real_fma((real)(low), inverse, to_far), real_fma((real)(high), inverse, to_far))};
 }
 
-// The rays, in any octant, that meet a box between near and limit.
-static inline mask box_rays_meet(const BoxRays *rays, scalar4 low, scalar4 high, real limit)
+// The rays, in any octant, that intersect a box between near and limit.
+static inline mask box_rays_intersect(const BoxRays *rays, scalar4 low, scalar4 high, real limit)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
     BoxInterval x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
@@ -102,10 +102,10 @@ static inline real box_plane(global const scalar *box, uint plane)
     return (real)(box[plane * BVH_WIDTH]);
 }
 
-// The rays, all of one octant, that meet a child's box between near and limit; *near is where. `box`: the
-// child's scalar in the node's first plane.
-static inline mask box_rays_meet_child(const BoxRays *rays, Octant octant, global const scalar *box,
-                                       real limit, real *near)
+// The rays, all of one octant, that intersect a child's box between near and limit; *near is where. `box`:
+// the child's scalar in the node's first plane.
+static inline mask box_rays_intersect_child(const BoxRays *rays, Octant octant, global const scalar *box,
+                                            real limit, real *near)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
     real near_x = real_fma(box_plane(box, octant.near_x), inverse.x, to_near.x);

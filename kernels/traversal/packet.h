@@ -110,9 +110,9 @@ static inline real axis_bounds_leave(const AxisBounds *bounds, global const scal
     return real_fma(children_plane(boxes, far_plane), (real)(bounds->most), (real)(bounds->to_far));
 }
 
-// The children whose boxes a ray of the group may meet, a lane per child; *near: not before there.
-static inline mask group_meets_children(const GroupBounds *bounds, global const scalar *boxes, scalar limit,
-                                        real *near)
+// The children whose boxes a ray of the group may intersect, a lane per child; *near: not before there.
+static inline mask bounds_intersect_children(const GroupBounds *bounds, global const scalar *boxes,
+                                             scalar limit, real *near)
 {
     Octant octant = bounds->octant;
     *near = real_max(real_max(axis_bounds_enter(&bounds->x, boxes, octant.near_x),
@@ -131,9 +131,9 @@ typedef struct {
     bool is_set;
 } SpilledRays;
 
-// The children whose boxes one ray meets, a lane per child.
-static inline mask ray_meets_children(const BoxRays *rays, uint lane, global const scalar *boxes,
-                                      scalar limit, real *near)
+// The children whose boxes one ray intersects, a lane per child.
+static inline mask ray_intersects_children(const BoxRays *rays, uint lane, global const scalar *boxes,
+                                           scalar limit, real *near)
 {
     Octant octant = octant_of_lane(rays, lane);
     real inverse_x = real_of_lane(&rays->inverse.x, lane);
@@ -166,54 +166,56 @@ typedef struct {
     scalar largest_limit;
 } RayGroup;
 
-// For each child the lanes whose rays meet its box, as bits, and the first entry distance.
-static inline integer rays_meet_children(const RayGroup *group, uint lanes, global const scalar *boxes,
-                                         real *near)
+// For each child the lanes whose rays intersect its box, as bits, and the first entry distance.
+static inline integer rays_intersect_children(const RayGroup *group, uint lanes, global const scalar *boxes,
+                                              real *near)
 {
     if (!group->spilled->is_set) *group->spilled = (SpilledRays){*group->rays, true};
     RealLanes limits = {group->limit};
-    integer met_by = (integer)(0);
+    integer hit_by = (integer)(0);
     *near = (real)(LARGEST);
     for (; lanes != 0; lanes &= lanes - 1) {
         uint lane = lowest_bit(lanes);
         real ray_near;
-        mask met = ray_meets_children(&group->spilled->rays, lane, boxes, limits.each[lane], &ray_near);
-        met_by = lanes_select(met, met_by | (integer)((scalar_integer)1 << lane), met_by);
-        *near = lanes_select(met & (ray_near < *near), ray_near, *near);
+        mask hits = ray_intersects_children(&group->spilled->rays, lane, boxes, limits.each[lane], &ray_near);
+        hit_by = lanes_select(hits, hit_by | (integer)((scalar_integer)1 << lane), hit_by);
+        *near = lanes_select(hits & (ray_near < *near), ray_near, *near);
     }
-    return met_by;
+    return hit_by;
 }
 
-// Pushes the children of a node that any of the lanes meets.
+// Pushes the children of a node that any of the lanes intersects.
 static inline void visit_node(TraversalStack *stack, const Scene *scene, global const BvhNode *node,
                               const RayGroup *group, uint lanes)
 {
     global const scalar *boxes = (global const scalar *)node->planes;
     const uint bottom = stack->count;
     RealLanes near;
-    IntegerLanes met_by;
+    IntegerLanes hit_by;
     uint children = 0;
     bool by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
     if (!by_ray) {
-        children = lanes_bits(group_meets_children(&group->bounds, boxes, group->largest_limit, &near.all));
+        children =
+            lanes_bits(bounds_intersect_children(&group->bounds, boxes, group->largest_limit, &near.all));
         by_ray = popcount(children) > popcount(lanes);
     }
     if (by_ray) {
-        met_by.all = rays_meet_children(group, lanes, boxes, &near.all);
-        children = lanes_bits(met_by.all != (integer)(0));
+        hit_by.all = rays_intersect_children(group, lanes, boxes, &near.all);
+        children = lanes_bits(hit_by.all != (integer)(0));
     }
     for (; children != 0; children &= children - 1) {
         uint child = lowest_bit(children);
         real unused;
-        uint child_lanes = by_ray ? (uint)met_by.each[child]
-                                  : lanes_bits(box_rays_meet_child(group->rays, group->bounds.octant,
-                                                                   boxes + child, group->limit, &unused));
+        uint child_lanes = by_ray
+                               ? (uint)hit_by.each[child]
+                               : lanes_bits(box_rays_intersect_child(group->rays, group->bounds.octant,
+                                                                     boxes + child, group->limit, &unused));
         if (child_lanes != 0)
             stack_push_child(stack, bottom, scene, node, child, child_lanes, near.each[child]);
     }
 }
 
-// Traverses the BVH with a group; visits what any of its active lanes meets.
+// Traverses the BVH with a group; visits what any of its active lanes intersects.
 static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
 {
     StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, (ushort)group->active, group->bounds.near};
@@ -235,15 +237,15 @@ static inline void traverse_group(Traversal *traversal, const Scene *scene, cons
     }
 }
 
-// Traverses the BVH with the rays that are active and meet its bounds, group by group.
+// Traverses the BVH with the rays that are active and intersect its bounds, group by group.
 static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
     ray_make_frame(ray);
     BoxRays rays = box_rays(ray, header->bounds);
-    mask meets_bvh =
-        box_rays_meet(&rays, header->bounds_low, header->bounds_high, traversal_limit(traversal));
-    uint remaining = lanes_bits(meets_bvh & traversal->active), divergent = 0;
+    mask hits_bvh =
+        box_rays_intersect(&rays, header->bounds_low, header->bounds_high, traversal_limit(traversal));
+    uint remaining = lanes_bits(hits_bvh & traversal->active), divergent = 0;
     SpilledRays spilled;
     spilled.is_set = false;
     while ((remaining | divergent) != 0) {

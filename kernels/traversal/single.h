@@ -8,7 +8,7 @@
 
 #if LANES == 1
 
-// Pushes the children of a node that the ray meets.
+// Pushes the children of a node that the ray intersects.
 static inline void visit_node(TraversalStack *stack, const Scene *scene, global const BvhNode *node,
                               const BoxRays *box_ray, Octant octant, scalar limit)
 {
@@ -16,19 +16,19 @@ static inline void visit_node(TraversalStack *stack, const Scene *scene, global 
     const uint bottom = stack->count;
     for (uint child = 0; child < BVH_WIDTH; child++) {
         scalar near;
-        if (box_rays_meet_child(box_ray, octant, boxes + child, limit, &near))
+        if (box_rays_intersect_child(box_ray, octant, boxes + child, limit, &near))
             stack_push_child(stack, bottom, scene, node, child, 1, near);
     }
 }
 
-// Traverses the BVH with the ray, if it is active and meets the BVH's bounds.
+// Traverses the BVH with the ray, if it is active and intersects the BVH's bounds.
 static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
     ray_make_frame(ray);
     BoxRays box_ray = box_rays(ray, header->bounds);
     scalar limit = traversal_limit(traversal);
-    if (!box_rays_meet(&box_ray, header->bounds_low, header->bounds_high, limit)) return;
+    if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, limit)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
     StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, 1, box_ray.near};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};

@@ -9,7 +9,7 @@
 typedef struct {
     uint first;   // the node, or the leaf's first primitive
     ushort what;  // BVH_NODE, or a leaf
-    ushort lanes; // whose rays meet its box, as bits
+    ushort lanes; // whose rays intersect its box, as bits
     scalar near;  // its entry distance
 } StackEntry;
 
@@ -40,14 +40,14 @@ static inline void entry_prefetch(const Scene *scene, uint first, uint what)
 static inline void stack_push_child(TraversalStack *stack, uint bottom, const Scene *scene,
                                     global const BvhNode *node, uint child, uint lanes, scalar near)
 {
-    uint place = stack->count++;
-    for (; place > bottom; place--) {
-        StackEntry below = stack->entries[place - 1];
+    uint slot = stack->count++;
+    for (; slot > bottom; slot--) {
+        StackEntry below = stack->entries[slot - 1];
         if (stack->farthest_first ? below.near <= near : below.near >= near) break;
-        stack->entries[place] = below;
+        stack->entries[slot] = below;
     }
     uint first = ((global const uint *)node->first)[child], what = ((global const uint *)node->what)[child];
-    stack->entries[place] = (StackEntry){first, (ushort)what, (ushort)lanes, near};
+    stack->entries[slot] = (StackEntry){first, (ushort)what, (ushort)lanes, near};
     entry_prefetch(scene, first, what);
 }
 
