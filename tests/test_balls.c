@@ -1,6 +1,7 @@
 // The balls that rays from the eye or to a light are held against (test_invariances has whole scenes with and
 // without them, as the hierarchy makes the difference): none that a line meets, or comes nearer to than a
 // shape's test may be off, is passed over, and those that it misses clearly are.
+// Sanitized in long tests only.
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/stages.h"

@@ -1,4 +1,5 @@
 // Reflection, refraction, total reflection and light through glass: small pictures against the reference.
+// Sanitized in long tests only.
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"

@@ -1,5 +1,6 @@
 // Random scenes of every shape, light and kind of material: what must not change a picture nor what lies
 // behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
+// Sanitized in long tests only.
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/transform.h"

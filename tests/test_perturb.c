@@ -1,6 +1,7 @@
 // What devices have otherwise: at `strict` their quotients and roots, wrong by what the specification allows,
 // are repaired to the correctly rounded ones; and the fma of those that have none in hardware is fma to the
 // bit.
+// Sanitized in long tests only.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"

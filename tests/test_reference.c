@@ -1,6 +1,6 @@
 // The reference itself, against roots known by hand or from certified interval arithmetic.
+#include "tests/random_ray.h"
 #include "tests/reference_color.h"
-#include "tests/specimen.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -369,18 +369,20 @@ static void measures_distances(void **state)
 {
     (void)state;
     size_t measured = 0;
-    for (SpecimenKind kind = 0; kind < SPECIMEN_COUNT; kind++) {
+    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    const size_t form_count = shape_forms(forms);
+    for (size_t kind = 0; kind < form_count; kind++) {
         Random random = {kind};
-        Specimen specimen = specimen_make(kind, &random);
+        RandomShape shape = random_shape(&forms[kind], &random);
         for (int i = 0; i < 50; i++) {
-            SpecimenRay given = specimen_ray(&specimen, &random);
+            RandomRay given = random_ray(&shape, &random);
             ReferenceRay ray = reference_ray(given.origin, given.direction);
-            ReferenceHit hit = reference_hit_object(&specimen.object, &ray);
-            double height = (i % 2 ? 1e-9 : -1e-9) * specimen.reach;
+            ReferenceHit hit = reference_hit_object(&shape.object, &ray);
+            double height = (i % 2 ? 1e-9 : -1e-9) * shape.reach;
             // near an edge another part of the surface may be nearer
-            if (!hit.found || hit.margin < 1e-6 * specimen.reach || hit.cosine < 1e-3) continue;
+            if (!hit.found || hit.margin < 1e-6 * shape.reach || hit.cosine < 1e-3) continue;
             Quad3 point = quad3_add(reference_point(&ray, hit.t), quad3_scale(hit.normal, height));
-            ReferenceSurface surface = reference_surface(&specimen.object, point);
+            ReferenceSurface surface = reference_surface(&shape.object, point);
             double distance = (double)reference_surface_distance(&surface);
             bool normal_found = false;
             for (int k = 0; k < surface.count; k++) {
@@ -390,11 +392,11 @@ static void measures_distances(void **state)
             }
             // to first order, of a paraboloid
             if (fabs(distance - fabs(height)) > 1e-7 * fabs(height) || !normal_found)
-                fail_msg("%s: %g off the surface, not %g", specimen_names[kind], distance, height);
+                fail_msg("%s: %g off the surface, not %g", forms[kind].name, distance, height);
             measured++;
         }
     }
-    assert_true(measured > 15 * SPECIMEN_COUNT);
+    assert_true(measured > 15 * form_count);
 }
 
 static void knows_highlights(void **state)

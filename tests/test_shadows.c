@@ -1,4 +1,5 @@
 // Shadows on which a faster search, or a surface much larger than what lies on it, once went wrong.
+// Sanitized in long tests only.
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"

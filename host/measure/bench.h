@@ -52,7 +52,7 @@ typedef struct {
     Figure build_cold, build_cached; // seconds
     uint64_t rays[BENCH_RAY_KINDS];
     bool wide, traverses_bvh; // computes in double; rays traversed a BVH
-    double flops_per_ray; // as work.h counts
+    double flops_per_ray;     // as work.h counts
     double picture_bytes;
 } BenchRow;
 
