@@ -40,7 +40,7 @@ static long double square_of(Quad coordinate, double size, Quad *margin)
     return floorl(place);
 }
 
-// Solids are cut from a checkered block of the world, the cube told a 1024th of its side behind the surface,
+// Solids are cut from a checkered block of the world, the cube found a 1024th of its side behind the surface,
 // so that a face between two cubes has one color; planes and discs carry squares of their own.
 static Color checker_color(const Object *object, const Material *material, const ReferenceHit *hit,
                            Quad3 point, Quad *margin)
@@ -80,21 +80,21 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
 {
     const Material *material = surface->material;
     Color base = surface->base;
-    bool endless = light->kind == LIGHT_DIRECTIONAL;
-    Quad3 way = endless ? quad3_scale(quad3(light->direction), -1)
-                        : quad3_subtract(quad3(light->position), surface->point);
+    bool directional = light->kind == LIGHT_DIRECTIONAL;
+    Quad3 way = directional ? quad3_scale(quad3(light->direction), -1)
+                            : quad3_subtract(quad3(light->position), surface->point);
     Quad3 to_light = quad3_unit(way);
     Quad facing = quad3_dot(surface->normal, to_light);
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
     if (facing <= 0) return;
 
     Quad start = surface->start / quad3_length(way);
-    ReferenceRay shadow = {surface->point, way, start, endless ? (Quad)LDBL_MAX : 1 - END_PART};
+    ReferenceRay shadow = {surface->point, way, start, directional ? (Quad)LDBL_MAX : 1 - END_PART};
     Quad strength = light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(way, -1)) : 1;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         ReferenceHit blocker = reference_hit_object(object, &shadow);
-        // The surface lies against itself; where it shadows itself is told by `facing`.
+        // The surface lies against itself; `facing` says where it shadows itself.
         if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
         if (blocker.found) strength *= scene->materials.items[object->material].transmission;
     }

@@ -1,4 +1,4 @@
-// The hierarchy: what a tree must be for any boxes, that no hit depends on it, and that closed meshes do not
+// The BVH: what a tree must be for any boxes, that no hit depends on it, and that closed meshes do not
 // leak. GLINT_LONG_TESTS=1 sends a million rays where this sends some ten thousand.
 // Sanitized in long tests only.
 #include "host/base/array.h"

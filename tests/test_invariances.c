@@ -142,7 +142,7 @@ static size_t objects_seen(const Film *film)
     return count;
 }
 
-static void runs_bands_and_hierarchy_change_nothing(const Case *c)
+static void runs_bands_and_bvh_change_nothing(const Case *c)
 {
     RenderSettings settings = c->settings;
     Film again = picture(c->scene, &settings);
@@ -153,7 +153,7 @@ static void runs_bands_and_hierarchy_change_nothing(const Case *c)
     settings = c->settings;
     settings.bvh = BVH_OFF;
     Film listed = picture_alone(c->scene, &settings);
-    same_and_freed(c, &listed, "without a hierarchy");
+    same_and_freed(c, &listed, "without a BVH");
 }
 
 // All widths at single; test_variants has them at strict.
@@ -276,7 +276,7 @@ static void precision_holds(Precision precision)
         assert_int_equal(film_count_faulty(&c.film), 0);
         assert_true(objects_seen(&c.film) >= OBJECTS / 3);
 
-        runs_bands_and_hierarchy_change_nothing(&c);
+        runs_bands_and_bvh_change_nothing(&c);
         // the compiler rearranges relaxed arithmetic for each width anew
         if (precision != PRECISION_FAST) lanes_change_nothing(&c);
         scale_changes_lengths_alone(&c, seed);

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 // A veil's light is taken once, also in a tile whose shadow rays run to different sides, which then search
-// the hierarchy in several packets: the light is above the corner of a tile.
+// the BVH in several packets: the light is above the corner of a tile.
 static void takes_a_veils_light_once(void **state)
 {
     (void)state;

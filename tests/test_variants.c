@@ -174,7 +174,7 @@ static void features_alone_and_all_together_agree(void **state)
         film_free(&general);
         scene_free(&scene);
     }
-    assert_int_equal(seen | FEATURE_BVH, FEATURE_ALL); // no scene needs a hierarchy; it has a test of its own
+    assert_int_equal(seen | FEATURE_BVH, FEATURE_ALL); // no scene needs a BVH; it has a test of its own
 
     // No scene needs checkers alone: built in without need, on an empty scene.
     Scene empty = scene_with_warnings(SCENE_HEAD);
@@ -187,7 +187,7 @@ static void features_alone_and_all_together_agree(void **state)
     scene_free(&empty);
 }
 
-static void hierarchy_changes_nothing(void **state)
+static void bvh_changes_nothing(void **state)
 {
     (void)state;
     for (size_t p = 0; p < 2; p++) {
@@ -196,7 +196,7 @@ static void hierarchy_changes_nothing(void **state)
         Film expected = picture(&every_shape, &settings);
         settings.bvh = BVH_ON;
         Film film = picture(&every_shape, &settings);
-        same_and_freed(&film, &expected, "through a hierarchy");
+        same_and_freed(&film, &expected, "through a BVH");
         film_free(&expected);
     }
 }
@@ -353,7 +353,7 @@ int main(void)
         cmocka_unit_test(lanes_agree),
         cmocka_unit_test(lanes_agree_behind_the_picture),
         cmocka_unit_test(features_alone_and_all_together_agree),
-        cmocka_unit_test(hierarchy_changes_nothing),
+        cmocka_unit_test(bvh_changes_nothing),
         cmocka_unit_test(bands_agree),
         cmocka_unit_test(launches_of_samples_agree),
         cmocka_unit_test(regions_are_cuts_of_the_whole),

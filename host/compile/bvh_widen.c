@@ -8,9 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Costs relative to each other: a node's boxes held against a beam all at once, one of them met and its turn
-// come, one primitive tested. (Found by trying: a test costs less than its arithmetic, which fills the
-// processor's waiting.)
+// Relative costs: testing a node's boxes against interval bounds at once, visiting one of them, testing one
+// primitive. Found by experiment: a test costs less than its arithmetic, which hides latency.
 static const double wide_node_cost = 1, wide_box_cost = 1, wide_test_cost = 0.4;
 
 // What takes one place where it might take several costs something even where its area is nothing: this

@@ -17,13 +17,13 @@ static uint32_t passed_path(const uint32_t *objects, size_t count)
     return path;
 }
 
-// A red ball in a coat of glass thinner than most epsilons: all that is seen through the glass is the ball,
+// A red sphere in a coat of glass thinner than most epsilons: all that is seen through the glass is the ball,
 // at any scale.
 void verify_nested_spheres(VerifyRun *run)
 {
     static const double ratios[] = {1 + 4e-5, 1 + 0x1p-16}, scales[] = {1, 1000, 0.001};
-    const uint32_t ball_then_coat[] = {1, 0};
-    const uint32_t expected = passed_path(ball_then_coat, 2);
+    const uint32_t sphere_then_coat[] = {1, 0};
+    const uint32_t expected = passed_path(sphere_then_coat, 2);
     for (size_t k = 0; k < 6; k++) {
         double scale = scales[k % 3], ratio = ratios[k / 3];
         Scene scene = verify_scene("ambient: [1, 1, 1]\n"
@@ -40,7 +40,7 @@ void verify_nested_spheres(VerifyRun *run)
         size_t seen = 0;
         for (size_t i = 0; i < film_pixel_count(&picture); i++) {
             if (picture.object[i] != 1) {
-                // at the rim the coat may be missed, but the ball behind it may not be seen without it
+                // at the rim the coat may be missed, but the sphere behind it may not be seen without it
                 ReferenceHit exact = verify_pixel_hit(&coat, &picture, i);
                 bool certain = exact.found && exact.margin > 1e-5 * coat.radius;
                 run->result->wrong += picture.object[i] != UINT32_MAX || certain;

@@ -1,4 +1,4 @@
-// Checks of triangles, and of the hierarchy, that no table holds.
+// Checks of triangles, and of the BVH, that no table holds.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
@@ -261,9 +261,9 @@ static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first,
     }
 }
 
-// The hierarchy gives what every object in turn gives, and whether anything is hit before a distance says the
+// The BVH gives what every object in turn gives, and whether anything is hit before a distance says the
 // same as what is hit first: cut an ulp before it and an ulp behind it.
-void verify_hierarchy(VerifyRun *run)
+void verify_bvh(VerifyRun *run)
 {
     TraceRay *rays = memory_allocate(CROWD_RAYS, sizeof *rays);
     TraceHit *hits = memory_allocate(CROWD_RAYS, sizeof *hits),
@@ -277,11 +277,11 @@ void verify_hierarchy(VerifyRun *run)
         verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
         crowd_rays(run, &scene, batch * CROWD_RAYS, hits, rays);
         verify_trace_opened(run, list, rays, CROWD_RAYS, plain);
-        double endless = rays[0].tmax;
+        double unlimited = rays[0].tmax;
         for (size_t cut = 0; cut < sizeof parts / sizeof *parts; cut++) {
             for (size_t i = 0; i < CROWD_RAYS; i++)
                 if (verify_is_hit(&plain[i]))
-                    rays[i].tmax = fmin(endless, verify_rounded(run, plain[i].t * parts[cut]));
+                    rays[i].tmax = fmin(unlimited, verify_rounded(run, plain[i].t * parts[cut]));
             verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
             for (size_t i = 0; i < CROWD_RAYS; i++) {
                 bool hit = verify_is_hit(&plain[i]) && plain[i].t < rays[i].tmax;

@@ -24,7 +24,7 @@ VerifyCheck verify_scale_ladder;      // M3
 VerifyCheck verify_within_triangle;   // M4
 VerifyCheck verify_facing_triangle;   // M4
 VerifyCheck verify_degenerate_meshes; // M5
-VerifyCheck verify_hierarchy;         // M6
+VerifyCheck verify_bvh;               // M6
 VerifyCheck verify_critical_angle;    // R4
 VerifyCheck verify_camera_frames;     // R8
 

@@ -1,7 +1,6 @@
-"""What a ray of a picture shows, at 300 bits, and how far a renderer that rounds may be from it.
+"""The color of an image's ray at 300 bits, and a bound on the error of a renderer that rounds.
 
-Every result comes with a bound on what rounding may do to it, carried along to first order. A shape is held to be
-computed exactly but for a displacement of its surface by `displacement` units in the last place of the magnitudes that
+Every result carries a first-order bound on rounding. A shape is assumed to be computed exactly except for a displacement of its surface by `displacement` units in the last place of the magnitudes that
 it is computed from; where a surface so much nearer and so much farther answers differently, or another surface comes
 in between, the answer is open and nothing is compared."""
 

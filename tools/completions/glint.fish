@@ -18,7 +18,7 @@ complete -c glint -n '__fish_seen_subcommand_from render trace' -s o -l output -
 complete -c glint -n '__fish_seen_subcommand_from render trace bench accuracy verify' -l device -x -a 'cpu gpu' -d 'Device'
 complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l precision -x -a 'fast single strict double' -d 'How exactly to compute'
 complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l lanes -x -a '1 4 8 16' -d 'Pixels or rays a work-item carries at once'
-complete -c glint -n '__fish_seen_subcommand_from render trace' -l bvh -x -a 'auto on off' -d 'Use a hierarchy'
+complete -c glint -n '__fish_seen_subcommand_from render trace' -l bvh -x -a 'auto on off' -d 'Use a BVH'
 complete -c glint -n '__fish_seen_subcommand_from render trace verify' -l no-cache -d 'Build the kernel anew'
 complete -c glint -n '__fish_seen_subcommand_from render trace accuracy verify' -l perturb -x -d 'Err as other devices may, SEED[:SCALE]'
 complete -c glint -n '__fish_seen_subcommand_from render trace check bench accuracy' -l lenient -d 'Skip unknown elements of a .rt scene'

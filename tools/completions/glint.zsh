@@ -10,7 +10,7 @@ _glint_render() {
         '--device[device to render on]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
         '--lanes[pixels a work-item carries at once]:lanes:(1 4 8 16)' \
-        '--bvh[use a hierarchy]:choice:(auto on off)' \
+        '--bvh[use a BVH]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
         '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow ray path color' \
         '--timing=-[how long each stage took]::form:(json)' \
@@ -31,7 +31,7 @@ _glint_trace() {
         '--device[device to trace on]:device:(cpu gpu)' \
         '--precision[how exactly to compute]:precision:(fast single strict double)' \
         '--lanes[rays a work-item carries at once]:lanes:(1 4 8 16)' \
-        '--bvh[use a hierarchy]:choice:(auto on off)' \
+        '--bvh[use a BVH]:choice:(auto on off)' \
         '--no-cache[build the kernel anew]' \
         '--perturb[err as other devices may]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
@@ -78,7 +78,7 @@ _glint_bench() {
     _arguments \
         '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
         '--lanes[pixels a work-item carries at once]:list:_sequence compadd - 1 4 8 16' \
-        '--bvh[use a hierarchy]:list:_sequence compadd - auto on off' \
+        '--bvh[use a BVH]:list:_sequence compadd - auto on off' \
         '--size[width and height in pixels]:WxH:' \
         '--seconds[end the runs after so long]:seconds:' \
         '--launches[list the launches of the last runs]' \
@@ -96,7 +96,7 @@ _glint_accuracy() {
         '--reference[linear colors to compare with]:picture:_files -g "*.(exr|npy)"' \
         '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
         '--lanes[pixels a work-item carries at once]:list:_sequence compadd - 1 4 8 16' \
-        '--bvh[use a hierarchy]:list:_sequence compadd - auto on off' \
+        '--bvh[use a BVH]:list:_sequence compadd - auto on off' \
         '--samples[rays for each pixel]:list:' \
         '--bounces[reflections and refractions at most]:number:' \
         '--size[width and height in pixels]:WxH:' \

@@ -20,7 +20,7 @@ static const char usage[] =
     "  --single        rays one by one, not in packets of 16\n"
     "  --user-spheres  with packets: spheres by callbacks of ours, not by Embree's own geometry\n"
     "  --incoherent    without Embree's flag for coherent rays\n"
-    "  --quality Q     of the hierarchy: low, medium or high (default: high)\n"
+    "  --quality Q     of the BVH: low, medium or high (default: high)\n"
     "  --tile N        pixels along the side of a thread's share of work, a multiple of 4 (default: 32)\n"
     "  --threads N     default: one a core\n"
     "  --size WxH      of the picture (default: 1920x1080)\n"

@@ -7,7 +7,7 @@
 static const int valid_lane = -1; // as Embree has it
 
 // A plane is not put to Embree: 16 rays against one are few instructions, and leave it shorter rays. This is
-// faster than two large triangles in its hierarchy. Plane k is noted in hits as geometry FIRST_PLANE + k.
+// faster than two large triangles in its BVH. Plane k is noted in hits as geometry FIRST_PLANE + k.
 enum { FIRST_PLANE = 1 << 30 };
 
 typedef struct {

@@ -1,6 +1,6 @@
-// The balls that rays from the eye or to a light are held against (test_invariances has whole scenes with and
-// without them, as the hierarchy makes the difference): none that a line meets, or comes nearer to than a
-// shape's test may be off, is passed over, and those that it misses clearly are.
+// Cull spheres of rays from the eye or to a light (test_invariances compares whole scenes with and without
+// them): none is culled that a line meets or comes nearer to than the error of a shape's test, and those that
+// it misses clearly are.
 // Sanitized in long tests only.
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
@@ -14,19 +14,20 @@
 
 #include <cmocka.h>
 
-enum { BALLS_PER_APEX = 4096, APEX_COUNT = 64, BALL_COUNT = BALLS_PER_APEX * APEX_COUNT };
+enum { SPHERES_PER_ORIGIN = 4096, ORIGIN_COUNT = 64, SPHERE_COUNT = SPHERES_PER_ORIGIN * ORIGIN_COUNT };
 
 static const char kernel_text[] =
-    "#include \"ray.h\"\n"
-    "kernel void misses(global const scalar *lines, global const CullSphere *balls, uint apex, global int "
+    "#include \"cull_sphere.h\"\n"
+    "kernel void misses(global const scalar *lines, global const CullSphere *cull_spheres, uint "
+    "common_origin, global int "
     "*missed)\n"
     "{\n"
     "    size_t i = get_global_id(0);\n"
     "    global const scalar *line = lines + 6 * i;\n"
     "    Vector origin = {line[0], line[1], line[2]}, direction = {line[3], line[4], line[5]};\n"
     "    Ray ray = ray_make(origin, direction, 0, 1, mask_all());\n"
-    "    ray_set_common_origin(&ray, apex);\n"
-    "    missed[i] = lanes_any(ray_misses_cull_sphere(&ray, &balls[i]));\n"
+    "    ray_set_common_origin(&ray, common_origin);\n"
+    "    missed[i] = lanes_any(ray_misses_cull_sphere(&ray, &cull_spheres[i]));\n"
     "}\n";
 
 typedef struct {
@@ -34,8 +35,8 @@ typedef struct {
     double unit_roundoff;
     Random random;
     double scale; // of all lengths but the eye's directions
-    Vector3 apex;
-    CompiledScene flat; // a light at the apex, and a sphere for each line
+    Vector3 common_origin;
+    CompiledScene flat; // a light at the common_origin, and a sphere for each line
     double *lines;      // origin and direction of each
     int *missed;
     size_t met_count, missed_count, between_count;
@@ -53,16 +54,17 @@ static Vector3 trial_vector_rounded(const Trial *trial, Vector3 v)
     return (Vector3){trial_rounded(trial, v.x), trial_rounded(trial, v.y), trial_rounded(trial, v.z)};
 }
 
-// A line through the apex, and a sphere that it just meets or just misses, on either side of the apex.
+// A line through the common_origin, and a sphere that it just meets or just misses, on either side of the
+// common_origin.
 static void line_make(Trial *trial, size_t index, bool from_eye)
 {
     Random *random = &trial->random;
     Vector3 way =
         vector_scale(vector_normalize(random_in_sphere(random)), trial->scale * random_power(random, -2, 4));
-    Vector3 origin =
-        from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, vector_subtract(trial->apex, way));
-    Vector3 direction =
-        trial_vector_rounded(trial, from_eye ? vector_normalize(way) : vector_subtract(trial->apex, origin));
+    Vector3 origin = from_eye ? (Vector3){0, 0, 0}
+                              : trial_vector_rounded(trial, vector_subtract(trial->common_origin, way));
+    Vector3 direction = trial_vector_rounded(trial, from_eye ? vector_normalize(way)
+                                                             : vector_subtract(trial->common_origin, origin));
     double *line = trial->lines + 6 * index;
     memcpy(line, (double[]){origin.x, origin.y, origin.z, direction.x, direction.y, direction.z},
            6 * sizeof *line);
@@ -72,7 +74,7 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
     double off =
         random_power(random, trial->wide ? -15 : -8, 1) * (random_between(random, -1, 1) < 0 ? -1 : 1);
     Vector3 across = vector_normalize(vector_cross(direction, random_in_sphere(random)));
-    Vector3 point = vector_add(trial->apex, vector_scale(vector_normalize(direction), along));
+    Vector3 point = vector_add(trial->common_origin, vector_scale(vector_normalize(direction), along));
     Vector3 center =
         trial_vector_rounded(trial, vector_add(point, vector_scale(across, radius * fmax(0, 1 + off))));
     ((Sphere *)trial->flat.arrays[FLAT_FIRST_SHAPE + KIND_SPHERES].items)[index].center_radius =
@@ -84,46 +86,48 @@ static void trial_open(Trial *trial, bool from_eye)
     FlatArray *arrays = trial->flat.arrays;
     arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, 1);
     arrays[FLAT_FIRST_SHAPE + KIND_SPHERES] =
-        flat_array_make(FLAT_FIRST_SHAPE + KIND_SPHERES, BALLS_PER_APEX);
+        flat_array_make(FLAT_FIRST_SHAPE + KIND_SPHERES, SPHERES_PER_ORIGIN);
     // elsewhere float's fourth powers of lengths vanish or are infinite, and nothing is passed over
     trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 16));
-    Vector3 apex =
+    Vector3 common_origin =
         vector_scale(random_in_sphere(&trial->random), trial->scale * random_power(&trial->random, -2, 4));
-    trial->apex = from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, apex);
+    trial->common_origin = from_eye ? (Vector3){0, 0, 0} : trial_vector_rounded(trial, common_origin);
     ((FlatLight *)arrays[FLAT_LIGHTS].items)->position =
-        (scalar4){trial->apex.x, trial->apex.y, trial->apex.z, 0};
-    for (size_t i = 0; i < BALLS_PER_APEX; i++)
+        (scalar4){trial->common_origin.x, trial->common_origin.y, trial->common_origin.z, 0};
+    for (size_t i = 0; i < SPHERES_PER_ORIGIN; i++)
         line_make(trial, i, from_eye);
     culling_fill(&trial->flat, trial->wide);
 }
 
 // What the device finds, with the arrays in its width.
-static void trial_run(Trial *trial, cl_program program, uint32_t apex)
+static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
 {
-    size_t scalar = trial->wide ? sizeof(double) : sizeof(float), lines_size = BALLS_PER_APEX * 6 * scalar;
-    char *lines = memory_allocate(BALLS_PER_APEX * 6, scalar);
-    for (size_t i = 0; i < (size_t)BALLS_PER_APEX * 6; i++) {
+    size_t scalar = trial->wide ? sizeof(double) : sizeof(float),
+           lines_size = SPHERES_PER_ORIGIN * 6 * scalar;
+    char *lines = memory_allocate(SPHERES_PER_ORIGIN * 6, scalar);
+    for (size_t i = 0; i < (size_t)SPHERES_PER_ORIGIN * 6; i++) {
         if (trial->wide)
             ((double *)(void *)lines)[i] = trial->lines[i];
         else
             ((float *)(void *)lines)[i] = (float)trial->lines[i];
     }
-    const FlatArray *balls = &trial->flat.arrays[FLAT_CULL_SPHERES];
-    // behind the hierarchy's own
-    FlatArray row = {flat_array_at(balls, (apex - COMMON_ORIGIN_EYE) * trial->flat.cull_sphere_count + 1),
-                     BALLS_PER_APEX, balls->layout};
+    const FlatArray *cull_spheres = &trial->flat.arrays[FLAT_CULL_SPHERES];
+    // behind the BVH's own
+    FlatArray row = {
+        flat_array_at(cull_spheres, (common_origin - COMMON_ORIGIN_EYE) * trial->flat.cull_sphere_count + 1),
+        SPHERES_PER_ORIGIN, cull_spheres->layout};
     size_t row_size = flat_array_size(&row, trial->wide);
     void *row_bytes = memory_allocate(row_size, 1);
     flat_array_write(&row, trial->wide, row_bytes);
 
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "misses");
-    const size_t count = BALLS_PER_APEX, missed_size = BALLS_PER_APEX * sizeof(int);
+    const size_t count = SPHERES_PER_ORIGIN, missed_size = SPHERES_PER_ORIGIN * sizeof(int);
     cl_mem buffers[] = {buffer_create(&probe_compute, lines_size, lines, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, row_size, row_bytes, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, missed_size, NULL, CL_MEM_WRITE_ONLY)};
     kernel_argument(&probe_compute, kernel, 0, sizeof(cl_mem), &buffers[0]);
     kernel_argument(&probe_compute, kernel, 1, sizeof(cl_mem), &buffers[1]);
-    kernel_argument(&probe_compute, kernel, 2, sizeof apex, &apex);
+    kernel_argument(&probe_compute, kernel, 2, sizeof common_origin, &common_origin);
     kernel_argument(&probe_compute, kernel, 3, sizeof(cl_mem), &buffers[2]);
     kernel_launch(&probe_compute, kernel, 1, &count, NULL);
     buffer_read(&probe_compute, buffers[2], missed_size, trial->missed);
@@ -148,8 +152,9 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
     const long double d[3] = {line[3], line[4], line[5]};
     const long double f[3] = {(long double)c.x - line[0], (long double)c.y - line[1],
                               (long double)c.z - line[2]};
-    const long double v[3] = {(long double)c.x - trial->apex.x, (long double)c.y - trial->apex.y,
-                              (long double)c.z - trial->apex.z};
+    const long double v[3] = {(long double)c.x - trial->common_origin.x,
+                              (long double)c.y - trial->common_origin.y,
+                              (long double)c.z - trial->common_origin.z};
     const long double moment[3] = {f[1] * d[2] - f[2] * d[1], f[2] * d[0] - f[0] * d[2],
                                    f[0] * d[1] - f[1] * d[0]};
     long double distance = sqrtl(dot(moment, moment) / dot(d, d)),
@@ -158,11 +163,11 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
     if (distance <= radius + slack) {
         trial->met_count++;
         if (trial->missed[index])
-            fail_msg("ball %zu of radius %a: a line %La from its center passes it", index, c.w, distance);
+            fail_msg("sphere %zu of radius %a: a line %La from its center passes it", index, c.w, distance);
     } else if (distance * distance - radius * radius > 800 * u * reach * reach) {
         trial->missed_count++;
         if (!trial->missed[index])
-            fail_msg("ball %zu of radius %a: a line %La from its center is said to meet it", index, c.w,
+            fail_msg("sphere %zu of radius %a: a line %La from its center is said to meet it", index, c.w,
                      distance);
     } else {
         trial->between_count++;
@@ -183,18 +188,18 @@ static void balls_check(bool wide, bool from_eye)
     cl_program program = probe_program(kernel_text, text_c(&prelude), "-cl-std=CL1.2");
     text_free(&prelude);
     Trial trial = {.wide = wide, .unit_roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2, .random = {7}};
-    trial.lines = memory_allocate((size_t)BALLS_PER_APEX * 6, sizeof *trial.lines);
-    trial.missed = memory_allocate(BALLS_PER_APEX, sizeof *trial.missed);
-    for (size_t i = 0; i < APEX_COUNT; i++) {
+    trial.lines = memory_allocate((size_t)SPHERES_PER_ORIGIN * 6, sizeof *trial.lines);
+    trial.missed = memory_allocate(SPHERES_PER_ORIGIN, sizeof *trial.missed);
+    for (size_t i = 0; i < ORIGIN_COUNT; i++) {
         trial_open(&trial, from_eye);
         trial_run(&trial, program, from_eye ? COMMON_ORIGIN_EYE : COMMON_ORIGIN_FIRST_LIGHT);
-        for (size_t k = 0; k < BALLS_PER_APEX; k++)
+        for (size_t k = 0; k < SPHERES_PER_ORIGIN; k++)
             line_judge(&trial, k, from_eye);
         compiled_scene_free(&trial.flat);
     }
     // no answer was left out for being too near to call, but for few
-    assert_true(trial.met_count > BALL_COUNT / 4);
-    assert_true(trial.missed_count > BALL_COUNT / 8);
+    assert_true(trial.met_count > SPHERE_COUNT / 4);
+    assert_true(trial.missed_count > SPHERE_COUNT / 8);
     free(trial.lines);
     free(trial.missed);
     clReleaseProgram(program);
