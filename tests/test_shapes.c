@@ -129,7 +129,7 @@ static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, s
     for (size_t i = 0; !wide && i < scene->objects.count; i++)
         scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
     for (size_t i = 0; i < RAYS_PER_SHAPE; i++) {
-        RandomRay given = random_ray(&aims[i % aim_count], random);
+        RandomRay given = random_ray(&aims[aim_count > 0 ? i % aim_count : 0], random);
         if (beside) given = move_beside(&given, scene, trial->reach, random);
         ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
                                 : reference_ray_rounded(given.origin, given.direction);

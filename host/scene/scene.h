@@ -115,8 +115,8 @@ typedef struct {
             Vector3 center, axis;
             double major, minor;
         } torus;
-        // the points as far from the focus as from the plane as far behind the apex; finite: up to a height along
-        // the axis
+        // the points as far from the focus as from the plane as far behind the apex; finite: up to a height
+        // along the axis
         struct {
             Vector3 apex, axis;
             double focal_length, height;

@@ -247,7 +247,8 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
 
 static void surface_box(const Object *object, Quad3 point, ReferenceSurface *surface)
 {
-    const double *low = &object->as.box.min.x, *high = &object->as.box.max.x;
+    const Vector3 min = object->as.box.min, max = object->as.box.max;
+    const double low[] = {min.x, min.y, min.z}, high[] = {max.x, max.y, max.z};
     const Quad at[] = {point.x, point.y, point.z};
     Vector3 center = vector_scale(vector_add(object->as.box.min, object->as.box.max), 0.5);
     double size = vector_length(vector_subtract(object->as.box.max, object->as.box.min)) / 2;

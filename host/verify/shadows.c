@@ -114,7 +114,7 @@ void verify_contact_shadow(VerifyRun *run)
         VerifyTarget targets[] = {verify_target(run, &scene.objects.items[0], eye),
                                   verify_target(run, &scene.objects.items[1], eye)};
         for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            Quad3 direction = quad3(verify_vector(&picture.ray[3 * i]));
+            Quad3 direction = quad3(verify_vector(picture.ray + 3 * i));
             bool dark = picture.shadow[i];
             ReferenceHit plane = verify_pixel_hit(&targets[0], &picture, i);
             ReferenceHit sphere = verify_pixel_hit(&targets[1], &picture, i);
