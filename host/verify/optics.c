@@ -1,7 +1,6 @@
 // Checks of refraction and of the camera's frame.
 #include "host/base/memory.h"
 #include "host/compile/camera_basis.h"
-#include "host/import/load.h"
 #include "host/verify/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -62,15 +61,8 @@ void verify_critical_angle(VerifyRun *run)
 static bool is_camera_refused(const char *camera)
 {
     char text[200];
-    int length = snprintf(text, sizeof text, "camera: {%s}\nobjects: []\n", camera);
-    Source source = {"verify", text, (size_t)length};
-    MessageList messages = {0};
-    Scene scene = {0};
-    bool read = scene_read_yaml(&scene, &source, &messages);
-    bool refused = !read && message_count(&messages, MESSAGE_ERROR) > 0;
-    message_list_free(&messages);
-    scene_free(&scene);
-    return refused;
+    snprintf(text, sizeof text, "camera: {%s}\nobjects: []\n", camera);
+    return verify_is_refused(text);
 }
 
 static bool is_orthonormal(const Vector3 axes[3])

@@ -82,6 +82,7 @@ void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 // Reads a scene that the program itself carries: native YAML, all but the camera. A text that cannot be read
 // is a program's fault. Caller frees it with scene_free.
 Scene verify_scene(const char *objects);
+bool verify_is_refused(const char *text); // whether the YAML reader rejects a scene with an error
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
 // Renders all layers of a film and counts the unsound pixels; film_free frees it. Zeros once the device

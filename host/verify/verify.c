@@ -279,6 +279,18 @@ Scene verify_scene(const char *objects)
     return scene;
 }
 
+bool verify_is_refused(const char *text)
+{
+    Source source = {"verify", text, strlen(text)};
+    MessageList messages = {0};
+    Scene scene = {0};
+    bool read = scene_read_yaml(&scene, &source, &messages);
+    bool refused = !read && message_count(&messages, MESSAGE_ERROR) > 0;
+    message_list_free(&messages);
+    scene_free(&scene);
+    return refused;
+}
+
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
 {
     return (Camera){.position = position,
