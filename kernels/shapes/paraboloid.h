@@ -8,7 +8,7 @@
 #ifndef PARABOLOID_H
 #define PARABOLOID_H
 
-#include "shapes/box.h"
+#include "shapes/revolution.h"
 
 typedef struct {
     Roots side; // the ray is inside the surface between them
@@ -62,21 +62,11 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     return crossings;
 }
 
-// As a cylinder: capped, the intersection of side and slab; else a root within the slab.
 static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real *t)
 {
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
-    Roots side = crossings.side, slab = crossings.slab;
     mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
-    if (shape->id.y & REVOLUTION_CAPPED) {
-        real near = real_max(side.near, slab.near), far = real_min(side.far, slab.far);
-        *t = ray_first(ray, near, far);
-        hit = hit & (near <= far);
-    } else {
-        mask near_counts = (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
-        *t = lanes_select(near_counts, side.near, side.far);
-        hit = hit & (*t >= slab.near) & (*t <= slab.far);
-    }
+    hit = hit & revolution_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
     return hit & (*t > ray->near) & (*t < (real)(LARGEST));
 }
 
@@ -103,12 +93,10 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
-        real to_slab = real_min(fabs(t - crossings.slab.near), fabs(t - crossings.slab.far));
-        real to_side = real_min(fabs(t - crossings.side.near), fabs(t - crossings.side.far));
         real gap = real_divide((real)(shape->axis_end.w) - vector_dot(p, axis), squared_axis);
         Vector on_plane = vector_fma(axis, gap, p);
         SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
-        surface_point_replace(&point, to_slab < to_side, &cap);
+        surface_point_replace(&point, revolution_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;
 }

@@ -249,28 +249,39 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
     return vector_length(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
 }
 
-// A capped solid is the intersection of side and slab: one comparison decides both, so that no ray passes
-// between side and cap. An open or unbounded one is hit at a root between the ends.
+// The first hit of a surface of revolution, of which the ray is inside the side between two roots and between
+// the ends within the slab. A capped solid is the intersection of both: one comparison decides both, so that
+// no ray passes between side and cap. An open or unbounded one is hit at a root between the ends.
+static inline mask revolution_first_hit(uint flags, const Ray *ray, Roots side, Roots slab, real *t)
+{
+    if (flags & REVOLUTION_CAPPED) {
+        real near = real_max(side.near, slab.near);
+        real far = real_min(side.far, slab.far);
+        *t = ray_first(ray, near, far);
+        return near <= far;
+    }
+    mask seen = flags & ONLY_INSIDE ? mask_none() : mask_all();
+    mask near_counts = seen & (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
+    *t = lanes_select(near_counts, side.near, side.far);
+    return (*t >= slab.near) & (*t <= slab.far);
+}
+
+// Whether the hit at t is on a cap: the surface whose crossing is nearer to t; at the rim the side.
+static inline mask revolution_on_cap(Roots side, Roots slab, real t)
+{
+    real to_slab = real_min(fabs(t - slab.near), fabs(t - slab.far));
+    real to_side = real_min(fabs(t - side.near), fabs(t - side.far));
+    return to_slab < to_side;
+}
+
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     mask hit = RAY_ACTIVE(ray) & revolution_line_crosses(&quadric);
     if (!lanes_any(hit)) return hit;
     RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
-    Roots side = crossings.side, slab = crossings.slab;
     hit = hit & crossings.real_roots;
-    if (shape->id.y & REVOLUTION_CAPPED) {
-        real near = real_max(side.near, slab.near);
-        real far = real_min(side.far, slab.far);
-        *t = ray_first(ray, near, far);
-        hit = hit & (near <= far);
-    } else {
-        mask seen = shape->id.y & ONLY_INSIDE ? mask_none() : mask_all();
-        mask near_counts =
-            seen & (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
-        *t = lanes_select(near_counts, side.near, side.far);
-        hit = hit & (*t >= slab.near) & (*t <= slab.far);
-    }
+    hit = hit & revolution_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
     if (sloped && (shape->id.y & REVOLUTION_FINITE))
         hit = hit & revolution_reaches(shape, &crossings, ray, *t);
     return hit & (*t > ray->near) & (*t < (real)(LARGEST));
@@ -316,10 +327,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, point.size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
-        // the surface whose crossing is nearer to t; at the rim the side
-        real to_slab = real_min(fabs(t - crossings.slab.near), fabs(t - crossings.slab.far));
-        real to_side = real_min(fabs(t - crossings.side.near), fabs(t - crossings.side.far));
-        mask on_cap = to_slab < to_side;
+        mask on_cap = revolution_on_cap(crossings.side, crossings.slab, t);
         real end = (real)(shape->range.x);
         real target = lanes_select(height * (real)(2) < end, (real)(0), end);
         Vector on_plane = vector_fma(axis, real_divide(target - height, squared_axis), p);
