@@ -1,5 +1,5 @@
-// The BVH: what a tree must be for any boxes, that no hit depends on it, and that closed meshes do not
-// leak. GLINT_LONG_TESTS=1 sends a million rays where this sends some ten thousand.
+// The BVH: its invariants for any boxes, that no hit depends on it, and that closed meshes do not leak; with
+// GLINT_LONG_TESTS=1 a million rays in place of ten thousand.
 // Sanitized in long tests only.
 #include "host/base/array.h"
 #include "host/base/memory.h"

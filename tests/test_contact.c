@@ -1,6 +1,5 @@
-// The box around where transparent and opaque things may touch: what lies outside it is never asked for an
-// opaque surface in the same place, so it must hold all such places, and is of use where it holds little
-// else.
+// The box around where transparent and opaque objects may touch: a hit outside it is never tested for an
+// opaque surface at the same point, so the box must contain all such points and should contain little else.
 #include "host/compile/compile.h"
 #include "tests/scene_reading.h"
 #include <float.h>

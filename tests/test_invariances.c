@@ -1,5 +1,5 @@
-// Random scenes of every shape, light and kind of material: what must not change a picture nor what lies
-// behind it, bit for bit (HARDCASES R6, R7, P7, M6). test_variants has a scene made by hand.
+// Random scenes of every shape, light and kind of material: settings that must not change any bit of an image
+// or its AOVs (hard cases R6, R7, P7, M6). test_variants has a scene made by hand.
 // Sanitized in long tests only.
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
@@ -115,7 +115,7 @@ static Film picture(const Scene *scene, const RenderSettings *settings)
     return film_render(&probe_compute, scene, settings, AOVS);
 }
 
-// Of kernels for which those of what lies behind the picture are not worth their building.
+// Without AOVs, whose kernels take longer to build than to test.
 static Film picture_alone(const Scene *scene, const RenderSettings *settings)
 {
     return film_render(&probe_compute, scene, settings, 0);

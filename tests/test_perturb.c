@@ -1,6 +1,5 @@
-// What devices have otherwise: at `strict` their quotients and roots, wrong by what the specification allows,
-// are repaired to the correctly rounded ones; and the fma of those that have none in hardware is fma to the
-// bit.
+// Differences between devices: at `strict` quotients and roots with the error that the specification permits
+// are repaired to the correctly rounded ones, and the fma of devices without one in hardware has fma's bits.
 // Sanitized in long tests only.
 #include "host/base/array.h"
 #include "host/base/memory.h"

@@ -1,4 +1,4 @@
-// Pictures whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard
+// Images whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard
 // cases.
 // Sanitized in long tests only.
 #include "host/base/text.h"

@@ -1,4 +1,4 @@
-// Shadows on which a faster search, or a surface much larger than what lies on it, once went wrong.
+// Shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
 // Sanitized in long tests only.
 #include "tests/film.h"
 #include "tests/probe.h"
@@ -93,7 +93,7 @@ static void hold_to_reference(const Scene *scene, const RenderSettings *settings
     film_free(&film);
 }
 
-// Ground whose numbers are a million times as large as what lies on it: a float of them counts in halves.
+// Ground whose coordinates are a million times the size of the objects on it: floats there are 0.5 apart.
 typedef struct {
     const char *name, *shape;
     Precision from; // held from this precision on

@@ -35,7 +35,7 @@ typedef struct {
     bool (*primitive_bounds)(const void *primitive, Bounds *bounds);
     // NULL: the bounding sphere of primitive_bounds.
     BoundingSphere (*bounding_sphere)(const void *primitive);
-    // A point and the normal, not unit, of what lies in a plane; NULL: it does not.
+    // A point and the normal, not unit, of a flat primitive; NULL: not flat.
     void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
     // The largest magnitude of an unbounded primitive's numbers, as distances from the origin.
     double (*reach)(const void *primitive);

@@ -37,7 +37,7 @@ typedef struct {
     double specular;  // ks; the highlight has the light's color
     double shininess; // Phong's power, >= 0
     double reflection, transmission, ior;
-    bool full_shadow; // it takes all light from what lies behind it, transparent or not
+    bool full_shadow; // casts a full shadow even if transparent
     bool checker;
     Color checker_colors[2]; // in place of color
     double checker_size;     // side of a square, > 0, in scene units
