@@ -7,8 +7,9 @@
 "$GLINT" devices >/dev/null 2>&1 || skip_all "no OpenCL device"
 
 cases='S1 S3 S5 S6 P3 P4 P5 P7 C1 C2 C4 C5 C7 T2 T3 T6 M3 M4 M5 M6 R4'
-seeds=1 precisions=single wide=
+seeds=1 precisions=single wide= bits_seed=1 bits_lanes=
 if is_long; then
+    bits_seed=7 bits_lanes='--lanes 4'
     cases+=' S2 S4 P1 P2 P6 C3 C6 T1 T4 T5 M1 M2 R1 R2 R3 R5 R8'
     seeds=$(seq 1 20) precisions='fast single'
     default_device=$("$GLINT" devices --json | tr -d '\n' | grep -o '"default": true[^}]*')
@@ -36,15 +37,15 @@ check "a thousand times the errors: exit status $status, not 3" test $status = 3
 check "a thousand times the errors: rays hit the sphere they leave" grep -q '^  S6 .*FAIL' "$scratch/lines"
 
 # At `strict` what a device does wrong is repaired, and at `double` rays meet nothing that may be wrong: same bits.
-hashes() { "$GLINT" verify S1 S6 P4 C5 C7 T2 M4 R4 --json "$@" | grep '"hash"'; }
+hashes() { "$GLINT" verify S1 S6 P4 C5 C7 T2 M4 R4 --json $bits_lanes "$@" | grep '"hash"'; }
 for precision in strict $wide; do
     hashes --precision $precision >"$scratch/plain"
     check "$precision has 8 hashes" test "$(wc -l <"$scratch/plain")" = 8
-    hashes --precision $precision --perturb 1 >"$scratch/perturbed"
+    hashes --precision $precision --perturb $bits_seed >"$scratch/perturbed"
     check "$precision keeps its bits" diff "$scratch/plain" "$scratch/perturbed"
 done
 hashes --precision single >"$scratch/plain"
-hashes --precision single --perturb 1 >"$scratch/perturbed"
+hashes --precision single --perturb $bits_seed >"$scratch/perturbed"
 check 'single does not keep its bits' test "$(diff "$scratch/plain" "$scratch/perturbed" | grep -c '^>')" = 8
 
 # Images: no seed is another, and each is the same twice and at every width.
