@@ -22,7 +22,7 @@ static int __lsan_do_recoverable_leak_check(void)
 enum { SANITIZED = 0 };
 #endif
 
-typedef enum { NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM, COMPUTE } Forgotten;
+typedef enum { NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM } Forgotten;
 enum { NO_DEVICE = 77, LEAKED = 23 };
 
 static void cl_must(cl_int status)
@@ -31,7 +31,7 @@ static void cl_must(cl_int status)
 }
 
 // Launches a kernel, so that the driver has compiled it and started its threads, and releases all but one
-// thing.
+// thing. Context and queue are not among them: idle worker threads of PoCL may keep pointers to both.
 static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
 {
     DeviceList list;
@@ -60,7 +60,7 @@ static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
     if (forgotten != BUFFER) cl_must(clReleaseMemObject(buffer));
     if (forgotten != KERNEL) cl_must(clReleaseKernel(kernel));
     if (forgotten != PROGRAM) cl_must(clReleaseProgram(program));
-    if (forgotten != COMPUTE) compute_close(&compute);
+    compute_close(&compute);
     device_list_close(&list);
 }
 
@@ -97,14 +97,13 @@ static void test_forgotten(void **state)
 
 int main(void)
 {
-    static Forgotten forgotten[] = {NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM, COMPUTE};
+    static Forgotten forgotten[] = {NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM};
     const struct CMUnitTest tests[] = {
         {"nothing", test_forgotten, NULL, NULL, &forgotten[0]},
         {"memory", test_forgotten, NULL, NULL, &forgotten[1]},
         {"a buffer", test_forgotten, NULL, NULL, &forgotten[2]},
         {"a kernel", test_forgotten, NULL, NULL, &forgotten[3]},
         {"a program", test_forgotten, NULL, NULL, &forgotten[4]},
-        {"context and queue", test_forgotten, NULL, NULL, &forgotten[5]},
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
