@@ -149,7 +149,7 @@ lint-format:
 
 lint-tidy:
 	@printf '%s\n' $(linted) | xargs -P $(LINT_JOBS) -I FILE \
-	    $(CLANG_TIDY) --quiet FILE -- $(OURS) '-DGLINT_VERSION="lint"' 2>/dev/null
+	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) FILE -- $(OURS) '-DGLINT_VERSION="lint"' 2>/dev/null
 
 lint-cppcheck:
 	@$(CPPCHECK) --quiet --std=c11 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \

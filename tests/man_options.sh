@@ -87,5 +87,7 @@ offers 'glint render --si' --size
 offers 'glint check --le' --lenient
 offers 'glint render --lanes 1' '1 16'
 offers 'glint render --timing = j' json
+glint() { "$GLINT" "$@"; }
+offers 'glint render --aov no' normal
 offers 'glint render --timing LICEN' LICENSE
 exit $failed

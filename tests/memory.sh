@@ -1,5 +1,5 @@
 #!/bin/bash
-# Memory is that of a band, not of the picture. GLINT_LONG_TESTS=1 renders the whole 32768x32768 as well (minutes).
+# Memory is that of a band, not of the image. GLINT_LONG_TESTS=1 renders the whole 32768x32768 as well (minutes).
 . "$(dirname "$0")/support.bash"
 is_sanitized && skip_all 'a sanitized program needs more memory'
 cd "$scratch" || exit 1

@@ -1,5 +1,5 @@
 #!/bin/bash
-# tools/peers/bench at a small size: the renderer on Embree draws what glint draws, and a picture that is of other work
+# tools/peers/bench at a small size: the renderer on Embree draws what glint draws, and an image that is of other work
 # is reported. Needs libembree-dev, and PyYAML.
 . "$(dirname "$0")/support.bash"
 
@@ -34,12 +34,12 @@ shift
 exec "$build/peers/embree" "$scratch/moved.embree" "\$@"
 SH
 chmod +x "$scratch/moved"
-other_work_is_told() {
+other_work_is_reported() {
     bench "$scratch/moved" spheres-16
     [ $? = 3 ]
 }
 
 check "spheres and a mesh by Embree and glint are timed" bench "$build/peers/embree" spheres-16 bunny-2000
-check "all of Embree's pictures are glint's" agree "Embree packets" "Embree packets, our spheres" "Embree single rays"
-check "a picture of other work makes the run fail" other_work_is_told
+check "all of Embree's images are glint's" agree "Embree packets" "Embree packets, our spheres" "Embree single rays"
+check "an image of other work makes the run fail" other_work_is_reported
 finish

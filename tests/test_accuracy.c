@@ -1,4 +1,4 @@
-// The errors of pictures made by hand, in which the count of each kind is known, and what follows from errors
+// The errors of images made by hand, in which the count of each kind is known, and what follows from errors
 // and times. tests/test_accuracy.py checks the same figures of rendered images against an independent
 // implementation.
 #include "host/base/memory.h"

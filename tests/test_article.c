@@ -215,7 +215,7 @@ static void sees_far_and_near(void **state)
     scene_free(&scene);
 }
 
-// How many pixels of the middle row and of the middle column a picture shows as lit.
+// How many pixels of the middle row and of the middle column an image shows as lit.
 typedef struct {
     unsigned across, down;
 } Extent;
@@ -226,20 +226,20 @@ static void keeps_a_sphere_round(void **state)
 {
     (void)state;
     Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 9\n" MATERIAL);
-    static float picture[HEIGHT][WIDTH][3];
-    assert_true(probe_render(&scene, WIDTH, HEIGHT, PRECISION_SINGLE, &picture[0][0][0]));
+    static float image[HEIGHT][WIDTH][3];
+    assert_true(probe_render(&scene, WIDTH, HEIGHT, PRECISION_SINGLE, &image[0][0][0]));
     Extent seen = {0}, expected = {0}, article = {0};
     for (unsigned row = 0; row < HEIGHT; row++) {
         for (unsigned column = 0; column < WIDTH; column++) {
             ReferenceRay ray = reference_camera_ray(&scene.camera, WIDTH, HEIGHT, column, row);
             bool there = reference_hit(&scene, &ray).found;
-            assert_int_equal(picture[row][column][0] > 0, there);
+            assert_int_equal(image[row][column][0] > 0, there);
             // A frame of 1 by 1 at distance 2, whatever the window's shape.
             Float3 d = {((float)column + 0.5f) / WIDTH - 0.5f, ((float)row + 0.5f) / HEIGHT - 0.5f, 2};
             bool stretched = within_limits(article_sphere((Float3){0, 0, 9}, 1, (Float3){0, 0, 0}, d));
             bool across = row == HEIGHT / 2, down = column == WIDTH / 2;
-            seen.across += across && picture[row][column][0] > 0;
-            seen.down += down && picture[row][column][0] > 0;
+            seen.across += across && image[row][column][0] > 0;
+            seen.down += down && image[row][column][0] > 0;
             expected.across += across && there;
             expected.down += down && there;
             article.across += across && stretched;

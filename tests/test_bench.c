@@ -121,7 +121,7 @@ static BenchRow row_make(void)
         .times = times_make(30, 1),
         .rays = {1200, 900, 100, 200, 1500},
         .flops_per_ray = 50,
-        .picture_bytes = 1200 * 12,
+        .image_bytes = 1200 * 12,
     };
     return row;
 }

@@ -1,4 +1,4 @@
-// Reflection, refraction, total reflection and light through glass: small pictures against the reference.
+// Reflection, refraction, total reflection and light through glass: small images against the reference.
 // Sanitized in long tests only.
 #include "tests/film.h"
 #include "tests/probe.h"

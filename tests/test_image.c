@@ -1,4 +1,4 @@
-// Pictures out and in: every format's round trip, notes, and failures that leave the old file as it was.
+// Images out and in: every format's round trip, notes, and failures that leave the old file as it was.
 #include "host/image/image.h"
 
 #include <dirent.h>
@@ -64,7 +64,8 @@ static void check_no_messages(MessageList *messages)
 }
 
 // Writes in uneven bands, so that a format's own blocks lie across them.
-static void picture_write(const char *path, const ImageHeader *header, const void *values, size_t value_size)
+static void image_write_file(const char *path, const ImageHeader *header, const void *values,
+                             size_t value_size)
 {
     MessageList messages = {0};
     ImageWriter *writer = image_writer_open(path, header, &messages);
@@ -80,7 +81,7 @@ static void picture_write(const char *path, const ImageHeader *header, const voi
     check_no_messages(&messages);
 }
 
-static Image picture_read(const char *path)
+static Image image_read_file(const char *path)
 {
     MessageList messages = {0};
     Image image;
@@ -94,8 +95,8 @@ static void check_display_round_trip(const char *path, uint32_t channels, Transf
     ImageHeader header = {image_format_of(path), 37, 41, channels, transfer, bits, 'f', notes};
     uint32_t count = 37 * 41 * channels;
     float *values = values_make(count);
-    picture_write(path, &header, values, sizeof *values);
-    Image image = picture_read(path);
+    image_write_file(path, &header, values, sizeof *values);
+    Image image = image_read_file(path);
     assert_int_equal(image.width, 37);
     assert_int_equal(image.height, 41);
     assert_int_equal(image.channels, channels);
@@ -130,8 +131,8 @@ static void check_float_round_trip(const char *path, uint32_t channels)
     values[3] = INFINITY;
     values[4] = NAN;
     values[5] = 1e30F;
-    picture_write(path, &header, values, sizeof *values);
-    Image image = picture_read(path);
+    image_write_file(path, &header, values, sizeof *values);
+    Image image = image_read_file(path);
     assert_int_equal(image.width, 37);
     assert_int_equal(image.height, 41);
     assert_int_equal(image.channels, channels);
@@ -157,8 +158,8 @@ static void test_small_exr(void **state)
     (void)state;
     const float value = 0.375F;
     ImageHeader header = {IMAGE_EXR, 1, 1, 1, TRANSFER_SRGB, 8, 'f', NULL};
-    picture_write("small.exr", &header, &value, sizeof value);
-    Image image = picture_read("small.exr");
+    image_write_file("small.exr", &header, &value, sizeof value);
+    Image image = image_read_file("small.exr");
     assert_true(image.width == 1 && image.height == 1 && image.channels == 1 && image.values[0] == value);
     image_free(&image);
 }
@@ -168,16 +169,16 @@ static void test_npy_types(void **state)
     (void)state;
     const uint32_t integers[] = {0, 1, 7, 16777216, 4294967040U, 5};
     ImageHeader header = {IMAGE_NPY, 3, 2, 1, TRANSFER_NONE, 8, 'u', NULL};
-    picture_write("u.npy", &header, integers, sizeof *integers);
-    Image image = picture_read("u.npy");
+    image_write_file("u.npy", &header, integers, sizeof *integers);
+    Image image = image_read_file("u.npy");
     for (int i = 0; i < 6; i++)
         assert_true(image.values[i] == (float)integers[i]);
     image_free(&image);
 
     const double doubles[] = {0.1, -1e300, 3, 4, 5, 6};
     header.npy_type = 'd';
-    picture_write("d.npy", &header, doubles, sizeof *doubles);
-    image = picture_read("d.npy");
+    image_write_file("d.npy", &header, doubles, sizeof *doubles);
+    image = image_read_file("d.npy");
     assert_true(image.values[0] == 0.1F && image.values[1] == -INFINITY && image.values[5] == 6.0F);
     image_free(&image);
 }
@@ -188,9 +189,9 @@ static void test_doubles_keep_their_bits(void **state)
     const double doubles[] = {1.0 / 3, 1 + 1e-15, 5e-324};
     const float floats[] = {1.0F / 3, 1, 0.5F};
     ImageHeader header = {IMAGE_NPY, 3, 1, 1, TRANSFER_NONE, 8, 'd', notes};
-    picture_write("d.npy", &header, doubles, sizeof *doubles);
+    image_write_file("d.npy", &header, doubles, sizeof *doubles);
     header.npy_type = 'f';
-    picture_write("f.npy", &header, floats, sizeof *floats);
+    image_write_file("f.npy", &header, floats, sizeof *floats);
     for (int i = 0; i < 2; i++) {
         MessageList messages = {0};
         Image image;
@@ -213,7 +214,7 @@ static void test_npy_bytes(void **state)
     (void)state;
     const float value = 1.5F;
     ImageHeader header = {IMAGE_NPY, 1, 1, 1, TRANSFER_NONE, 8, 'f', NULL};
-    picture_write("b.npy", &header, &value, sizeof value);
+    image_write_file("b.npy", &header, &value, sizeof value);
     char bytes[256];
     FILE *file = fopen("b.npy", "rb");
     assert_non_null(file);
@@ -232,7 +233,7 @@ static void test_png_notes(void **state)
     (void)state;
     ImageHeader header = {IMAGE_PNG, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
     float *values = values_make(60);
-    picture_write("notes.png", &header, values, sizeof *values);
+    image_write_file("notes.png", &header, values, sizeof *values);
     free(values);
     FILE *file = fopen("notes.png", "rb");
     assert_non_null(file);
@@ -259,7 +260,7 @@ static void test_exr_notes(void **state)
     (void)state;
     ImageHeader header = {IMAGE_EXR, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
     float *values = values_make(60);
-    picture_write("notes.exr", &header, values, sizeof *values);
+    image_write_file("notes.exr", &header, values, sizeof *values);
     free(values);
     exr_context_t context;
     assert_int_equal(exr_start_read(&context, "notes.exr", NULL), EXR_ERR_SUCCESS);
@@ -471,7 +472,7 @@ static void test_text_pixmap(void **state)
     (void)state;
     const char bytes[] = "P3 # colors\n# more\n2 1\n4\n0 1 2\n3 4 # last\n1";
     file_write("text.ppm", bytes, sizeof bytes - 1);
-    Image image = picture_read("text.ppm");
+    Image image = image_read_file("text.ppm");
     assert_int_equal(image.width, 2);
     assert_int_equal(image.channels, 3);
     const float expected[] = {0, 0.25F, 0.5F, 0.75F, 1, 0.25F};

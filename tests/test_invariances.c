@@ -110,13 +110,13 @@ static Scene random_scene(uint64_t seed)
     return scene;
 }
 
-static Film picture(const Scene *scene, const RenderSettings *settings)
+static Film render(const Scene *scene, const RenderSettings *settings)
 {
     return film_render(&probe_compute, scene, settings, AOVS);
 }
 
 // Without AOVs, whose kernels take longer to build than to test.
-static Film picture_alone(const Scene *scene, const RenderSettings *settings)
+static Film render_alone(const Scene *scene, const RenderSettings *settings)
 {
     return film_render(&probe_compute, scene, settings, 0);
 }
@@ -145,14 +145,14 @@ static size_t objects_seen(const Film *film)
 static void runs_bands_and_bvh_change_nothing(const Case *c)
 {
     RenderSettings settings = c->settings;
-    Film again = picture(c->scene, &settings);
+    Film again = render(c->scene, &settings);
     same_and_freed(c, &again, "again");
     settings.band_rows = 5;
-    Film bands = picture(c->scene, &settings);
+    Film bands = render(c->scene, &settings);
     same_and_freed(c, &bands, "bands of 5 rows");
     settings = c->settings;
     settings.bvh = BVH_OFF;
-    Film listed = picture_alone(c->scene, &settings);
+    Film listed = render_alone(c->scene, &settings);
     same_and_freed(c, &listed, "without a BVH");
 }
 
@@ -166,7 +166,7 @@ static void lanes_change_nothing(const Case *c)
         if (settings.precision != PRECISION_SINGLE && settings.lanes > 1) break;
         char what[32];
         snprintf(what, sizeof what, "%u lanes", settings.lanes);
-        Film film = picture_alone(c->scene, &settings);
+        Film film = render_alone(c->scene, &settings);
         same_and_freed(c, &film, what);
     }
 }
@@ -177,7 +177,7 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         Scene scene = random_scene(seed);
         scene_scale(&scene, ldexp(1, exponents[i]));
-        Film film = picture(&scene, &c->settings);
+        Film film = render(&scene, &c->settings);
         for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++) {
             film.t[k] = ldexp(film.t[k], -exponents[i]);
             for (size_t axis = 0; axis < 3; axis++)
@@ -214,13 +214,13 @@ static Scene unchecked_scene(uint64_t seed)
     return scene;
 }
 
-static void mirror_flips_the_picture(const Case *checkered, uint64_t seed)
+static void mirror_flips_the_image(const Case *checkered, uint64_t seed)
 {
     Scene given = unchecked_scene(seed), scene = unchecked_scene(seed);
     scene_mirror(&scene);
     Case c = *checkered;
-    c.film = picture(&given, &c.settings);
-    Film film = picture(&scene, &c.settings);
+    c.film = render(&given, &c.settings);
+    Film film = render(&scene, &c.settings);
     double *vectors[] = {film.color, film.normal, film.position, film.ray};
     for (size_t i = 0; i < 4; i++) {
         columns_flip(vectors[i], 3 * sizeof(double));
@@ -252,7 +252,7 @@ static void order_changes_ids_alone(const Case *c, uint64_t seed)
         }
         for (size_t i = 0; i < OBJECTS; i++)
             scene.objects.items[i] = given.objects.items[from[i]];
-        Film film = picture(&scene, &c->settings);
+        Film film = render(&scene, &c->settings);
         for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++)
             if (film.object[i] != UINT32_MAX) film.object[i] = from[film.object[i]];
         same_and_freed(c, &film, permutation == 0 ? "objects in reverse" : "objects shuffled");
@@ -272,7 +272,7 @@ static void precision_holds(Precision precision)
         c.settings.bvh = BVH_ON;
         c.settings.extra_features = features_of(&scene); // also where a changed scene needs fewer
         assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_IMAGES, FEATURE_ALL);
-        c.film = picture(&scene, &c.settings);
+        c.film = render(&scene, &c.settings);
         assert_int_equal(film_count_faulty(&c.film), 0);
         assert_true(objects_seen(&c.film) >= OBJECTS / 3);
 
@@ -280,7 +280,7 @@ static void precision_holds(Precision precision)
         // the compiler rearranges relaxed arithmetic for each width anew
         if (precision != PRECISION_FAST) lanes_change_nothing(&c);
         scale_changes_lengths_alone(&c, seed);
-        mirror_flips_the_picture(&c, seed);
+        mirror_flips_the_image(&c, seed);
         order_changes_ids_alone(&c, seed);
         film_free(&c.film);
         scene_free(&scene);

@@ -86,7 +86,7 @@ typedef struct {
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY) SHAPE_LIST(SHAPE_ENTRY)};
 enum { MEMBER_COUNT = sizeof members / sizeof *members };
 
-// One object of every shape and a picture, so that the compiled scene has every struct's layout.
+// One object of every shape and a texture, so that the compiled scene has every struct's layout.
 static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
                                  "lights: [{point: {position: [1, 2, 3]}}]\n"
                                  "objects:\n"

@@ -338,7 +338,7 @@ static void concave_polygon_is_cut_in_full(void **state)
     text_free(&face);
 }
 
-static void polygons_that_cannot_be_filled_are_told(void **state)
+static void polygons_that_cannot_be_filled_are_reported(void **state)
 {
     (void)state;
     file_write("a.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 3 3 0\nv 3 0 0\nv 4 0 0\nf 1 2 3 4\nf 1 2 5 6\n");
@@ -486,7 +486,7 @@ static void gltf_places_no_more_than_a_million_nodes(void **state)
     text_free(&named);
 }
 
-static void scene_file_is_told_what_is_wrong(void **state)
+static void scene_file_faults_are_reported(void **state)
 {
     (void)state;
     file_write("a.obj", square);
@@ -605,7 +605,7 @@ static void too_many_triangles_are_refused(void **state)
     assert_refused(&probe_compute, &scene, "268435457 objects and triangles, more than 268435456");
 }
 
-static void device_without_room_is_told(void **state)
+static void device_without_room_is_reported(void **state)
 {
     (void)state;
     file_write("a.obj", octahedron);
@@ -637,15 +637,15 @@ int main(void)
         cmocka_unit_test(faces_without_corners_are_left_out),
         cmocka_unit_test(what_no_face_uses_does_not_count),
         cmocka_unit_test(concave_polygon_is_cut_in_full),
-        cmocka_unit_test(polygons_that_cannot_be_filled_are_told),
+        cmocka_unit_test(polygons_that_cannot_be_filled_are_reported),
         cmocka_unit_test(faults_name_file_and_vertex),
         cmocka_unit_test(gltf_of_any_depth_is_survived),
         cmocka_unit_test(gltf_places_no_more_than_a_million_nodes),
-        cmocka_unit_test(scene_file_is_told_what_is_wrong),
+        cmocka_unit_test(scene_file_faults_are_reported),
         cmocka_unit_test(ids_count_the_triangles),
         cmocka_unit_test(triangles_without_area_are_never_hit),
         cmocka_unit_test(too_many_triangles_are_refused),
-        cmocka_unit_test(device_without_room_is_told),
+        cmocka_unit_test(device_without_room_is_reported),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

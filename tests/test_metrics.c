@@ -28,7 +28,7 @@ static Image gray_image(unsigned step)
     return image;
 }
 
-static void test_equal_pictures(void **state)
+static void test_equal_images(void **state)
 {
     (void)state;
     Image image = gray_image(128);
@@ -183,7 +183,7 @@ static void test_heatmap_rises(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_equal_pictures),
+        cmocka_unit_test(test_equal_images),
         cmocka_unit_test(test_one_black_pixel),
         cmocka_unit_test(test_one_step_lighter),
         cmocka_unit_test(test_black_and_white),

@@ -1,4 +1,4 @@
-// How long launches get when parts of a picture cost very different times: the pace alone, without a device
+// How long launches get when parts of an image cost very different times: the pace alone, without a device
 // or a clock.
 #include "host/render/pace.h"
 #include <setjmp.h>
@@ -17,7 +17,7 @@ typedef struct {
     uint64_t samples;
 } Run;
 
-// Renders a picture whose rows from `glass_row` on are glass, as renderer_render does.
+// Renders an image whose rows from `glass_row` on are glass, as renderer_render does.
 static Run run(uint32_t sample_count, uint32_t glass_row)
 {
     Run run = {0};
@@ -101,7 +101,7 @@ static void launches_of_a_band_begin_small(void **state)
     assert_int_equal(pace_launch_samples(&pace, 100, 64), 1);
 }
 
-static void plain_pictures_have_few_launches(void **state)
+static void plain_images_have_few_launches(void **state)
 {
     (void)state;
     static const uint32_t sample_counts[] = {1, 4, 16, 64, 256};
@@ -120,7 +120,7 @@ int main(void)
         cmocka_unit_test(glass_below_sky_has_no_long_launch),
         cmocka_unit_test(rows_shrink_after_a_slow_band),
         cmocka_unit_test(launches_of_a_band_begin_small),
-        cmocka_unit_test(plain_pictures_have_few_launches),
+        cmocka_unit_test(plain_images_have_few_launches),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -34,7 +34,7 @@ static Object frustum(double first, double second, bool caps)
                     .as.cone = {{0, 0, 0}, {0, 0, 2}, {first, second}, 0, true, caps, false}};
 }
 
-static Object endless_cone(double slope)
+static Object infinite_cone(double slope)
 {
     return (Object){.kind = SHAPE_CONE, .as.cone = {.axis = {0, 0, 1}, .slope = slope}};
 }
@@ -166,7 +166,7 @@ static void knows_cylinders(void **state)
 static void knows_cones(void **state)
 {
     (void)state;
-    const Object half = endless_cone(0.5), right = endless_cone(1);
+    const Object half = infinite_cone(0.5), right = infinite_cone(1);
     const Object tip = frustum(1, 0, true), cup = frustum(0.5, 1, false);
     const Vector3 x = {1, 0, 0}, z = {0, 0, 1};
     const Known known[] = {

@@ -41,7 +41,7 @@ static bool take_band(void *context, const Film *band, double fraction_done)
 }
 
 // The published tracer sends a reflected ray from whatever transmits (README, Testing procedures, 8), gears
-// of glass with a Ks of 0 too, where it adds nothing to the picture. glint sends no such ray, unless it
+// of glass with a Ks of 0 too, where it adds nothing to the image. glint sends no such ray, unless it
 // carries a little.
 static void glass_reflect(Scene *scene)
 {

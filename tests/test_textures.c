@@ -1,4 +1,4 @@
-// Pictures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
+// Textures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
 #include "host/image/image.h"
 #include "tests/film.h"
@@ -14,18 +14,18 @@
 #include <cmocka.h>
 
 static char folder[] = "/tmp/glint-textures-XXXXXX";
-static char picture_path[64];
+static char texture_path[64];
 
 static int textures_open(void **state)
 {
     if (!mkdtemp(folder)) return -1;
-    snprintf(picture_path, sizeof picture_path, "%s/picture.npy", folder);
+    snprintf(texture_path, sizeof texture_path, "%s/texture.npy", folder);
     return probe_open(state);
 }
 
 static int textures_close(void **state)
 {
-    unlink(picture_path);
+    unlink(texture_path);
     rmdir(folder);
     return probe_close(state);
 }
@@ -33,41 +33,41 @@ static int textures_close(void **state)
 typedef struct {
     uint32_t width, height;
     float colors[64][3]; // rows from the top
-} TestPicture;
+} TestTexture;
 
 // Every texel has a color of its own, of eighths.
-static TestPicture picture_make(uint32_t width, uint32_t height)
+static TestTexture texture_make(uint32_t width, uint32_t height)
 {
-    TestPicture picture = {width, height, {{0}}};
+    TestTexture texture = {width, height, {{0}}};
     for (uint32_t i = 0; i < width * height; i++) {
-        picture.colors[i][0] = (float)(i * 5 % 8) / 8;
-        picture.colors[i][1] = (float)(i % 8) / 8;
-        picture.colors[i][2] = (float)(i / 8 % 8) / 8;
+        texture.colors[i][0] = (float)(i * 5 % 8) / 8;
+        texture.colors[i][1] = (float)(i % 8) / 8;
+        texture.colors[i][2] = (float)(i / 8 % 8) / 8;
     }
-    return picture;
+    return texture;
 }
 
-static void picture_write(const TestPicture *picture)
+static void texture_write(const TestTexture *texture)
 {
     const ImageHeader header = {.format = IMAGE_NPY,
-                                .width = picture->width,
-                                .height = picture->height,
+                                .width = texture->width,
+                                .height = texture->height,
                                 .channels = 3,
                                 .npy_type = 'f'};
     MessageList messages = {0};
-    ImageWriter *writer = image_writer_open(picture_path, &header, &messages);
+    ImageWriter *writer = image_writer_open(texture_path, &header, &messages);
     assert_non_null(writer);
-    assert_true(image_writer_rows(writer, picture->colors, picture->height, &messages));
+    assert_true(image_writer_rows(writer, texture->colors, texture->height, &messages));
     assert_true(image_writer_commit(writer, &messages));
 }
 
-// A scene that shows colors as they are, and one object, whose material is the picture's.
+// A scene that shows colors as they are, and one object, whose material is the texture's.
 static Scene scene_make(const char *camera, const char *object)
 {
     Text text = {0};
-    text_appendf(&text, "camera: {%s}\nambient: [1, 1, 1]\nmaterials: {picture: {image: %s, size: 2}}\n",
-                 camera, picture_path);
-    text_appendf(&text, "objects: [{%s material: picture}}]\n", object);
+    text_appendf(&text, "camera: {%s}\nambient: [1, 1, 1]\nmaterials: {texture: {image: %s, size: 2}}\n",
+                 camera, texture_path);
+    text_appendf(&text, "objects: [{%s material: texture}}]\n", object);
     Scene scene = scene_of_text("s.yaml", text_c(&text));
     text_free(&text);
     return scene;
@@ -93,8 +93,8 @@ static void check_seen(const char *camera, const char *object, double red, doubl
 static void sphere_shows_east_and_west(void **state)
 {
     (void)state;
-    const TestPicture picture = {2, 1, {{1, 0, 0.25F}, {0, 1, 0.75F}}}; // west, east
-    picture_write(&picture);
+    const TestTexture texture = {2, 1, {{1, 0, 0.25F}, {0, 1, 0.75F}}}; // west, east
+    texture_write(&texture);
     check_seen(FROM(-5, 0, 0), BALL, 1, 0, 0.25);
     check_seen(FROM(5, 0, 0), BALL, 0, 1, 0.75);
     check_seen(FROM(0, 0, 5), BALL, 0.5, 0.5, 0.5);
@@ -106,9 +106,9 @@ static void sphere_shows_east_and_west(void **state)
 static void sphere_shows_north_and_south(void **state)
 {
     (void)state;
-    const TestPicture picture = {
+    const TestTexture texture = {
         4, 2, {{0, 0, 0}, {0, 0, 1}, {0, 1, 0}, {0, 1, 1}, {1, 0, 0}, {1, 0, 1}, {1, 1, 0}, {1, 1, 1}}};
-    picture_write(&picture);
+    texture_write(&texture);
     check_seen(FROM(0, 5, 0), BALL, 0, 0.5, 0.5);  // north: of longitude 0, the mean of two texels
     check_seen(FROM(0, -5, 0), BALL, 1, 0.5, 0.5); // south
     check_seen(FROM(0, 0, 5), BALL, 0.5, 0.5, 0.5);
@@ -117,31 +117,31 @@ static void sphere_shows_north_and_south(void **state)
                0); // longitude 45, latitude -45: one texel's center
 }
 
-static double picture_at(const TestPicture *picture, long column, long row, bool repeats_upward,
+static double texture_at(const TestTexture *texture, long column, long row, bool repeats_upward,
                          size_t channel)
 {
-    long width = (long)picture->width, height = (long)picture->height;
+    long width = (long)texture->width, height = (long)texture->height;
     column = (column % width + width) % width;
     if (repeats_upward) row = (row % height + height) % height;
     row = row < 0 ? 0 : row >= height ? height - 1 : row;
-    return (double)picture->colors[row * width + column][channel];
+    return (double)texture->colors[row * width + column][channel];
 }
 
-static double picture_between(const TestPicture *picture, double u, double v, bool repeats_upward,
+static double texture_between(const TestTexture *texture, double u, double v, bool repeats_upward,
                               size_t channel)
 {
-    double x = u * picture->width - 0.5, y = (1 - v) * picture->height - 0.5;
+    double x = u * texture->width - 0.5, y = (1 - v) * texture->height - 0.5;
     double left = floor(x), top = floor(y), across = x - left, down = y - top;
     long i = (long)left, j = (long)top;
-    return (1 - down) * ((1 - across) * picture_at(picture, i, j, repeats_upward, channel) +
-                         across * picture_at(picture, i + 1, j, repeats_upward, channel)) +
-           down * ((1 - across) * picture_at(picture, i, j + 1, repeats_upward, channel) +
-                   across * picture_at(picture, i + 1, j + 1, repeats_upward, channel));
+    return (1 - down) * ((1 - across) * texture_at(texture, i, j, repeats_upward, channel) +
+                         across * texture_at(texture, i + 1, j, repeats_upward, channel)) +
+           down * ((1 - across) * texture_at(texture, i, j + 1, repeats_upward, channel) +
+                   across * texture_at(texture, i + 1, j + 1, repeats_upward, channel));
 }
 
 enum { WIDTH = 61, HEIGHT = 47 };
 
-typedef void (*PictureMap)(Vector3 position, Vector3 normal, double *u, double *v);
+typedef void (*TextureMap)(Vector3 position, Vector3 normal, double *u, double *v);
 
 static void map_sphere(Vector3 position, Vector3 normal, double *u, double *v)
 {
@@ -184,11 +184,11 @@ static Vector3 vector_at(const double *values, size_t pixel)
     return (Vector3){values[3 * pixel], values[3 * pixel + 1], values[3 * pixel + 2]};
 }
 
-// Each pixel against its place in the picture, where texels are larger than pixels.
-static void check_places(const char *camera, const char *object, PictureMap map, bool repeats_upward)
+// Each pixel against its place in the texture, where texels are larger than pixels.
+static void check_places(const char *camera, const char *object, TextureMap map, bool repeats_upward)
 {
-    TestPicture picture = picture_make(4, 2);
-    picture_write(&picture);
+    TestTexture texture = texture_make(4, 2);
+    texture_write(&texture);
     Scene scene = scene_make(camera, object);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!probe_has(precision)) continue;
@@ -205,7 +205,7 @@ static void check_places(const char *camera, const char *object, PictureMap map,
             map(vector_add(from_eye, scene.camera.position), normal, &u, &v);
             for (size_t channel = 0; channel < 3; channel++)
                 largest = fmax(largest, fabs(film.color[3 * i + channel] -
-                                             picture_between(&picture, u, v, repeats_upward, channel)));
+                                             texture_between(&texture, u, v, repeats_upward, channel)));
             seen++;
         }
         assert_in_range(seen, WIDTH * HEIGHT / 4, WIDTH * HEIGHT);
@@ -246,19 +246,19 @@ static void meshes_have_it_by_uv(void **state)
                  map_quad, true);
 }
 
-// Far away, where a pixel sees the whole picture and more, the mean of all texels. 5 x 3 is nowhere a half of
+// Far away, where a pixel sees the whole texture and more, the mean of all texels. 5 x 3 is nowhere a half of
 // anything.
 static void far_away_it_is_its_mean(void **state)
 {
     (void)state;
     static const uint32_t sizes[][2] = {{8, 8}, {5, 3}, {7, 1}, {1, 6}, {1, 1}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        TestPicture picture = picture_make(sizes[i][0], sizes[i][1]);
-        uint32_t count = picture.width * picture.height;
+        TestTexture texture = texture_make(sizes[i][0], sizes[i][1]);
+        uint32_t count = texture.width * texture.height;
         double mean[3] = {0};
         for (uint32_t k = 0; k < 3 * count; k++)
-            mean[k % 3] += (double)picture.colors[k / 3][k % 3] / count;
-        picture_write(&picture);
+            mean[k % 3] += (double)texture.colors[k / 3][k % 3] / count;
+        texture_write(&texture);
         const char *far_camera = "position: [0, 0, 1000], look_at: [0, 0, 0], fov: 5";
         check_seen(far_camera, BALL, mean[0], mean[1], mean[2]);
         check_seen(far_camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", mean[0], mean[1], mean[2]);
@@ -270,12 +270,12 @@ static void far_away_it_is_its_mean(void **state)
 static void between_levels_it_blends(void **state)
 {
     (void)state;
-    TestPicture picture = {8, 8, {{0}}};
+    TestTexture texture = {8, 8, {{0}}};
     for (uint32_t i = 0; i < 64; i++)
-        picture.colors[i][0] = i % 8 < 2; // two columns of eight
-    picture_write(&picture);
+        texture.colors[i][0] = i % 8 < 2; // two columns of eight
+    texture_write(&texture);
     // 0.25 a texel; 2 distance tan(fov / 2) = 0.75. The eye looks at the middle of a texel of 2 columns,
-    // which is the second of the four: black, its neighbors of half the picture's width: the colors 1 and 0.
+    // which is the second of the four: black, its neighbors of half the texture's width: the colors 1 and 0.
     double finer = 0, coarser = 0.5 * (1 - 0.25); // of 4 columns: white in half of the first
     char camera[128];
     snprintf(camera, sizeof camera, "position: [0.75, 0.75, 1], look_at: [0.75, 0.75, 0], fov: %.17g",
@@ -283,15 +283,15 @@ static void between_levels_it_blends(void **state)
     check_seen(camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", (finer + coarser) / 2, 0, 0);
 }
 
-// A mirror's picture of a picture is filtered for the whole way to the eye.
+// A mirror's texture of a texture is filtered for the whole way to the eye.
 static void mirrors_filter_it_too(void **state)
 {
     (void)state;
-    TestPicture picture = picture_make(8, 8);
+    TestTexture texture = texture_make(8, 8);
     double mean[3] = {0};
     for (uint32_t k = 0; k < 192; k++)
-        mean[k % 3] += (double)picture.colors[k / 3][k % 3] / 64;
-    picture_write(&picture);
+        mean[k % 3] += (double)texture.colors[k / 3][k % 3] / 64;
+    texture_write(&texture);
     check_seen("position: [0, 0, 1000], look_at: [0, 0, 0], fov: 5",
                "plane: {point: [0, 0, 0], normal: [0, 0, 1], material: {color: [0, 0, 0], reflection: 1}}},\n"
                "  {plane: {point: [0, 0, 1001], normal: [0, 0, -1],",
@@ -332,13 +332,13 @@ static void jpeg_is_read(void **state)
     tjhandle encoder = tjInitCompress();
     assert_int_equal(
         tjCompress2(encoder, pixels, SIDE, 0, SIDE, TJPF_RGB, &bytes, &length, TJSAMP_420, 95, 0), 0);
-    FILE *file = fopen(picture_path, "wb");
+    FILE *file = fopen(texture_path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, length, file), length);
     fclose(file);
     Image image;
     MessageList messages = {0};
-    assert_true(image_read(&image, picture_path, &messages));
+    assert_true(image_read(&image, texture_path, &messages));
     assert_int_equal(image.width, SIDE);
     assert_int_equal(image.height, SIDE);
     assert_true(image.display);
@@ -357,8 +357,8 @@ static void jpeg_is_read(void **state)
     film_free(&film);
     scene_free(&scene);
 
-    assert_int_equal(truncate(picture_path, 20), 0);
-    assert_false(image_read(&image, picture_path, &messages));
+    assert_int_equal(truncate(texture_path, 20), 0);
+    assert_false(image_read(&image, texture_path, &messages));
     message_list_free(&messages);
     tjFree(bytes);
     tjDestroy(encoder);
@@ -368,7 +368,7 @@ static void jpeg_is_read(void **state)
     "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 5, "                 \
     "5]}}]\nmaterials:\n"
 
-static void scene_faults_are_told(void **state)
+static void scene_faults_are_reported(void **state)
 {
     (void)state;
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
@@ -388,7 +388,7 @@ static void scene_faults_are_told(void **state)
                     "5:60: error: the mesh has no uv for the material's image\n");
 }
 
-// What renderer_open says about the picture, at its place in the scene file.
+// What renderer_open says about the texture, at its place in the scene file.
 static void check_refused(const char *expected)
 {
     Scene scene = scene_make(FROM(0, 0, 5), BALL);
@@ -406,22 +406,22 @@ static void check_refused(const char *expected)
     scene_free(&scene);
 }
 
-static void picture_faults_are_told(void **state)
+static void texture_faults_are_reported(void **state)
 {
     (void)state;
-    unlink(picture_path);
+    unlink(texture_path);
     check_refused("No such file");
-    FILE *file = fopen(picture_path, "w");
-    fputs("not a picture", file);
+    FILE *file = fopen(texture_path, "w");
+    fputs("not a texture", file);
     fclose(file);
     check_refused("neither PNG, JPEG, PPM, EXR nor NPY");
-    TestPicture picture = picture_make(3, 2);
-    picture.colors[4][1] = NAN;
-    picture_write(&picture);
+    TestTexture texture = texture_make(3, 2);
+    texture.colors[4][1] = NAN;
+    texture_write(&texture);
     check_refused("a color is not finite");
 }
 
-static void pictures_are_shared(void **state)
+static void textures_are_shared(void **state)
 {
     (void)state;
     Scene scene = scene_of_text(
@@ -447,9 +447,9 @@ int main(void)
         cmocka_unit_test(mirrors_filter_it_too),
         cmocka_unit_test(every_build_gives_the_same_bits),
         cmocka_unit_test(jpeg_is_read),
-        cmocka_unit_test(scene_faults_are_told),
-        cmocka_unit_test(picture_faults_are_told),
-        cmocka_unit_test(pictures_are_shared),
+        cmocka_unit_test(scene_faults_are_reported),
+        cmocka_unit_test(texture_faults_are_reported),
+        cmocka_unit_test(textures_are_shared),
     };
     return cmocka_run_group_tests(tests, textures_open, textures_close);
 }

@@ -1,4 +1,4 @@
-// What must not change a picture, bit for bit: lanes, features built in without need, bands, the region, a
+// What must not change an image, bit for bit: lanes, features built in without need, bands, the region, a
 // repeated run; and what must change it in a known way: the scene's scale, its mirror image.
 #include "host/compile/transform.h"
 #include "host/import/load.h"
@@ -34,8 +34,8 @@ static int variants_close(void **state)
     return probe_close(state);
 }
 
-// A picture with the settings' features as they are.
-static Film picture(const Scene *scene, const RenderSettings *settings)
+// A rendering with the settings' features as they are.
+static Film render(const Scene *scene, const RenderSettings *settings)
 {
     return film_render(&probe_compute, scene, settings, 0);
 }
@@ -49,7 +49,7 @@ static void same_and_freed(Film *film, const Film *expected, const char *what)
 static void scene_has_every_feature(void **state)
 {
     (void)state;
-    // test_textures has pictures on surfaces: a mirror image would have to mirror them too
+    // test_textures has textures: a mirror image would have to mirror them too
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_IMAGES, FEATURE_ALL);
 }
 
@@ -63,7 +63,7 @@ static void lanes_agree(void **state)
             settings.lanes = lane_counts[i];
             char what[64];
             snprintf(what, sizeof what, "%s, %u lanes", precision_names[settings.precision], settings.lanes);
-            Film film = picture(&every_shape, &settings);
+            Film film = render(&every_shape, &settings);
             assert_int_equal(film_count_faulty(&film), 0);
             if (i == 0)
                 expected = film;
@@ -74,7 +74,7 @@ static void lanes_agree(void **state)
     }
 }
 
-static void lanes_agree_behind_the_picture(void **state)
+static void lanes_agree_on_aovs(void **state)
 {
     (void)state;
     const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
@@ -167,9 +167,9 @@ static void features_alone_and_all_together_agree(void **state)
         seen |= feature_scenes[i].features;
 
         settings.extra_features = 0;
-        Film specialised = picture(&scene, &settings);
+        Film specialised = render(&scene, &settings);
         settings.extra_features = FEATURE_ALL;
-        Film general = picture(&scene, &settings);
+        Film general = render(&scene, &settings);
         same_and_freed(&specialised, &general, feature_scenes[i].text);
         film_free(&general);
         scene_free(&scene);
@@ -179,9 +179,9 @@ static void features_alone_and_all_together_agree(void **state)
     // No scene needs checkers alone: built in without need, on an empty scene.
     Scene empty = scene_with_warnings(SCENE_HEAD);
     settings.extra_features = FEATURE_CHECKERS;
-    Film checkers = picture(&empty, &settings);
+    Film checkers = render(&empty, &settings);
     settings.extra_features = FEATURE_ALL;
-    Film general = picture(&empty, &settings);
+    Film general = render(&empty, &settings);
     same_and_freed(&checkers, &general, "checkers alone");
     film_free(&general);
     scene_free(&empty);
@@ -193,9 +193,9 @@ static void bvh_changes_nothing(void **state)
     for (size_t p = 0; p < 2; p++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
         settings.bvh = BVH_OFF;
-        Film expected = picture(&every_shape, &settings);
+        Film expected = render(&every_shape, &settings);
         settings.bvh = BVH_ON;
-        Film film = picture(&every_shape, &settings);
+        Film film = render(&every_shape, &settings);
         same_and_freed(&film, &expected, "through a BVH");
         film_free(&expected);
     }
@@ -206,17 +206,17 @@ static void bands_agree(void **state)
     (void)state;
     static const uint32_t band_rows[] = {1, 7, 32};
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Film expected = picture(&every_shape, &settings);
+    Film expected = render(&every_shape, &settings);
     for (size_t i = 0; i < 3; i++) {
         settings.band_rows = band_rows[i];
         char what[32];
         snprintf(what, sizeof what, "bands of %u rows", band_rows[i]);
-        Film film = picture(&every_shape, &settings);
+        Film film = render(&every_shape, &settings);
         same_and_freed(&film, &expected, what);
     }
     settings.band_rows = 0;
     settings.band_seconds = 1e-9;
-    Film shortest = picture(&every_shape, &settings);
+    Film shortest = render(&every_shape, &settings);
     same_and_freed(&shortest, &expected, "the shortest bands by time");
     film_free(&expected);
 }
@@ -226,16 +226,16 @@ static void launches_of_samples_agree(void **state)
 {
     (void)state;
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Film one = picture(&every_shape, &settings);
+    Film one = render(&every_shape, &settings);
     settings.sample_count = 5;
     settings.band_seconds = 100;
-    Film expected = picture(&every_shape, &settings);
+    Film expected = render(&every_shape, &settings);
     settings.band_seconds = 1e-9;
-    Film apart = picture(&every_shape, &settings);
+    Film apart = render(&every_shape, &settings);
     same_and_freed(&apart, &expected, "5 samples in launches apart");
     settings.band_rows = 7;
     settings.lanes = 1;
-    Film scalar = picture(&every_shape, &settings);
+    Film scalar = render(&every_shape, &settings);
     same_and_freed(&scalar, &expected, "5 samples, bands of 7 rows, 1 lane");
 
     // The samples do something, and no more than soften edges.
@@ -255,7 +255,7 @@ static void regions_are_cuts_of_the_whole(void **state)
         {0, 13, WIDTH, 1},
     };
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Film whole = picture(&every_shape, &settings);
+    Film whole = render(&every_shape, &settings);
     for (size_t i = 0; i < sizeof regions / sizeof *regions; i++) {
         const uint32_t *r = regions[i];
         settings.region_x = r[0];
@@ -264,7 +264,7 @@ static void regions_are_cuts_of_the_whole(void **state)
         settings.region_height = r[3];
         char what[64];
         snprintf(what, sizeof what, "region %u,%u,%u,%u", r[0], r[1], r[2], r[3]);
-        Film part = picture(&every_shape, &settings), expected = film_cut(&whole, r[0], r[1], r[2], r[3]);
+        Film part = render(&every_shape, &settings), expected = film_cut(&whole, r[0], r[1], r[2], r[3]);
         same_and_freed(&part, &expected, what);
         film_free(&expected);
     }
@@ -275,9 +275,9 @@ static void runs_repeat(void **state)
 {
     (void)state;
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_FAST);
-    Film first = picture(&every_shape, &settings);
+    Film first = render(&every_shape, &settings);
     for (unsigned run = 0; run < 5; run++) {
-        Film film = picture(&every_shape, &settings);
+        Film film = render(&every_shape, &settings);
         same_and_freed(&film, &first, "repeated at fast");
     }
     film_free(&first);
@@ -291,14 +291,14 @@ static void scale_changes_nothing(void **state)
     static const int exponents[] = {-90, -40, -20, -10, -3, 3, 10, 20, 40, 90};
     for (size_t p = 0; p < 2; p++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
-        Film expected = picture(&every_shape, &settings);
+        Film expected = render(&every_shape, &settings);
         for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
             Scene scene = scene_of_file("tests/scenes/every_shape.yaml");
             scene_scale(&scene, ldexp(1, exponents[i]));
             char what[64];
             snprintf(what, sizeof what, "%s, scaled by 2^%d", precision_names[settings.precision],
                      exponents[i]);
-            Film film = picture(&scene, &settings);
+            Film film = render(&scene, &settings);
             same_and_freed(&film, &expected, what);
             scene_free(&scene);
         }
@@ -307,7 +307,7 @@ static void scale_changes_nothing(void **state)
 }
 
 // HARDCASES R7.
-static void mirror_gives_the_mirrored_picture(void **state)
+static void mirror_gives_the_mirrored_image(void **state)
 {
     (void)state;
     Scene mirrored = scene_of_file("tests/scenes/every_shape.yaml");
@@ -315,8 +315,8 @@ static void mirror_gives_the_mirrored_picture(void **state)
     for (size_t p = 0; p < 2; p++) {
         for (uint32_t width = WIDTH; width <= WIDTH + 1; width++) {
             RenderSettings settings = film_settings(width, HEIGHT, exact_precisions[p]);
-            Film film = picture(&every_shape, &settings), flipped = film_flipped(&film);
-            Film mirror = picture(&mirrored, &settings);
+            Film film = render(&every_shape, &settings), flipped = film_flipped(&film);
+            Film mirror = render(&mirrored, &settings);
             char what[64];
             snprintf(what, sizeof what, "%s, mirrored, %u wide", precision_names[settings.precision], width);
             same_and_freed(&mirror, &flipped, what);
@@ -340,7 +340,7 @@ static void order_of_objects_changes_nothing(void **state)
         *b = first;
     }
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_STRICT);
-    Film expected = picture(&every_shape, &settings), film = picture(&reversed, &settings);
+    Film expected = render(&every_shape, &settings), film = render(&reversed, &settings);
     same_and_freed(&film, &expected, "objects in reverse");
     film_free(&expected);
     scene_free(&reversed);
@@ -351,7 +351,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scene_has_every_feature),
         cmocka_unit_test(lanes_agree),
-        cmocka_unit_test(lanes_agree_behind_the_picture),
+        cmocka_unit_test(lanes_agree_on_aovs),
         cmocka_unit_test(features_alone_and_all_together_agree),
         cmocka_unit_test(bvh_changes_nothing),
         cmocka_unit_test(bands_agree),
@@ -359,7 +359,7 @@ int main(void)
         cmocka_unit_test(regions_are_cuts_of_the_whole),
         cmocka_unit_test(runs_repeat),
         cmocka_unit_test(scale_changes_nothing),
-        cmocka_unit_test(mirror_gives_the_mirrored_picture),
+        cmocka_unit_test(mirror_gives_the_mirrored_image),
         cmocka_unit_test(order_of_objects_changes_nothing),
     };
     return cmocka_run_group_tests(tests, variants_open, variants_close);

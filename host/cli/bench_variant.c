@@ -85,7 +85,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
         row->flops_per_ray = work_flops_per_ray(variant->scene);
         size_t bytes =
             (size_t)settings->width * settings->height * 3 * (row->wide ? sizeof(double) : sizeof(float));
-        row->picture_bytes = (double)bytes;
+        row->image_bytes = (double)bytes;
     } else {
         row->failure = memory_copy_text(messages.count > 0 ? messages.items[0].text : "unknown");
     }

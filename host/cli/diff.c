@@ -159,7 +159,7 @@ static bool heatmap_make(const DiffOptions *options, const Comparison *compariso
     return written;
 }
 
-static bool pictures_compare(const DiffOptions *options, Comparison *comparison, MessageList *messages)
+static bool images_compare(const DiffOptions *options, Comparison *comparison, MessageList *messages)
 {
     if (!image_read(&comparison->reference, options->reference_path, messages) ||
         !image_read(&comparison->test, options->test_path, messages) ||
@@ -194,7 +194,7 @@ int command_diff(int argument_count, char **arguments)
 
     Comparison comparison = {0};
     MessageList messages = {0};
-    bool compared = pictures_compare(&options, &comparison, &messages);
+    bool compared = images_compare(&options, &comparison, &messages);
     messages_print(&messages, NULL);
     if (compared && options.as_json)
         json_report(&options, &comparison);

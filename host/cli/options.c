@@ -39,7 +39,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
 
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
 {
-    const uint64_t largest = PICTURE_SIDE_LARGEST;
+    const uint64_t largest = IMAGE_SIDE_LARGEST;
     const char *at;
     uint64_t w, h;
     if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||
@@ -206,12 +206,12 @@ RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint3
     };
 }
 
-void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
+void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
 {
     if (*width > 0) return;
     *width = scene->width > 0 ? scene->width : 1280;
     double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
-    double fitting = fmax(1, fmin(round(*width / aspect), PICTURE_SIDE_LARGEST));
+    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_LARGEST));
     *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
 }
 

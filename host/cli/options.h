@@ -68,7 +68,7 @@ enum {
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT
 
-enum { PICTURE_SIDE_LARGEST = 1 << 20, SAMPLES_LARGEST = 1 << 20, BOUNCES_DEFAULT = 5 };
+enum { IMAGE_SIDE_LARGEST = 1 << 20, SAMPLES_LARGEST = 1 << 20, BOUNCES_DEFAULT = 5 };
 
 enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
@@ -107,7 +107,7 @@ RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint3
 
 // The default image size if none is given (width 0): the scene's own, else 1280 wide with the camera frame's
 // aspect ratio, or 16:9.
-void picture_size_choose(const Scene *scene, uint32_t *width, uint32_t *height);
+void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height);
 
 typedef struct {
     DeviceList devices;

@@ -76,8 +76,7 @@ static bool region_read(const char *value, uint32_t region[4])
         errno = 0;
         unsigned long number = strtoul(at, &end, 10);
         bool digit_first = *at >= '0' && *at <= '9';
-        if (!digit_first || errno != 0 || number > PICTURE_SIDE_LARGEST || *end != (i < 3 ? ',' : '\0'))
-            break;
+        if (!digit_first || errno != 0 || number > IMAGE_SIDE_LARGEST || *end != (i < 3 ? ',' : '\0')) break;
         region[i] = (uint32_t)number;
         at = end + 1;
         if (i == 3 && region[2] > 0 && region[3] > 0) return true;
@@ -146,7 +145,7 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
 
 static bool settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
 {
-    picture_size_choose(scene, &options->width, &options->height);
+    image_size_choose(scene, &options->width, &options->height);
     if (!options->has_region) {
         options->region[2] = options->width;
         options->region[3] = options->height;

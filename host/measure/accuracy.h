@@ -1,4 +1,4 @@
-// How far a picture is from a reference, split by what went wrong: another object, another shadow, another
+// How far an image is from a reference, split by what went wrong: another object, another shadow, another
 // path, or the same of all three and other numbers. Works on plain arrays; docs/accuracy.md defines every
 // figure.
 #pragma once
@@ -130,7 +130,7 @@ typedef struct {
     AccuracyPick picks[BUDGET_COUNT];
 } AccuracyScene;
 
-void accuracy_scene_free(AccuracyScene *scene); // with its pictures; and zeroes
+void accuracy_scene_free(AccuracyScene *scene); // with its images; and zeroes
 
 // The plotted figure of a kind, or why there is none.
 Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);

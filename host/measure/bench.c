@@ -84,5 +84,5 @@ Figure bench_peak_fraction(const BenchRow *row, const Peak *peak)
 
 double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak)
 {
-    return row->picture_bytes / bench_kernel(&row->times).median / peak->bytes_per_second;
+    return row->image_bytes / bench_kernel(&row->times).median / peak->bytes_per_second;
 }

@@ -53,7 +53,7 @@ typedef struct {
     uint64_t rays[BENCH_RAY_KINDS];
     bool wide, traverses_bvh; // computes in double; rays traversed a BVH
     double flops_per_ray;     // as work.h counts
-    double picture_bytes;
+    double image_bytes;
 } BenchRow;
 
 void bench_row_free(BenchRow *row);
@@ -63,5 +63,5 @@ double bench_rays_per_second(const BenchRow *row);
 // Of the device's arithmetic: what the rays that look for their closest hit need at least (work.h) against
 // what it could do in that time. Shadow rays, which may stop at the first object, and colors come on top.
 Figure bench_peak_fraction(const BenchRow *row, const Peak *peak);
-// Of the device's bandwidth: writing the picture, the least that must go through memory.
+// Of the device's bandwidth: writing the image, the least that must go through memory.
 double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak);

@@ -110,7 +110,7 @@ typedef struct {
     float weights[2 * RADIUS_LARGEST + 1];
 } Filter;
 
-// Outside the picture its border goes on.
+// Outside the image its border goes on.
 static void filter_across(const Filter *filter, const Plane *in, Plane *out)
 {
     size_t width = in->width, radius = (size_t)filter->radius;
@@ -235,20 +235,20 @@ static Plane feature_strength(const Plane *gray, double (*shape)(double x, doubl
     return across;
 }
 
-// A picture as the eye has it.
+// An image as the eye has it.
 typedef struct {
     Plane ycc[3]; // blurred
     Plane edges, points;
 } Seen;
 
-static Seen seen_open(const float *picture, uint32_t width, uint32_t height)
+static Seen seen_open(const float *image, uint32_t width, uint32_t height)
 {
     Seen seen;
     Plane gray = plane_open(width, height);
     for (int i = 0; i < 3; i++)
         seen.ycc[i] = plane_open(width, height);
     for (size_t i = 0; i < (size_t)width * height; i++) {
-        const float *pixel = picture + 3 * i;
+        const float *pixel = image + 3 * i;
         Triple ycc = ycc_from_rgb((Triple){srgb_decode((double)pixel[0]), srgb_decode((double)pixel[1]),
                                            srgb_decode((double)pixel[2])});
         seen.ycc[0].values[i] = (float)ycc.x;

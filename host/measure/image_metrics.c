@@ -49,15 +49,15 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
 {
     if (reference->width != test->width || reference->height != test->height ||
         reference->channels != test->channels) {
-        message_add(messages, MESSAGE_ERROR,
-                    "the pictures differ in size: %ux%u with %u %s, and %ux%u with %u", reference->width,
-                    reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
-                    test->width, test->height, test->channels);
+        message_add(messages, MESSAGE_ERROR, "the images differ in size: %ux%u with %u %s, and %ux%u with %u",
+                    reference->width, reference->height, reference->channels,
+                    reference->channels == 1 ? "channel" : "channels", test->width, test->height,
+                    test->channels);
         return false;
     }
     if (reference->display != test->display) {
         message_add(messages, MESSAGE_ERROR,
-                    "the pictures differ in kind: the %s holds display values, the other linear light",
+                    "the images differ in kind: the %s holds display values, the other linear light",
                     reference->display ? "first" : "second");
         return false;
     }

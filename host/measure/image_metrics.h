@@ -1,4 +1,4 @@
-// How far a picture is from a reference, in numbers.
+// How far an image is from a reference, in numbers.
 #pragma once
 
 #include "host/base/message.h"
@@ -32,8 +32,8 @@ typedef struct {
 // False, with an error message, where the two differ in size or kind, so that there is nothing to compare.
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages);
 
-// Of comparable pictures. Display values are compared as light: with the sRGB curve undone, whatever curve
-// they were written with, because a screen does so. A picture of 1 channel of display values is gray.
+// Of comparable images. Display values are compared as light: with the sRGB curve undone, whatever curve
+// they were written with, because a screen does so. An image of 1 channel of display values is gray.
 ImageMetrics image_metrics(const Image *reference, const Image *test);
 
 // The largest difference among each pixel's channels, as light; infinite where one is finite and the other is

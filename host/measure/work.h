@@ -1,4 +1,4 @@
-// The arithmetic that a picture needs at least, to hold against what a device can do.
+// The arithmetic that an image needs at least, to hold against what a device can do.
 #pragma once
 
 #include "host/scene/scene.h"

@@ -1,4 +1,4 @@
-// Pictures and rays through glass.
+// Images and rays through glass.
 #include "host/base/memory.h"
 #include "host/verify/families.h"
 #include "host/verify/judge.h"
@@ -35,22 +35,22 @@ void verify_nested_spheres(VerifyRun *run)
         scene.objects.items[1].as.sphere.radius = scale * ratio;
         const Vector3 eye = {1.5 * scale, 2 * scale, 2.5 * scale}, center = {0, 0, 0};
         scene.camera = verify_camera(eye, center, 40);
-        Film picture = verify_render(run, &scene, false, 192, 192);
+        Film image = verify_render(run, &scene, false, 192, 192);
         VerifyTarget coat = verify_target(run, &scene.objects.items[1], eye);
         size_t seen = 0;
-        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            if (picture.object[i] != 1) {
+        for (size_t i = 0; i < film_pixel_count(&image); i++) {
+            if (image.object[i] != 1) {
                 // at the rim the coat may be missed, but the sphere behind it may not be seen without it
-                ReferenceHit exact = verify_pixel_hit(&coat, &picture, i);
+                ReferenceHit exact = verify_pixel_hit(&coat, &image, i);
                 bool certain = exact.found && exact.margin > 1e-5 * coat.radius;
-                run->result->wrong += picture.object[i] != UINT32_MAX || certain;
+                run->result->wrong += image.object[i] != UINT32_MAX || certain;
                 continue;
             }
             seen++;
-            run->result->wrong += picture.path[i] != expected;
+            run->result->wrong += image.path[i] != expected;
         }
         run->result->wrong += seen == 0;
-        film_free(&picture);
+        film_free(&image);
         scene_free(&scene);
     }
 }
@@ -149,17 +149,17 @@ void verify_matched_glass(VerifyRun *run)
     scene_free(&without);
     for (unsigned k = 0; k < sizeof matched / sizeof *matched; k++) {
         Scene scene = matched_scene(matched[k]);
-        Film picture = verify_render(run, &scene, false, 256, 256);
+        Film image = verify_render(run, &scene, false, 256, 256);
         scene_free(&scene);
         size_t through = 0;
-        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            through += picture.object[i] == 1;
+        for (size_t i = 0; i < film_pixel_count(&image); i++) {
+            through += image.object[i] == 1;
             if (edge_distance(&empty, i) < 1e-3) continue;
             for (size_t c = 3 * i; c < 3 * i + 3; c++)
-                verify_note(run, fabs(picture.color[c] - empty.color[c]), 1e-5, "of 1");
+                verify_note(run, fabs(image.color[c] - empty.color[c]), 1e-5, "of 1");
         }
         run->result->wrong += through == 0;
-        film_free(&picture);
+        film_free(&image);
         judge_straight_rays(run, matched[k], 71 + k);
     }
     film_free(&empty);

@@ -1,4 +1,4 @@
-// Pictures of Phong's highlights, from dull to a thousandth of a radian wide.
+// Images of Phong's highlights, from dull to a thousandth of a radian wide.
 #include "host/verify/judge.h"
 #include <math.h>
 #include <stdio.h>
@@ -40,29 +40,29 @@ void verify_highlights(VerifyRun *run)
             scene.camera.look_at = highlight_middle(eye, vector_scale(direction, -1));
             scene.camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
         }
-        Film picture = verify_render(run, &scene, false, 96, 96);
+        Film image = verify_render(run, &scene, false, 96, 96);
         Quad3 to_light =
             quad3_unit((Quad3){-verify_rounded(run, direction.x), -verify_rounded(run, direction.y),
                                -verify_rounded(run, direction.z)});
         size_t seen = 0;
         double brightest = 0;
-        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            double value = picture.color[3 * i];
+        for (size_t i = 0; i < film_pixel_count(&image); i++) {
+            double value = image.color[3 * i];
             run->result->wrong += value < 0 || value > 1 + 0x1p-20;
-            seen += picture.object[i] == 0;
+            seen += image.object[i] == 0;
             brightest = fmax(brightest, value);
-            if (run->tier == TIER_A || picture.object[i] != 0 || power > owed_power) continue;
-            Quad3 normal = quad3_unit(quad3(verify_vector(picture.normal + 3 * i)));
-            Quad3 ray = quad3_unit(quad3(verify_vector(picture.ray + 3 * i)));
+            if (run->tier == TIER_A || image.object[i] != 0 || power > owed_power) continue;
+            Quad3 normal = quad3_unit(quad3(verify_vector(image.normal + 3 * i)));
+            Quad3 ray = quad3_unit(quad3(verify_vector(image.ray + 3 * i)));
             Quad facing = quad3_dot(normal, to_light);
             // whether light that grazes reaches the surface at all is the shadow's matter
             if (quad_absolute(facing) < 16 * verify_roundoff(run)) continue;
             Quad exact = reference_highlight(normal, to_light, quad3_scale(ray, -1), power);
             verify_note(run, (double)quad_absolute(value - exact), owed, "of 1");
         }
-        // closely, the highlight's middle lies in the picture's
+        // closely, the highlight's middle lies in the image's
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);
-        film_free(&picture);
+        film_free(&image);
         scene_free(&scene);
     }
 }

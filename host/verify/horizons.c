@@ -1,16 +1,16 @@
-// Pictures of ground up to its horizon.
+// Images of ground up to its horizon.
 #include "host/verify/judge.h"
 #include <math.h>
 #include <stdlib.h>
 
 // The first row, from the bottom, whose pixel of the column hits nothing; counts what is hit above it.
-static uint32_t column_horizon(VerifyRun *run, const Film *picture, uint32_t column)
+static uint32_t column_horizon(VerifyRun *run, const Film *image, uint32_t column)
 {
-    uint32_t row = picture->height;
-    while (row > 0 && verify_pixel_found(picture, (size_t)(row - 1) * picture->width + column))
+    uint32_t row = image->height;
+    while (row > 0 && verify_pixel_found(image, (size_t)(row - 1) * image->width + column))
         row--;
     for (uint32_t above = 0; above < row; above++)
-        run->result->wrong += verify_pixel_found(picture, (size_t)above * picture->width + column);
+        run->result->wrong += verify_pixel_found(image, (size_t)above * image->width + column);
     return row;
 }
 
@@ -26,27 +26,27 @@ void verify_ground_horizon(VerifyRun *run)
     const Vector3 eye = {0, 1, 0};
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
-        Film picture = verify_render(run, &scene, false, 128, 512);
+        Film image = verify_render(run, &scene, false, 128, 512);
         VerifyTarget ground = verify_target(run, &scene.objects.items[0], eye);
-        for (uint32_t column = 0; column < picture.width; column++) {
-            uint32_t horizon = column_horizon(run, &picture, column), exact = picture.height;
-            for (uint32_t row = picture.height - 1; row > horizon; row--) {
-                size_t pixel = (size_t)row * picture.width + column;
-                run->result->wrong += picture.t[pixel - picture.width] < picture.t[pixel];
+        for (uint32_t column = 0; column < image.width; column++) {
+            uint32_t horizon = column_horizon(run, &image, column), exact = image.height;
+            for (uint32_t row = image.height - 1; row > horizon; row--) {
+                size_t pixel = (size_t)row * image.width + column;
+                run->result->wrong += image.t[pixel - image.width] < image.t[pixel];
             }
             while (exact > 0) {
-                size_t pixel = (size_t)(exact - 1) * picture.width + column;
-                if (!verify_pixel_hit(&ground, &picture, pixel).found) break;
+                size_t pixel = (size_t)(exact - 1) * image.width + column;
+                if (!verify_pixel_hit(&ground, &image, pixel).found) break;
                 exact--;
             }
             verify_note(run, fabs((double)horizon - (double)exact), 1, "rows");
         }
-        film_free(&picture);
+        film_free(&image);
     }
     scene_free(&scene);
 }
 
-// Seen horizontally the plane ends in every column at the picture's middle, whether that lies on a row of
+// Seen horizontally the plane ends in every column at the image's middle, whether that lies on a row of
 // pixels or between two.
 void verify_plane_horizon(VerifyRun *run)
 {
@@ -54,10 +54,10 @@ void verify_plane_horizon(VerifyRun *run)
     const Vector3 eye = {0, 1.7, 0}, ahead = {0, 1.7, 1};
     scene.camera = verify_camera(eye, ahead, 60);
     for (uint32_t height = 511; height <= 512; height++) {
-        Film picture = verify_render(run, &scene, false, 512, height);
-        for (uint32_t column = 0; column < picture.width; column++)
-            run->result->wrong += column_horizon(run, &picture, column) != (height + 1) / 2;
-        film_free(&picture);
+        Film image = verify_render(run, &scene, false, 512, height);
+        for (uint32_t column = 0; column < image.width; column++)
+            run->result->wrong += column_horizon(run, &image, column) != (height + 1) / 2;
+        film_free(&image);
     }
     scene_free(&scene);
 }

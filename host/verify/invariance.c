@@ -1,4 +1,4 @@
-// A scene of every shape, scaled, mirrored and turned: the picture may change in the known way only.
+// A scene of every shape, scaled, mirrored and turned: the image may change in the known way only.
 #include "host/compile/transform.h"
 #include "host/verify/run.h"
 #include <math.h>
@@ -52,26 +52,26 @@ static Scene every_shape_scene(void)
     return scene;
 }
 
-// Counts the objects of a scene that no pixel shows: two empty pictures would be alike.
-static void demand_every_object(VerifyRun *run, const Scene *scene, const Film *picture)
+// Counts the objects of a scene that no pixel shows: two empty images would be alike.
+static void demand_every_object(VerifyRun *run, const Scene *scene, const Film *image)
 {
     for (size_t object = 0; object < scene->objects.count; object++) {
         size_t pixel = 0;
-        while (pixel < film_pixel_count(picture) && picture->object[pixel] != object)
+        while (pixel < film_pixel_count(image) && image->object[pixel] != object)
             pixel++;
-        run->result->wrong += pixel == film_pixel_count(picture);
+        run->result->wrong += pixel == film_pixel_count(image);
     }
 }
 
 typedef struct {
-    const Film *picture;
+    const Film *image;
     double scale; // of lengths
     bool mirrored;
 } View;
 
 static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
 {
-    const Film *b = view->picture;
+    const Film *b = view->image;
     double side = view->mirrored ? -1 : 1, scale = view->scale;
     bool same = a->object[i] == b->object[k] && a->path[i] == b->path[k];
     same &= b->t[k] == a->t[i] * scale;
@@ -87,7 +87,7 @@ static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
     return same;
 }
 
-// Counts the pixels of two pictures that are not each other's, bit for bit but for the sign of a zero.
+// Counts the pixels of two images that are not each other's, bit for bit but for the sign of a zero.
 static void compare(VerifyRun *run, const Film *a, const View *view)
 {
     for (size_t i = 0; i < film_pixel_count(a); i++) {
@@ -100,19 +100,19 @@ void verify_scaled_scenes(VerifyRun *run)
 {
     static const int exponents[] = {-20, -10, -3, 3, 10, 20};
     Scene scene = every_shape_scene();
-    Film picture = verify_render(run, &scene, false, 160, 120);
-    demand_every_object(run, &scene, &picture);
+    Film image = verify_render(run, &scene, false, 160, 120);
+    demand_every_object(run, &scene, &image);
     scene_free(&scene);
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
         double scale = ldexp(1, exponents[i]);
         Scene scaled = every_shape_scene();
         scene_scale(&scaled, scale);
         Film other = verify_render(run, &scaled, i % 2, 160, 120);
-        compare(run, &picture, &(View){&other, scale, false});
+        compare(run, &image, &(View){&other, scale, false});
         film_free(&other);
         scene_free(&scaled);
     }
-    film_free(&picture);
+    film_free(&image);
 }
 
 // Whether a ray, or one turned by a few roundings, meets the object.
@@ -138,31 +138,31 @@ static bool meets_nearby(VerifyRun *run, Renderer *opened, const double directio
     return false;
 }
 
-static bool shadow_edge_beside(const Film *picture, size_t pixel, size_t light)
+static bool shadow_edge_beside(const Film *image, size_t pixel, size_t light)
 {
-    size_t column = pixel % picture->width, row = pixel / picture->width;
-    uint32_t here = picture->shadow[pixel * picture->light_count + light];
-    for (size_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < picture->height; y++)
-        for (size_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < picture->width; x++)
-            if (picture->shadow[(y * picture->width + x) * picture->light_count + light] != here) return true;
+    size_t column = pixel % image->width, row = pixel / image->width;
+    uint32_t here = image->shadow[pixel * image->light_count + light];
+    for (size_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < image->height; y++)
+        for (size_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < image->width; x++)
+            if (image->shadow[(y * image->width + x) * image->light_count + light] != here) return true;
     return false;
 }
 
 // The scene with its axes exchanged. An object may differ where the other one is met within a few roundings
 // of the ray, a shadow at its edge; where neither does, colors are the same within 1e-5.
-static void judge_turned(VerifyRun *run, Renderer *opened, const Film *picture, const Film *turned)
+static void judge_turned(VerifyRun *run, Renderer *opened, const Film *image, const Film *turned)
 {
-    for (size_t i = 0; i < film_pixel_count(picture); i++) {
-        bool same = picture->object[i] == turned->object[i];
-        if (!same) run->result->wrong += !meets_nearby(run, opened, &picture->ray[3 * i], turned->object[i]);
-        for (size_t light = 0; light < picture->light_count && same; light++) {
-            size_t k = i * picture->light_count + light;
-            if (picture->shadow[k] == turned->shadow[k]) continue;
+    for (size_t i = 0; i < film_pixel_count(image); i++) {
+        bool same = image->object[i] == turned->object[i];
+        if (!same) run->result->wrong += !meets_nearby(run, opened, &image->ray[3 * i], turned->object[i]);
+        for (size_t light = 0; light < image->light_count && same; light++) {
+            size_t k = i * image->light_count + light;
+            if (image->shadow[k] == turned->shadow[k]) continue;
             same = false;
-            run->result->wrong += !shadow_edge_beside(picture, i, light);
+            run->result->wrong += !shadow_edge_beside(image, i, light);
         }
         for (size_t k = 3 * i; k < 3 * i + 3 && same; k++)
-            verify_note(run, fabs(picture->color[k] - turned->color[k]), 1e-5, "of 1");
+            verify_note(run, fabs(image->color[k] - turned->color[k]), 1e-5, "of 1");
     }
 }
 
@@ -195,27 +195,27 @@ void verify_mirrored_scenes(VerifyRun *run)
     for (uint32_t width = 511; width <= 512; width++) {
         Scene scene = unchecked_scene(), mirrored = unchecked_scene();
         scene_mirror(&mirrored);
-        Film picture = verify_render(run, &scene, false, width, 128);
-        demand_every_object(run, &scene, &picture);
+        Film image = verify_render(run, &scene, false, width, 128);
+        demand_every_object(run, &scene, &image);
         Film other = verify_render(run, &mirrored, false, width, 128);
-        compare(run, &picture, &(View){&other, 1, true});
-        film_free(&picture);
+        compare(run, &image, &(View){&other, 1, true});
+        film_free(&image);
         film_free(&other);
         scene_free(&scene);
         scene_free(&mirrored);
     }
     Scene scene = plain_scene(), turned = plain_scene();
-    Film picture = verify_render(run, &scene, false, 256, 192);
-    demand_every_object(run, &scene, &picture);
+    Film image = verify_render(run, &scene, false, 256, 192);
+    demand_every_object(run, &scene, &image);
     Renderer *opened = verify_open(run, &scene, false);
     for (unsigned turns = 1; turns < 3; turns++) {
         scene_turn_axes(&turned);
         Film other = verify_render(run, &turned, false, 256, 192);
-        judge_turned(run, opened, &picture, &other);
+        judge_turned(run, opened, &image, &other);
         film_free(&other);
     }
     renderer_close(opened);
-    film_free(&picture);
+    film_free(&image);
     scene_free(&scene);
     scene_free(&turned);
 }

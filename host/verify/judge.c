@@ -67,21 +67,21 @@ static void judge_distance(VerifyRun *run, const ReferenceHit *exact, double t, 
     verify_note_error(run, (double)quad_absolute(t - exact->t) / ulp, bound / ulp);
 }
 
-ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *picture, size_t pixel)
+ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, size_t pixel)
 {
     const Vector3 eye = {0, 0, 0};
-    ReferenceRay ray = reference_ray(eye, verify_vector(&picture->ray[3 * pixel]));
+    ReferenceRay ray = reference_ray(eye, verify_vector(&image->ray[3 * pixel]));
     return reference_hit_object(&target->object, &ray);
 }
 
-ReferenceHit verify_judge_pixel(VerifyRun *run, const VerifyTarget *target, const Film *picture, size_t pixel)
+ReferenceHit verify_judge_pixel(VerifyRun *run, const VerifyTarget *target, const Film *image, size_t pixel)
 {
-    ReferenceHit exact = verify_pixel_hit(target, picture, pixel);
-    if (verify_pixel_found(picture, pixel) != exact.found) {
+    ReferenceHit exact = verify_pixel_hit(target, image, pixel);
+    if (verify_pixel_found(image, pixel) != exact.found) {
         run->result->wrong += !is_open(run, target, &exact);
     } else if (exact.found) {
-        double length = vector_length(verify_vector(&picture->ray[3 * pixel]));
-        judge_distance(run, &exact, picture->t[pixel], bound_of(run, target, &exact, length, NULL));
+        double length = vector_length(verify_vector(&image->ray[3 * pixel]));
+        judge_distance(run, &exact, image->t[pixel], bound_of(run, target, &exact, length, NULL));
     }
     return exact;
 }

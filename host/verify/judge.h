@@ -16,10 +16,9 @@ typedef struct {
 VerifyTarget verify_target(const VerifyRun *run, const Object *object, Vector3 eye);
 
 // What the ray of a pixel should hit of a target.
-ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *picture, size_t pixel);
+ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, size_t pixel);
 // Judges hit or miss and the distance at a pixel of an image of the target alone; returns what is exact.
-ReferenceHit verify_judge_pixel(VerifyRun *run, const VerifyTarget *target, const Film *picture,
-                                size_t pixel);
+ReferenceHit verify_judge_pixel(VerifyRun *run, const VerifyTarget *target, const Film *image, size_t pixel);
 
 // The objects of a scene in the numbers of the precision at work; the caller frees them.
 Object *verify_objects(const VerifyRun *run, const Scene *scene);

@@ -1,4 +1,4 @@
-// Pictures of what is far, thin or pointed: each pixel's hit or miss against the exact one for the ray that
+// Images of what is far, thin or pointed: each pixel's hit or miss against the exact one for the ray that
 // was traced.
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
@@ -10,9 +10,9 @@
 static const Vector3 origin;
 
 // Of rays from the center outward no pixel that is farther out is brighter.
-static void judge_radial_brightness(VerifyRun *run, const Film *picture)
+static void judge_radial_brightness(VerifyRun *run, const Film *image)
 {
-    const uint32_t side = picture->width;
+    const uint32_t side = image->width;
     for (unsigned k = 0; k < 16; k++) {
         double x = cos(k * M_PI / 8), y = sin(k * M_PI / 8), brightness = INFINITY;
         int64_t farthest = -1;
@@ -23,7 +23,7 @@ static void judge_radial_brightness(VerifyRun *run, const Film *picture)
             // the pixels along the way are not quite on it: only those farther out than all before count
             if (dx * dx + dy * dy <= farthest) continue;
             farthest = dx * dx + dy * dy;
-            double value = picture->color[3 * (size_t)(row * side + column)];
+            double value = image->color[3 * (size_t)(row * side + column)];
             run->result->wrong += value > brightness + 2.0 / 255;
             brightness = fmin(brightness, value);
         }
@@ -31,15 +31,15 @@ static void judge_radial_brightness(VerifyRun *run, const Film *picture)
 }
 
 // Each pixel; and Lambert's cosine for light from the eye's side, of which the 99.9th percentile counts.
-static void judge_fringe(VerifyRun *run, const Film *picture, const VerifyTarget *sphere)
+static void judge_fringe(VerifyRun *run, const Film *image, const VerifyTarget *sphere)
 {
-    float *errors = memory_allocate(film_pixel_count(picture), sizeof *errors);
+    float *errors = memory_allocate(film_pixel_count(image), sizeof *errors);
     size_t count = 0;
-    for (size_t i = 0; i < film_pixel_count(picture); i++) {
-        ReferenceHit exact = verify_judge_pixel(run, sphere, picture, i);
-        if (!exact.found || !verify_pixel_found(picture, i)) continue;
+    for (size_t i = 0; i < film_pixel_count(image); i++) {
+        ReferenceHit exact = verify_judge_pixel(run, sphere, image, i);
+        if (!exact.found || !verify_pixel_found(image, i)) continue;
         double shade = fmax((double)exact.normal.z, 0);
-        errors[count++] = (float)fabs(picture->color[3 * i] - shade);
+        errors[count++] = (float)fabs(image->color[3 * i] - shade);
     }
     bool near = sphere->distance <= 1e3;
     if (count > 0 && (near || run->tier > TIER_B))
@@ -56,20 +56,20 @@ void verify_far_fringe(VerifyRun *run)
         double distance = distances[k];
         const Vector3 eye = {0, 0, distance};
         scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
-        Film picture = verify_render(run, &scene, false, 512, 512);
-        judge_radial_brightness(run, &picture);
+        Film image = verify_render(run, &scene, false, 512, 512);
+        judge_radial_brightness(run, &image);
         VerifyTarget sphere = verify_target(run, &scene.objects.items[0], eye);
-        if (run->tier != TIER_A) judge_fringe(run, &picture, &sphere);
-        film_free(&picture);
+        if (run->tier != TIER_A) judge_fringe(run, &image, &sphere);
+        film_free(&image);
     }
     scene_free(&scene);
 }
 
-static void judge_pixels(VerifyRun *run, const Film *picture, const Scene *scene)
+static void judge_pixels(VerifyRun *run, const Film *image, const Scene *scene)
 {
     VerifyTarget target = verify_target(run, &scene->objects.items[0], scene->camera.position);
-    for (size_t i = 0; i < film_pixel_count(picture) && run->tier != TIER_A; i++)
-        verify_judge_pixel(run, &target, picture, i);
+    for (size_t i = 0; i < film_pixel_count(image) && run->tier != TIER_A; i++)
+        verify_judge_pixel(run, &target, image, i);
 }
 
 // Every column has a stretch of pixels without a gap.
@@ -79,18 +79,18 @@ void verify_wire(VerifyRun *run)
         verify_scene("objects:\n  - cylinder: {from: [-10000, 0, 0], to: [10000, 0, 0], radius: 0.001}\n");
     const Vector3 eye = {0, 0, -10};
     scene.camera = verify_camera(eye, origin, 0.293);
-    Film picture = verify_render(run, &scene, false, 1024, 64);
-    judge_pixels(run, &picture, &scene);
-    for (uint32_t column = 0; column < picture.width; column++) {
+    Film image = verify_render(run, &scene, false, 1024, 64);
+    judge_pixels(run, &image, &scene);
+    for (uint32_t column = 0; column < image.width; column++) {
         size_t stretches = 0;
-        for (uint32_t row = 0; row < picture.height; row++) {
-            size_t pixel = (size_t)row * picture.width + column;
-            bool above = row > 0 && verify_pixel_found(&picture, pixel - picture.width);
-            stretches += verify_pixel_found(&picture, pixel) && !above;
+        for (uint32_t row = 0; row < image.height; row++) {
+            size_t pixel = (size_t)row * image.width + column;
+            bool above = row > 0 && verify_pixel_found(&image, pixel - image.width);
+            stretches += verify_pixel_found(&image, pixel) && !above;
         }
         run->result->leaks += stretches != 1;
     }
-    film_free(&picture);
+    film_free(&image);
     scene_free(&scene);
 }
 
@@ -112,16 +112,16 @@ void verify_apex(VerifyRun *run)
         Scene scene = verify_scene(text);
         scene.camera = verify_camera(views[k].eye, origin, 0);
         scene.camera.half_tangent = SIDE * 1e-4 / 2 / 5;
-        Film picture = verify_render(run, &scene, false, SIDE, SIDE);
-        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            if (k == 0) run->result->wrong += !verify_pixel_found(&picture, i) || !(picture.color[3 * i] > 0);
-            if (!verify_pixel_found(&picture, i)) continue;
+        Film image = verify_render(run, &scene, false, SIDE, SIDE);
+        for (size_t i = 0; i < film_pixel_count(&image); i++) {
+            if (k == 0) run->result->wrong += !verify_pixel_found(&image, i) || !(image.color[3 * i] > 0);
+            if (!verify_pixel_found(&image, i)) continue;
             const double u = verify_roundoff(run);
-            double length = vector_length(verify_vector(picture.normal + 3 * i));
+            double length = vector_length(verify_vector(image.normal + 3 * i));
             // a root and a quotient more
             verify_note(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
         }
-        film_free(&picture);
+        film_free(&image);
         scene_free(&scene);
     }
 }
@@ -142,9 +142,9 @@ void verify_far_torus(VerifyRun *run)
         const Vector3 eye = {0.3 * distances[k], 0.4 * distances[k], -0.866 * distances[k]};
         scene.camera = verify_camera(eye, origin, 0);
         scene.camera.half_tangent = 1.3 / distances[k];
-        Film picture = verify_render(run, &scene, false, 160, 160);
-        judge_pixels(run, &picture, &scene);
-        film_free(&picture);
+        Film image = verify_render(run, &scene, false, 160, 160);
+        judge_pixels(run, &image, &scene);
+        film_free(&image);
     }
     scene_free(&scene);
 }
@@ -174,7 +174,7 @@ void verify_tangent_circle(VerifyRun *run)
 
 // Pixels still to be looked at, and those that were.
 typedef struct {
-    const Film *picture;
+    const Film *image;
     uint32_t (*pending)[2]; // column, row
     size_t pending_count;
     bool *seen;
@@ -182,8 +182,8 @@ typedef struct {
 
 static bool flood_take(Flood *flood, uint32_t column, uint32_t row)
 {
-    size_t pixel = (size_t)row * flood->picture->width + column;
-    if (flood->seen[pixel] || !verify_pixel_found(flood->picture, pixel)) return false;
+    size_t pixel = (size_t)row * flood->image->width + column;
+    if (flood->seen[pixel] || !verify_pixel_found(flood->image, pixel)) return false;
     flood->seen[pixel] = true;
     uint32_t *place = flood->pending[flood->pending_count++];
     place[0] = column;
@@ -193,24 +193,24 @@ static bool flood_take(Flood *flood, uint32_t column, uint32_t row)
 
 static void flood_run(Flood *flood)
 {
-    const Film *picture = flood->picture;
+    const Film *image = flood->image;
     while (flood->pending_count > 0) {
         const uint32_t *place = flood->pending[--flood->pending_count];
         uint32_t column = place[0], row = place[1];
-        for (uint32_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < picture->height; y++)
-            for (uint32_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < picture->width; x++)
+        for (uint32_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < image->height; y++)
+            for (uint32_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < image->width; x++)
                 flood_take(flood, x, y);
     }
 }
 
 // How many parts the hit pixels fall into, where those that touch at a corner belong together.
-static size_t count_parts(const Film *picture)
+static size_t count_parts(const Film *image)
 {
-    size_t parts = 0, pixels = film_pixel_count(picture);
-    Flood flood = {picture, memory_allocate(pixels, sizeof *flood.pending), 0,
+    size_t parts = 0, pixels = film_pixel_count(image);
+    Flood flood = {image, memory_allocate(pixels, sizeof *flood.pending), 0,
                    memory_allocate_zeroed(pixels, sizeof *flood.seen)};
-    for (uint32_t row = 0; row < picture->height; row++)
-        for (uint32_t column = 0; column < picture->width; column++) {
+    for (uint32_t row = 0; row < image->height; row++)
+        for (uint32_t column = 0; column < image->width; column++) {
             if (!flood_take(&flood, column, row)) continue;
             parts++;
             flood_run(&flood);
@@ -220,7 +220,7 @@ static size_t count_parts(const Film *picture)
     return parts;
 }
 
-// At 30 degrees the ring is half a pixel thick, so that the exact one has gaps as well; the second picture,
+// At 30 degrees the ring is half a pixel thick, so that the exact one has gaps as well; the second image,
 // where it is 1.4 pixels thick, has none.
 void verify_thin_ring(VerifyRun *run)
 {
@@ -232,10 +232,10 @@ void verify_thin_ring(VerifyRun *run)
     Scene scene = torus_scene(0.001);
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, origin, views[k].fov);
-        Film picture = verify_render(run, &scene, false, views[k].side, views[k].side);
-        judge_pixels(run, &picture, &scene);
-        if (k == 1) run->result->leaks += count_parts(&picture) != 1;
-        film_free(&picture);
+        Film image = verify_render(run, &scene, false, views[k].side, views[k].side);
+        judge_pixels(run, &image, &scene);
+        if (k == 1) run->result->leaks += count_parts(&image) != 1;
+        film_free(&image);
     }
     scene_free(&scene);
 }

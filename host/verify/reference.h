@@ -67,7 +67,7 @@ ReferenceSurface reference_surface(const Object *object, Quad3 point);
 Quad reference_surface_distance(const ReferenceSurface *surface); // that of its nearest sheet
 
 // Phong's highlight, max(0, R . V)^shininess, for unit vectors (B. T. Phong, "Illumination for Computer
-// Generated Pictures", CACM 18(6), 1975); 0 where the light is behind the surface.
+// Generated Images", CACM 18(6), 1975); 0 where the light is behind the surface.
 Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shininess);
 
 // The unit of the last place of a number with this many significant bits: 24 for float, 53 for double.

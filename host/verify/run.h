@@ -89,9 +89,9 @@ Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // 
 // failed.
 Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height);
 
-static inline bool verify_pixel_found(const Film *picture, size_t pixel)
+static inline bool verify_pixel_found(const Film *image, size_t pixel)
 {
-    return picture->object[pixel] != UINT32_MAX;
+    return image->object[pixel] != UINT32_MAX;
 }
 
 static inline Vector3 verify_vector(const double *parts)

@@ -1,4 +1,4 @@
-// Pictures of shadows: none where nothing stands in the light, and none missing.
+// Images of shadows: none where nothing stands in the light, and none missing.
 #include "host/base/array.h"
 #include "host/verify/judge.h"
 #include <math.h>
@@ -26,17 +26,17 @@ void verify_plane_acne(VerifyRun *run)
             scene.lights.items[0].direction = vector_scale(to_light, -1);
             scene.objects.items[0].as.plane.point = point;
             scene.camera = verify_camera(eye, point, 60);
-            Film picture = verify_render(run, &scene, false, 128, 128);
+            Film image = verify_render(run, &scene, false, 128, 128);
             Vector3 direction = vector_normalize(scene.lights.items[0].direction);
             Quad3 stored = {verify_rounded(run, direction.x), verify_rounded(run, direction.y),
                             verify_rounded(run, direction.z)};
             Quad cosine = -quad3_dot(quad3_unit(quad3(normal)), stored);
             double least = INFINITY, most = 0;
-            for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-                run->result->leaks += picture.object[i] != 0;
-                run->result->wrong += picture.shadow[i] != 0;
-                least = fmin(least, picture.color[3 * i]);
-                most = fmax(most, picture.color[3 * i]);
+            for (size_t i = 0; i < film_pixel_count(&image); i++) {
+                run->result->leaks += image.object[i] != 0;
+                run->result->wrong += image.shadow[i] != 0;
+                least = fmin(least, image.color[3 * i]);
+                most = fmax(most, image.color[3 * i]);
             }
             run->result->wrong += !(least > 0);
             verify_note(run, (most - least) / verify_ulp(run, most), 2, "ulp");
@@ -44,7 +44,7 @@ void verify_plane_acne(VerifyRun *run)
             verify_note(run,
                         (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u,
                         8, "u");
-            film_free(&picture);
+            film_free(&image);
             scene_free(&scene);
         }
     }
@@ -62,19 +62,19 @@ void verify_thin_plate(VerifyRun *run)
         scene.camera = verify_camera(eye, center, 40);
         scene.lights.items[0].position.z = light_above ? 2 : -2;
         scene.lights.items[1].direction.z = light_above ? -1 : 1;
-        Film picture = verify_render(run, &scene, false, 256, 256);
+        Film image = verify_render(run, &scene, false, 256, 256);
         size_t seen = 0;
-        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            if (picture.object[i] == UINT32_MAX) continue;
+        for (size_t i = 0; i < film_pixel_count(&image); i++) {
+            if (image.object[i] == UINT32_MAX) continue;
             seen++;
-            const double *color = picture.color + 3 * i;
+            const double *color = image.color + 3 * i;
             if (above == light_above)
-                run->result->wrong += !(color[0] > 0) || picture.shadow[2 * i] || picture.shadow[2 * i + 1];
+                run->result->wrong += !(color[0] > 0) || image.shadow[2 * i] || image.shadow[2 * i + 1];
             else
-                run->result->leaks += color[0] != 0 || !picture.shadow[2 * i] || !picture.shadow[2 * i + 1];
+                run->result->leaks += color[0] != 0 || !image.shadow[2 * i] || !image.shadow[2 * i + 1];
         }
         run->result->wrong += seen == 0;
-        film_free(&picture);
+        film_free(&image);
     }
     scene_free(&scene);
 }
@@ -109,28 +109,28 @@ void verify_contact_shadow(VerifyRun *run)
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         const Vector3 eye = views[k].eye;
         scene.camera = verify_camera(eye, touched, views[k].fov);
-        Film picture = verify_render(run, &scene, false, 384, 384);
+        Film image = verify_render(run, &scene, false, 384, 384);
         Quad3 to_light = quad3(vector_subtract(light, eye)), ground = quad3(vector_subtract(touched, eye));
         VerifyTarget targets[] = {verify_target(run, &scene.objects.items[0], eye),
                                   verify_target(run, &scene.objects.items[1], eye)};
-        for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-            Quad3 direction = quad3(verify_vector(picture.ray + 3 * i));
-            bool dark = picture.shadow[i];
-            ReferenceHit plane = verify_pixel_hit(&targets[0], &picture, i);
-            ReferenceHit sphere = verify_pixel_hit(&targets[1], &picture, i);
-            judge_nearest(run, picture.object[i], &plane, &sphere);
-            if (picture.object[i] == 0 && plane.found) {
+        for (size_t i = 0; i < film_pixel_count(&image); i++) {
+            Quad3 direction = quad3(verify_vector(image.ray + 3 * i));
+            bool dark = image.shadow[i];
+            ReferenceHit plane = verify_pixel_hit(&targets[0], &image, i);
+            ReferenceHit sphere = verify_pixel_hit(&targets[1], &image, i);
+            judge_nearest(run, image.object[i], &plane, &sphere);
+            if (image.object[i] == 0 && plane.found) {
                 Vector3 p = quad3_rounded(quad3_subtract(quad3_scale(direction, plane.t), ground));
                 double radius = hypot(p.x, p.z);
                 run->result->leaks += !dark && radius < edge * (1 - 1e-5);
                 run->result->wrong += dark && radius > edge * (1 + 1e-5);
-            } else if (picture.object[i] == 1 && sphere.found) {
+            } else if (image.object[i] == 1 && sphere.found) {
                 Quad3 p = quad3_scale(direction, sphere.t);
                 Quad facing = quad3_dot(sphere.normal, quad3_unit(quad3_subtract(to_light, p)));
                 run->result->wrong += quad_absolute(facing) > 1e-5 && dark != (facing < 0);
             }
         }
-        film_free(&picture);
+        film_free(&image);
     }
     scene_free(&scene);
 }

@@ -206,14 +206,14 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *
     renderer_close(opened);
 }
 
-static bool is_pixel_sound(const VerifyRun *run, const Film *picture, size_t i)
+static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
 {
-    const double *color = &picture->color[3 * i], *normal = &picture->normal[3 * i];
+    const double *color = &image->color[3 * i], *normal = &image->normal[3 * i];
     if (!is_finite(color) || color[0] < 0 || color[1] < 0 || color[2] < 0) return false;
-    if (!is_finite(&picture->ray[3 * i])) return false;
-    if (picture->object[i] == UINT32_MAX) return isinf(picture->t[i]);
-    if (!(picture->t[i] > 0) || !isfinite(picture->t[i])) return false;
-    if (!is_finite(normal) || !is_finite(&picture->position[3 * i])) return false;
+    if (!is_finite(&image->ray[3 * i])) return false;
+    if (image->object[i] == UINT32_MAX) return isinf(image->t[i]);
+    if (!(image->t[i] > 0) || !isfinite(image->t[i])) return false;
+    if (!is_finite(normal) || !is_finite(&image->position[3 * i])) return false;
     return run->tier == TIER_A || is_unit(run, normal);
 }
 

@@ -1,4 +1,4 @@
-// Pictures by cameras whose numbers are extreme or say too little.
+// Images by cameras whose numbers are extreme or say too little.
 #include "host/verify/run.h"
 #include <math.h>
 #include <stdlib.h>
@@ -24,9 +24,9 @@ static Film view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Ve
     Scene scene = tiled_scene(place);
     scene.camera = verify_camera(eye, look_at, fov);
     scene.camera.up = up;
-    Film picture = verify_render(run, &scene, false, SIDE, SIDE);
+    Film image = verify_render(run, &scene, false, SIDE, SIDE);
     scene_free(&scene);
-    return picture;
+    return image;
 }
 
 static void compare(VerifyRun *run, const Film *a, const Film *b)
@@ -50,15 +50,15 @@ static void judge_views_without_up(VerifyRun *run)
         Film expected = view(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
         const Vector3 ups[] = {toward, vector_scale(toward, -0.5), {0, 0, 0}};
         for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
-            Film picture = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
-            compare(run, &picture, &expected);
-            film_free(&picture);
+            Film image = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
+            compare(run, &image, &expected);
+            film_free(&image);
         }
         if (k == 0) {
             // nearly along the view is not along it
-            Film picture = view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
-            compare(run, &picture, &expected);
-            film_free(&picture);
+            Film image = view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
+            compare(run, &image, &expected);
+            film_free(&image);
         }
         film_free(&expected);
     }
@@ -68,20 +68,20 @@ static void judge_views_without_up(VerifyRun *run)
 static void judge_tiles(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, eye = {0.3, 5, 0.4}, below = {0.3, 0, 0.4}, up = {0, 1, 0};
-    Film picture = view(run, here, eye, below, up, 60);
+    Film image = view(run, here, eye, below, up, 60);
     size_t counts[2] = {0};
-    for (size_t i = 0; i < film_pixel_count(&picture); i++) {
-        if (picture.object[i] != 0) continue;
-        const double *d = picture.ray + 3 * i;
+    for (size_t i = 0; i < film_pixel_count(&image); i++) {
+        if (image.object[i] != 0) continue;
+        const double *d = image.ray + 3 * i;
         double x = eye.x - eye.y * d[0] / d[1], z = eye.z - eye.y * d[2] / d[1];
         if (fmin(fabs(x - round(x)), fabs(z - round(z))) < 1e-5) continue;
-        bool even = fmod(floor(x) + floor(z), 2) == 0, white = picture.color[3 * i] > 0.75;
+        bool even = fmod(floor(x) + floor(z), 2) == 0, white = image.color[3 * i] > 0.75;
         // which of the colors comes first is the plane's own affair
         counts[white == even]++;
     }
     run->result->wrong += counts[0] < counts[1] ? counts[0] : counts[1];
     run->result->wrong += counts[0] + counts[1] == 0;
-    film_free(&picture);
+    film_free(&image);
 }
 
 // From nearly no field of view to nearly all there is, far from the origin, and a single pixel.
@@ -91,9 +91,9 @@ static void judge_extremes(VerifyRun *run)
     static const double fovs[] = {1e-3, 179.9};
     const size_t middle = (SIDE * SIDE - 1) / 2;
     for (size_t i = 0; i < sizeof fovs / sizeof *fovs; i++) {
-        Film picture = view(run, here, eye, here, up, fovs[i]);
-        run->result->wrong += picture.object[middle] != 1 || !(picture.color[3 * middle] > 0);
-        film_free(&picture);
+        Film image = view(run, here, eye, here, up, fovs[i]);
+        run->result->wrong += image.object[middle] != 1 || !(image.color[3 * middle] > 0);
+        film_free(&image);
     }
     Film near = view(run, here, eye, here, up, 40);
     Film away = view(run, far, vector_add(far, eye), far, up, 40);

@@ -1,4 +1,4 @@
-"""Scenes for the oracle: what the YAML of docs/scene-format.md says, without meshes and pictures on surfaces.
+"""Scenes for the oracle: what the YAML of docs/scene-format.md says, without meshes and images on surfaces.
 
 As docs/verify.md tells it, the eye is subtracted in double, then each number is rounded once to the precision; what is
 left is exact."""

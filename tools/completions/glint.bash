@@ -33,7 +33,7 @@ _glint() {
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
     --device) words="cpu gpu" ;;
-    --aov) words="t normal position object shadow ray path color" ;;
+    --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
     --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance) return ;;
     esac

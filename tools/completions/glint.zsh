@@ -1,23 +1,27 @@
 #compdef glint
 # Completion of glint for zsh; the options of each subcommand are checked against its --help by tests/man_options.sh.
 
+_glint_aovs() {
+    _sequence "$@" compadd - ${(f)"$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p')"}
+}
+
 _glint_render() {
     _arguments \
-        '(-o --output)'{-o,--output}'[where the picture goes]:picture:_files -g "*.(png|ppm|exr|npy)"' \
+        '(-o --output)'{-o,--output}'[image file to write]:image:_files -g "*.(png|ppm|exr|npy)"' \
         '--size[width and height in pixels]:WxH:' \
         '--samples[rays for each pixel]:number:' \
-        '--region[pixels of the whole picture to render]:X,Y,W,H:' \
+        '--region[pixels of the whole image to render]:X,Y,W,H:' \
         '--device[device to render on]:device:(cpu gpu)' \
-        '--precision[how exactly to compute]:precision:(fast single strict double)' \
-        '--lanes[pixels a work-item carries at once]:lanes:(1 4 8 16)' \
+        '--precision[arithmetic]:precision:(fast single strict double)' \
+        '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--bvh[use a BVH]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
-        '--aov[other things than the picture]:kinds:_sequence compadd - t normal position object shadow ray path color' \
-        '--timing=-[how long each stage took]::form:(json)' \
+        '--aov[more files beside the image]:names:_glint_aovs' \
+        '--timing=-[report the time of every stage]::form:(json)' \
         '--transfer[curve from linear light to display values]:curve:(srgb none)' \
-        '--bits[bits a channel]:bits:(8 16)' \
+        '--bits[bits per channel]:bits:(8 16)' \
         '--no-cache[build the kernel anew]' \
-        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
+        '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '--quiet[no progress]' \
         '(- *)'{-h,--help}'[list the options]' \
@@ -29,11 +33,11 @@ _glint_trace() {
         '--rays[file of rays]:rays:_files' \
         '(-o --output)'{-o,--output}'[where the CSV goes]:file:_files' \
         '--device[device to trace on]:device:(cpu gpu)' \
-        '--precision[how exactly to compute]:precision:(fast single strict double)' \
-        '--lanes[rays a work-item carries at once]:lanes:(1 4 8 16)' \
+        '--precision[arithmetic]:precision:(fast single strict double)' \
+        '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--bvh[use a BVH]:choice:(auto on off)' \
         '--no-cache[build the kernel anew]' \
-        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
+        '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
@@ -56,10 +60,10 @@ _glint_devices() {
 _glint_verify() {
     _arguments \
         '--device[device to verify]:device:(cpu gpu)' \
-        '--precision[how exactly to compute]:precision:(fast single strict double)' \
-        '--lanes[rays a work-item carries at once]:lanes:(1 4 8 16)' \
+        '--precision[arithmetic]:precision:(fast single strict double)' \
+        '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--no-cache[build the kernels anew]' \
-        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
+        '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--lean[build small kernels, for a slow compiler]' \
         '--json[print JSON]' \
         '(- *)'{-h,--help}'[list the options]'
@@ -67,23 +71,23 @@ _glint_verify() {
 
 _glint_diff() {
     _arguments \
-        '--heatmap[picture of the differences]:picture:_files -g "*.(png|ppm|exr|npy)"' \
+        '--heatmap[image of the differences]:image:_files -g "*.(png|ppm|exr|npy)"' \
         '--json[print JSON]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:reference:_files -g "*.(png|ppm|exr|npy)"' \
-        '2:picture:_files -g "*.(png|ppm|exr|npy)"'
+        '2:image:_files -g "*.(png|ppm|exr|npy)"'
 }
 
 _glint_bench() {
     _arguments \
-        '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
-        '--lanes[pixels a work-item carries at once]:list:_sequence compadd - 1 4 8 16' \
+        '--precision[arithmetic]:list:_sequence compadd - fast single strict double' \
+        '--lanes[rays per work-item]:list:_sequence compadd - 1 4 8 16' \
         '--bvh[use a BVH]:list:_sequence compadd - auto on off' \
         '--size[width and height in pixels]:WxH:' \
-        '--seconds[end the runs after so long]:seconds:' \
+        '--seconds[stop the runs after this many seconds]:seconds:' \
         '--launches[list the launches of the last runs]' \
         '--json[print JSON]' \
-        '--compare[hold against an earlier report]:report:_files -g "*.json"' \
+        '--compare[compare with an earlier report]:report:_files -g "*.json"' \
         '--tolerance[new time over old that passes]:ratio:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--lenient[skip unknown elements of a .rt scene]' \
@@ -93,18 +97,18 @@ _glint_bench() {
 
 _glint_accuracy() {
     _arguments \
-        '--reference[linear colors to compare with]:picture:_files -g "*.(exr|npy)"' \
-        '--precision[how exactly to compute]:list:_sequence compadd - fast single strict double' \
-        '--lanes[pixels a work-item carries at once]:list:_sequence compadd - 1 4 8 16' \
+        '--reference[linear colors to compare with]:image:_files -g "*.(exr|npy)"' \
+        '--precision[arithmetic]:list:_sequence compadd - fast single strict double' \
+        '--lanes[rays per work-item]:list:_sequence compadd - 1 4 8 16' \
         '--bvh[use a BVH]:list:_sequence compadd - auto on off' \
         '--samples[rays for each pixel]:list:' \
         '--bounces[reflections and refractions at most]:number:' \
         '--size[width and height in pixels]:WxH:' \
-        '--seconds[end the runs after so long]:seconds:' \
+        '--seconds[stop the runs after this many seconds]:seconds:' \
         '--save[where all that is compared goes]:folder:_files -/' \
         '--html[self-contained HTML report]:file:_files -g "*.html"' \
         '--json[print JSON]' \
-        '--perturb[err as other devices may]:SEED[\:SCALE]:' \
+        '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
@@ -113,13 +117,13 @@ _glint_accuracy() {
 
 _glint() {
     local -a subcommands=(
-        'render:render a picture'
+        'render:render an image'
         'trace:shoot explicit rays'
         'check:read a scene without rendering it'
         'devices:list the OpenCL devices'
-        'diff:tell how far apart two pictures are'
-        'bench:tell how fast this device renders scenes'
-        'accuracy:tell how fast and how exact each way of rendering is'
+        'diff:compare two images'
+        'bench:benchmark scenes on this device'
+        'accuracy:report time and error of every configuration'
         'verify:run the hard cases on a device'
     )
     if ((CURRENT == 2)); then

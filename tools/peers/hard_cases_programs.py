@@ -68,13 +68,13 @@ class Embree:
 
 
 class Glint:
-    """Of pictures alone: what glint makes of rays, glint verify tells."""
+    """Of images alone: what glint makes of rays, glint verify tells."""
 
     def __init__(self, program, precision):
         self.program, self.precision, self.name = program, precision, f"glint {precision}"
 
-    def render(self, scene, picture, size):
-        command = [self.program, "render", scene, "-o", picture, "--quiet", "--precision", self.precision]
+    def render(self, scene, image, size):
+        command = [self.program, "render", scene, "-o", image, "--quiet", "--precision", self.precision]
         command += ["--size", "{}x{}".format(*size), "--transfer", "none"]
         subprocess.run(command, capture_output=True, check=True)
 

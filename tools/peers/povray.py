@@ -55,8 +55,8 @@ def write_scene(scene, path, size):
             write_mesh(write, mesh)
 
 
-def command(scene_path, picture, size):
-    return ["povray", f"+I{scene_path}", f"+O{picture}", f"+W{size[0]}", f"+H{size[1]}", "+FP", "-D", "-V", "-A",
+def command(scene_path, image, size):
+    return ["povray", f"+I{scene_path}", f"+O{image}", f"+W{size[0]}", f"+H{size[1]}", "+FP", "-D", "-V", "-A",
             "File_Gamma=1.0"]
 
 

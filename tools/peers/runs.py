@@ -1,4 +1,4 @@
-"""Runs programs, and compares the pictures that they leave."""
+"""Runs programs, and compares the images that they leave."""
 import collections
 import concurrent.futures
 import operator
@@ -35,7 +35,7 @@ def run_once(command, environment=None):
 
 
 def read_ppm(path):
-    """The bytes of a picture of 8 bits a channel."""
+    """The bytes of an image of 8 bits a channel."""
     content, at, words = path.read_bytes(), 0, []
     while len(words) < 4:
         end = content.index(b"\n", at)
@@ -45,7 +45,7 @@ def read_ppm(path):
     return content[at:]
 
 
-def picture_difference(path, other_path):
+def image_difference(path, other_path):
     """Mean and largest absolute difference in 255ths; which part of all channels is off by more than 16 of them, and
     which part of the pixels by more than 2 in some channel."""
     off = bytes(map(abs, map(operator.sub, read_ppm(path), read_ppm(other_path))))

@@ -10,7 +10,7 @@ def place(values):
 
 
 def frustum(scene, size):
-    """The picture's left, right, bottom and top at a distance of 1, half a pixel off to the left and down: Tachyon's
+    """The image's left, right, bottom and top at a distance of 1, half a pixel off to the left and down: Tachyon's
     rays go through the upper right corners of the pixels, those of the others through the centers."""
     top, half_pixel = scene.half_tangent(), scene.half_tangent() / size[1]
     right = top * size[0] / size[1]
@@ -57,10 +57,10 @@ def write_scene(scene, path, size):
         write("End_Scene\n")
 
 
-def command(scene_path, picture, size):
+def command(scene_path, image, size):
     """Depth 6, the eye's ray counted, is glint's five bounces."""
     return ["tachyon", scene_path, "-res", str(size[0]), str(size[1]), "-shade_phong", "-raydepth", "6",
-            "-format", "PPM", "-o", picture]
+            "-format", "PPM", "-o", image]
 
 
 def stage_seconds(stdout, _stderr):

@@ -1,4 +1,4 @@
-// The scene of a description by Embree, on all cores: the time of a frame, and the picture.
+// The scene of a description by Embree, on all cores: the time of a frame, and the image.
 #include "packet.h"
 #include "spheres.h"
 
@@ -23,9 +23,9 @@ static const char usage[] =
     "  --quality Q     of the BVH: low, medium or high (default: high)\n"
     "  --tile N        pixels along the side of a thread's share of work, a multiple of 4 (default: 32)\n"
     "  --threads N     default: one a core\n"
-    "  --size WxH      of the picture (default: 1920x1080)\n"
+    "  --size WxH      of the image (default: 1920x1080)\n"
     "  --seconds MAX   stop after so long (default: 2), but not before 5 frames\n"
-    "  -o FILE         the picture as .ppm, cut at white, or .npy\n";
+    "  -o FILE         the image as .ppm, cut at white, or .npy\n";
 
 typedef struct {
     const char *description, *output;

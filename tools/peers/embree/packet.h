@@ -29,5 +29,5 @@ typedef struct {
     float *film; // height * width * 3, from the top left
 } Renderer;
 
-// Of the pixels from x, y on that are in the picture.
+// Of the pixels from x, y on that are in the image.
 void packet_render(const Renderer *renderer, unsigned x, unsigned y);

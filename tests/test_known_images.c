@@ -18,7 +18,7 @@
 static Scene scene_of(const char *text)
 {
     MessageList messages = {0};
-    Source source = {"picture.yaml", text, strlen(text)};
+    Source source = {"image.yaml", text, strlen(text)};
     Scene scene;
     bool read = scene_read_yaml(&scene, &source, &messages);
     if (!read) message_list_print(&messages, stderr);

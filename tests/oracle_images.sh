@@ -1,5 +1,5 @@
 #!/bin/bash
-# Small pictures of every shape and light, of mirrors and glass, at each precision, pixel by pixel against the exact
+# Small images of every shape and light, of mirrors and glass, at each precision, pixel by pixel against the exact
 # oracle.
 # With GLINT_LONG_TESTS=1 also larger ones of each shape by itself (some minutes).
 # Takes the program from BUILD: the kernels are the same in every build, so that the first build's run is enough.
@@ -8,9 +8,9 @@
 python_with flint=python-flint==0.9.0 yaml=PyYAML==6.0.3 numpy=numpy==2.4.6
 long=
 [ "${GLINT_LONG_TESTS-}" != 1 ] || long=--long
-if "$python" -B tests/oracle/pictures.py "${BUILD:-build}/glint" "$scratch" $long; then
+if "$python" -B tests/oracle/images.py "${BUILD:-build}/glint" "$scratch" $long; then
     pass
 else
-    fail "pictures are what the oracle says"
+    fail "images are what the oracle says"
 fi
 finish

@@ -1,4 +1,4 @@
-"""The hard cases that are pictures, for tools/peers/hard-cases: each is a question to a program, answered pixel by
+"""The hard cases that are images, for tools/peers/hard-cases: each is a question to a program, answered pixel by
 pixel."""
 import json
 import pathlib
@@ -46,7 +46,7 @@ class Camera:
 
 
 class Look:
-    """Of every object in a picture: what it gives off by itself, what it scatters, and its highlight."""
+    """Of every object in an image: what it gives off by itself, what it scatters, and its highlight."""
 
     def __init__(self, ambient=0.0, diffuse=0.0, specular=0.0, shininess=1.0):
         self.ambient, self.diffuse, self.specular, self.shininess = ambient, diffuse, specular, shininess
@@ -57,19 +57,19 @@ def draw(program, camera, objects, look, light=None):
     it travels, a place far up that way, a place it passes), and its intensity."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        scene, picture = folder / "scene", folder / "picture.ppm"
+        scene, image = folder / "scene", folder / "image.ppm"
         if isinstance(program, Povray):
             scene.write_text(povray_scene(program, camera, objects, look, light))
-            povray([f"+I{scene}", f"+O{picture}", *(f"+{k}{n}" for k, n in zip("WH", camera.size))])
+            povray([f"+I{scene}", f"+O{image}", *(f"+{k}{n}" for k, n in zip("WH", camera.size))])
         elif isinstance(program, Tachyon):
             scene.write_text(tachyon_scene(program, camera, objects, look, light))
-            tachyon([scene, "-o", picture])
+            tachyon([scene, "-o", image])
         elif isinstance(program, Glint):
             scene.with_suffix(".yaml").write_text(glint_scene(camera, objects, look, light))
-            program.render(scene.with_suffix(".yaml"), picture, camera.size)
+            program.render(scene.with_suffix(".yaml"), image, camera.size)
         else:
             raise NotModelled("leaves shading and secondary rays to the caller")
-        return picture.read_bytes()[-3 * camera.size[0] * camera.size[1] :][::3]
+        return image.read_bytes()[-3 * camera.size[0] * camera.size[1] :][::3]
 
 
 def povray_scene(program, camera, objects, look, light):
@@ -282,8 +282,8 @@ def transformed(value, function):
 
 
 def scales(program):
-    """R6: the picture of the scene 2^k times as large is the same, bit for bit."""
-    pictures = []
+    """R6: the image of the scene 2^k times as large is the same, bit for bit."""
+    images = []
     for k in (0, -20, -10, -3, 3, 10, 20):
         def scaled(vector, factor=2.0**k):
             return [x * factor for x in vector]
@@ -293,15 +293,15 @@ def scales(program):
             if "radius" in body:
                 body["radius"] *= 2.0**k
         camera = Camera(scaled([1, 1, 5]), [0, 0, 0], 0.375, (64, 48))
-        pictures.append(draw(program, camera, objects, Look(0.125, 0.75), ("point", scaled([3, 5, 4]), 0.75)))
-    for picture in pictures[1:]:
-        yield from ("pixels changed by scale" if a != b else None for a, b in zip(picture, pictures[0]))
+        images.append(draw(program, camera, objects, Look(0.125, 0.75), ("point", scaled([3, 5, 4]), 0.75)))
+    for image in images[1:]:
+        yield from ("pixels changed by scale" if a != b else None for a, b in zip(image, images[0]))
 
 
 def mirrored(program):
-    """R7: the mirrored scene gives the mirrored picture, bit for bit."""
+    """R7: the mirrored scene gives the mirrored image, bit for bit."""
     for width in (64, 63):
-        pictures = []
+        images = []
         for sign in (1, -1):
             def turned(vector, sign=sign):
                 return [sign * vector[0], *vector[1:]]
@@ -311,8 +311,8 @@ def mirrored(program):
                 if "min" in body and sign < 0:
                     body["min"][0], body["max"][0] = body["max"][0], body["min"][0]
             camera = Camera([0, 1, 5], [0, 0, 0], 0.375, (width, 48))
-            pictures.append(draw(program, camera, objects, Look(0.125, 0.75), ("point", turned([3, 5, 4]), 0.75)))
-        first, second = ([picture[i : i + width] for i in range(0, len(picture), width)] for picture in pictures)
+            images.append(draw(program, camera, objects, Look(0.125, 0.75), ("point", turned([3, 5, 4]), 0.75)))
+        first, second = ([image[i : i + width] for i in range(0, len(image), width)] for image in images)
         for row, other in zip(first, second):
             yield from ("pixels changed by mirroring" if a != b else None for a, b in zip(row, other[::-1]))
 
@@ -345,13 +345,13 @@ def highlight_fault(eye, d, place, shininess, value):
     return None if abs(value / 255 - expected) <= 2e-3 + 1 / 255 else "highlights off"
 
 
-PICTURES = {
-    "S2": ("silhouette of a sphere from far away, a picture", question(fringe)),
-    "C3": ("wire, a picture", question(wire)),
-    "T5": ("ring thinner than a pixel, a picture", question(thin_ring)),
+IMAGES = {
+    "S2": ("silhouette of a sphere from far away, an image", question(fringe)),
+    "C3": ("wire, an image", question(wire)),
+    "T5": ("ring thinner than a pixel, an image", question(thin_ring)),
     "P2": ("plane under grazing light", question(acne)),
     "R1": ("shadow where a sphere touches its plane", question(contact)),
     "R5": ("highlights with powers up to 10,000", question(exponents)),
-    "R6": ("the same picture at every power of two", question(scales)),
-    "R7": ("the mirrored scene's picture", question(mirrored)),
+    "R6": ("the same image at every power of two", question(scales)),
+    "R7": ("the mirrored scene's image", question(mirrored)),
 }

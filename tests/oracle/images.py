@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Holds small pictures of glint to the oracle, pixel by pixel: objects, distances, normals, shadows, colors.
+"""Holds small images of glint to the oracle, pixel by pixel: objects, distances, normals, shadows, colors.
 
-usage: pictures.py GLINT FOLDER [--long]
+usage: images.py GLINT FOLDER [--long]
 
 For each precision it prints what was compared, what was open, and the worst errors; exit status 1 if one is beyond its
 bound."""
@@ -117,25 +117,25 @@ class Tally:
 
 def render(glint, scene, precision, size, folder):
     (folder / "scene.yaml").write_text(scene)
-    command = [glint, "render", folder / "scene.yaml", "-o", folder / "picture.npy", "--quiet"]
+    command = [glint, "render", folder / "scene.yaml", "-o", folder / "image.npy", "--quiet"]
     command += ["--precision", precision, "--size", "{}x{}".format(*size)]
     command += ["--bounces", str(BOUNCES), "--aov", ",".join(KINDS)]
     subprocess.run(command, check=True)
-    return {kind: numpy.load(folder / f"picture.{kind}.npy") for kind in KINDS}
+    return {kind: numpy.load(folder / f"image.{kind}.npy") for kind in KINDS}
 
 
 def distance(a, b):
     return max(abs(float(x) - y) for x, y in zip(a, b))
 
 
-def compare(scene, picture, rounding, tallies, name):
-    height, width = picture["t"].shape[:2]
+def compare(scene, image, rounding, tallies, name):
+    height, width = image["t"].shape[:2]
     for row in range(height):
         for column in range(width):
             where = f"{name} at {column},{row}"
-            ray = [float(x) for x in picture["ray"][row, column]]
+            ray = [float(x) for x in image["ray"][row, column]]
             answer = trace(scene, Beam((0, 0, 0), ray), rounding, BOUNCES)
-            seen = {kind: values[row, column] for kind, values in picture.items()}
+            seen = {kind: values[row, column] for kind, values in image.items()}
             compare_pixel(answer, seen, rounding, tallies, where)
 
 
@@ -174,9 +174,9 @@ def main(glint, folder, is_long):
         tallies = {kind: Tally() for kind in ("object", "t", "normal", "shadow", "color")}
         for name in SHAPES if is_long else SHORT:
             text = STAGE + "".join(f"  - {line}\n" for line in SHAPES[name])
-            picture = render(glint, text, precision, size, folder)
+            image = render(glint, text, precision, size, folder)
             scene = Scene(yaml.safe_load(text), float if precision == "double" else narrow)
-            compare(scene, picture, rounding, tallies, name)
+            compare(scene, image, rounding, tallies, name)
         print(precision)
         for kind, tally in tallies.items():
             line = f"  {kind:8}{tally.count:7} compared, {tally.open} open, {tally.wrong} wrong"
