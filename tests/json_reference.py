@@ -8,75 +8,88 @@ import re
 INTRODUCTION = """\
 # JSON
 
-What the commands print with `--json`, and `glint render` with `--timing=json`. `tests/test_json.py --write` writes this page from
-the commands' output.
+What the commands print with `--json`, and `glint render` with `--timing=json`: one object. `tests/test_json.py --write` writes this
+page from the commands' output.
 
-- Standard output has one object and nothing else; messages and progress go to standard error.
-- `schema` is the version of a command's members. It is raised when a member changes its name or meaning or goes; members may be added
-  without that.
+- `schema` is the version of a command's members. It is raised when a member changes its name or meaning or goes, not when one is added.
 - `a[]` is an element of the array `a`; `a.{b,c}` stands for `a.b` and `a.c`.
 - A *count* is an integer, 0 or more, a *hash* a text of 16 hexadecimal digits. `_ms` are milliseconds, `_bytes` bytes, `_mhz` megahertz.
   Numbers that are not finite are `null`, such as the PSNR of equal images.
-- A *figure* may be unavailable: an object with `status`, which is `"unavailable"`, and `reason` stands in its place.
-- A member is always there unless its row says when.
+- A *figure* may be unavailable: an object with `status` `"unavailable"` and `reason` stands in its place.
+- A member is always there unless its row says when. In every report `glint` is the program's version, and `device` has the name,
+  platform, driver and other members of `glint devices`. `doubt` and `clock_doubt` appear where the device's clock is not trusted,
+  and say why.
 """
 NOTES = {
-    "glint render --timing=json": "Printed once the image is written.",
+    "glint render --timing=json": "",
     "glint check": "",
-    "glint devices": "Exit status 1 if there is no device.",
+    "glint devices": "",
     "glint diff": "Not printed if the images cannot be compared (exit status 1).",
     "glint bench": "A row that cannot be measured has only the members up to `size`, `status` and `reason`.",
-    "glint accuracy": "[accuracy.md](accuracy.md) defines the figures. A reference's row ends with `saved`, an unavailable one with "
-                      "`reason`. The HTML report embeds the same object.",
-    "glint verify": "[verify.md](verify.md) lists the cases. Exit status 3 if any failed.",
+    "glint accuracy": "[accuracy.md](accuracy.md) defines the figures. A row has `frame_ms`, `kernel_ms`, `clock`, `rays` and "
+                      "`mrays_per_s` of `glint bench`; a reference's ends with `saved`, an unavailable one with `reason`. The "
+                      "HTML report embeds the same object.",
+    "glint verify": "[verify.md](verify.md) lists the cases.",
+}
+# A path that begins so has no row, since the introduction, a note or a row names the section that has it.
+ELSEWHERE = {
+    "glint render --timing=json": ("glint", "device"),
+    "glint check": (),
+    "glint devices": (),
+    "glint diff": (),
+    "glint bench": ("glint", *(f"device.{name}" for name in ("name", "platform", "driver", "type", "units", "clock_mhz")),
+                    "runs[].launches[]."),
+    "glint accuracy": ("glint", "device", *(f"scenes[].variants[].{name}" for name in (
+        "frame_ms", "kernel_ms", "clock", "rays", "mrays_per_s"))),
+    "glint verify": ("glint", "device"),
 }
 MEANINGS = {
     "schema": "integer",
-    "glint": "text; the program's version",
-    "device": "object; as in `glint devices`",
+    "glint": "text",
+    "device": "object",
     "device.{name,platform,platform_version,driver,type}": "text",
     "device.{units,clock_mhz}": "count",
     "perturb": "object; only with `--perturb`",
     "perturb.{seed,scale}": "integer",
-    "scene": "text; its path",
-    "size": "integer; width and height in pixels",
+    "scene": "text; path",
+    "size": "integer; width, height",
     "samples": "integer; per pixel",
     "precision": "text; `fast`, `single`, `strict` or `double`",
-    "lanes": "integer; 1, 4, 8 or 16 rays per work-item",
-    "bvh": "text; as requested: `auto`, `on` or `off`",
+    "lanes": "integer; 1, 4, 8 or 16",
+    "bvh": "text; `auto`, `on` or `off`",
     "kernel_hash": "hash; of the kernel's text",
     "parse_ms": "number; reading the scene",
     "flatten_ms": "number; flattening it to arrays",
-    "upload_ms": "number; copying them to the device",
+    "upload_ms": "number; copying the arrays to the device",
     "encode_ms": "number; encoding and writing the files",
     "bvh_ms": "number or null; building the BVH; null without one",
-    "build_ms": "number; building the kernels or loading them from the cache",
-    "build_from_cache": "boolean; all came from the cache",
+    "build_ms": "number; building or loading the kernels",
+    "build_from_cache": "boolean; all were cached",
     "{launches[],read_backs[]}": "object; in order",
     "{launches[],read_backs[]}.name": "text; kernel, or `read-back`",
-    "{launches[],read_backs[]}.event_ms": "number or null or figure; by the device's clock, where it is trusted",
-    "{launches[],read_backs[]}.host_ms": "number; by the host's clock",
+    "{launches[],read_backs[]}.event_ms": "number or null or figure; the device's clock, where trusted",
+    "{launches[],read_backs[]}.host_ms": "number; the host's clock",
     "{launches[],read_backs[]}.doubt": "text; why the device's clock is not trusted",
     # check
-    "valid": "boolean; the scene was read and its textures exist; otherwise only the messages follow",
+    "valid": "boolean; if not, only the messages follow",
     "objects": "count; a mesh is one",
-    "shapes": "object; objects per shape",
+    "shapes": "object; objects of each",
     "shapes.*": "count",
     "mesh_triangles": "count; of all meshes",
     "unbounded": "count; objects outside `bounds`",
     "{lights,materials,pixels}": "count",
     "bounds": "object or null; of all bounded objects; null if there are none",
     "bounds.{min,max}": "number; x, y, z",
-    "features": "text; kernel features the scene needs (kernels/features.h)",
+    "features": "text; the kernel's (kernels/features.h)",
     "{warnings[],errors[]}": "object; in order",
     "{warnings[],errors[]}.file": "text or null",
-    "{warnings[],errors[]}.{line,column}": "count; from 1; 0 if unknown; columns count characters",
+    "{warnings[],errors[]}.{line,column}": "count; from 1, in characters; 0 if unknown",
     "{warnings[],errors[]}.text": "text",
     # devices
     "{platforms,platforms_without_device}": "count",
-    "devices[]": "object; of all platforms",
+    "devices[]": "object",
     "devices[].index": "count; for `--device`",
-    "devices[].twin": "count; 0 for the first device of its platform and name",
+    "devices[].twin": "count; earlier devices of its platform and name",
     "devices[].default": "boolean; used without `--device`",
     "devices[].usable": "boolean; kernels can be built and run",
     "devices[].unusable_because": "text or null",
@@ -97,7 +110,7 @@ MEANINGS = {
     "channels": "integer; 3 for colors, 1 for gray",
     "kind": "text; `display` (PNG, JPEG, PPM) or `linear` (EXR, NPY)",
     "equal": "boolean; all bits agree",
-    "differing_values": "count; of width x height x channels",
+    "differing_values": "count",
     "nonfinite_pixels": "object",
     "nonfinite_pixels.{reference,image}": "count; pixels with a NaN or infinity",
     "linear": "object; differences in linear light where both are finite",
@@ -105,14 +118,14 @@ MEANINGS = {
     "linear.{max_abs,rmse,p99_9,rel_mse}": "number; relMSE divides each square by that of the reference plus 0.01",
     "bias": "number; signed mean",
     "psnr": "number or null; decibels",
-    "srgb8": "object; 8-bit sRGB values, of colors and of gray display values",
+    "srgb8": "object; 8-bit sRGB; not for gray linear images",
     "srgb8.{off_by_1,off_by_2_or_more}": "count; values",
     "flip": "object; only with `srgb8`",
     "flip.{mean,max}": "number; perceived difference, 0 to 1",
     "flip.pixels_per_degree": "integer",
     "worst": "object; the largest difference",
     "worst.{x,y}": "count; from the top left",
-    "worst.{reference,image}": "number or null; the values there, per channel",
+    "worst.{reference,image}": "number or null; values per channel",
     "heatmap": "object; only with `--heatmap`",
     "heatmap.file": "text; path",
     "heatmap.{white,black}": "number; the differences shown white and black",
@@ -123,9 +136,9 @@ MEANINGS = {
     "clock": "text; `event` (the device's) or `host`",
     "clock_doubt": "text; why the device's clock is not trusted",
     "runs[]": "object; a row",
-    "status": "text; `unavailable`; only if the row cannot be measured",
-    "reason": "text; why; only if not measured",
-    "frame_ms": "object; from the first command to pixels on the host",
+    "status": "text; `unavailable`",
+    "reason": "text; why not measured",
+    "frame_ms": "object; first command to pixels on the host",
     "kernel_ms": "object; sum of the launches, by `clock`",
     "{frame_ms,kernel_ms}.{min,median,max}": "number",
     "{frame_ms,kernel_ms}.quartile_range": "number; upper less lower quartile",
@@ -134,20 +147,20 @@ MEANINGS = {
     "runs[].build_ms.{cold,cached}": "figure",
     "rays": "object; per image",
     "rays.{camera,camera_hits,reflected,refracted,shadow}": "count",
-    "mrays_per_s": "number; 10^6 rays of all kinds per second of the median of `kernel_ms`",
+    "mrays_per_s": "number; rays of all kinds over the median of `kernel_ms`",
     "traverses_bvh": "boolean",
     "peak_fraction": "figure; least arithmetic of the rays over `device.peak`; unavailable with a BVH",
     "bandwidth_fraction": "number; the same for the image's bytes",
-    "ratio": "figure; new over old; only with `--compare`; unavailable for rows missing in the baseline",
+    "ratio": "figure; new over old; only with `--compare`",
     "ratio.{frame,kernel}": "number; of medians",
     "ratio.slower": "boolean; above `--tolerance`",
-    "runs[].launches[]": "object; of the last run; only with `--launches`",
+    "runs[].launches[]": "object; of the last run, as in `glint render`; only with `--launches`",
     # accuracy
     "scenes[]": "object; in order",
     "bounces": "count; limit per ray",
     "scenes[].reference": "object",
-    "scenes[].reference.kind": "text; `render`, or `file` with `--reference`",
-    "scenes[].reference.file": "text; only of a file; otherwise the next five",
+    "scenes[].reference.kind": "text; `render` or `file`",
+    "scenes[].reference.file": "text; only of a file, in place of `precision` to `kernel_hash`",
     "{nonfinite,negative}": "count; pixels with such a channel",
     "saved": "text; prefix of its .npy files; only with `--save`",
     "edges": "figure; pixels at edges; unavailable for a file",
@@ -159,11 +172,11 @@ MEANINGS = {
     "why": "text; the reasons",
     "errors": "object",
     "errors.{object,shadow,path}": "figure; unavailable against a file",
-    "errors.{object,shadow,path}.{edge,away}": "count; pixels (shadow: bits), at edges and away from them",
+    "errors.{object,shadow,path}.{edge,away}": "count; pixels (shadow: bits)",
     "errors.{shading,t,normal}": "figure; unavailable against a file or without common pixels",
     "errors.{shading,t,normal}.pixels": "count; compared",
     "errors.shading.{max,rmse,p99_9}": "number; linear light",
-    "errors.t.{relative,ulps}": "object; relative, and in ulp of the row's precision",
+    "errors.t.{relative,ulps}": "object; ulp of the row's precision",
     "errors.t.{relative,ulps}.{max,p99_9}": "number",
     "errors.normal.{max,p99_9}": "number; radians",
     "errors.image": "object; linear light",
@@ -176,7 +189,7 @@ MEANINGS = {
     "variants[].worst.*.away": "boolean; from edges",
     "variants[].worst.shadow.light": "count; index",
     "variants[].worst.*.error": "number or null; of color; relative for `t`, radians for `normal`",
-    "variants[].worst.*.{reference,variant}": "number or null; ids, shadow bits, path hashes, distances or channel values",
+    "variants[].worst.*.{reference,variant}": "number or null; id, shadow bit, path hash, distance or channels",
     "variants[].worst.*.{reference_color,variant_color}": "number or null; linear RGB",
     "pareto": "object; per kind: no other row is as good and faster",
     "pareto.*": "boolean; only where available",
@@ -198,13 +211,13 @@ MEANINGS = {
     "cases[].{name,title}": "text",
     "cases[].passed": "boolean; the counts from `wrong` to `differing` are 0",
     "cases[].rays": "count; rays and pixels",
-    "wrong": "count; wrong hits, misses or objects, errors beyond their bound",
+    "wrong": "count; hits, misses, objects, errors beyond their bound",
     "leaks": "count; misses of closed surfaces",
     "unsound": "count; not finite, behind the origin, normals not unit",
-    "{off,turned}": "count; points and normals off the surface's by more than their bounds",
+    "{off,turned}": "count; points, normals off the surface's by more than their bounds",
     "differing": "count; answers whose bits must not differ",
     "{surface_part,normal_part}": "number; the largest errors over their bounds",
-    "cases[].{worst,bound}": "number or null; the error closest to its bound; null without a measure",
+    "cases[].{worst,bound}": "number or null; of the error closest to its bound",
     "unit": "text; of both, if there are any",
     "hash": "hash; of all answers' bits: equal at `strict` on every device",
 }
@@ -238,17 +251,17 @@ def braced(words):
 
 
 def merged(rows):
-    """Rows of one meaning whose paths differ in one part become one row with alternatives."""
+    """Rows of one type and meaning whose paths differ in one part become one row with alternatives."""
     kept = []
-    for rule, parts, kind, words in rows:
+    for parts, kind, words in rows:
         for row in kept:
-            differing = [i for i, (a, b) in enumerate(zip(row[1], parts)) if b[0] not in a]
-            if row[0] == rule and len(row[1]) == len(parts) and len(differing) <= 1 and rule != "schema":
+            differing = [i for i, (a, b) in enumerate(zip(row[0], parts)) if b[0] not in a]
+            if len(row[0]) == len(parts) and row[1:] == (kind, words) and len(differing) <= 1 and parts[0] != ["schema"]:
                 for i in differing:
-                    row[1][i].extend(parts[i])
+                    row[0][i].extend(parts[i])
                 break
         else:
-            kept.append((rule, parts, kind, words))
+            kept.append((parts, kind, words))
     return kept
 
 
@@ -259,7 +272,8 @@ def section(heading, schema, paths):
         rule, kind, words = meaning_of(path)
         if rule == "schema":
             words = str(schema)
-        rows.append((rule, [[part] for part in path.split(".")], kind, words.removesuffix("; ")))
+        if not path.startswith(ELSEWHERE[heading]) and (kind, words) != ("object", ""):  # whose members say it
+            rows.append(([[part] for part in path.split(".")], kind, words.removesuffix("; ")))
     note = NOTES[heading] + "\n\n" if NOTES[heading] else ""
-    table = "".join(f"| `{'.'.join(map(braced, parts))}` | {kind} | {words} |\n" for _, parts, kind, words in merged(rows))
+    table = "".join(f"| `{'.'.join(map(braced, parts))}` | {kind} | {words} |\n" for parts, kind, words in merged(rows))
     return f"## {heading}\n\n{note}| member | type | meaning |\n|---|---|---|\n{table}"
