@@ -15,6 +15,12 @@ bool tests_are_long(void)
     return value && strcmp(value, "1") == 0;
 }
 
+const uint32_t *tested_lanes(void)
+{
+    static const uint32_t few[] = {1, 4, 0}, all[] = {1, 4, 8, 16, 0};
+    return tests_are_long() ? all : few;
+}
+
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision)
 {
     return (RenderSettings){.width = width,

@@ -6,6 +6,7 @@
 #include "host/compile/bvh_widen.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include <math.h>
 #include <setjmp.h>
@@ -24,8 +25,7 @@ static Vector3 random_in_cube(double half)
 
 static size_t few_or_many(size_t few, size_t many)
 {
-    const char *long_tests = getenv("GLINT_LONG_TESTS");
-    return long_tests && !strcmp(long_tests, "1") ? many : few;
+    return tests_are_long() ? many : few;
 }
 
 // The tree
@@ -400,7 +400,6 @@ static size_t hits_differ(const TraceRay *rays, const TraceHit *hits, const Trac
 static void rays_may_look_behind_their_start(void **state)
 {
     (void)state;
-    static const uint32_t lane_counts[] = {1, 4, 8, 16};
     random_state.state = 7;
     Scene scene = random_scene(4000);
     const uint32_t plane = (uint32_t)scene.objects.count - 1;
@@ -418,10 +417,10 @@ static void rays_may_look_behind_their_start(void **state)
             behind += expected[i].object < plane && expected[i].t < 0;
             dimmed += expected[i].light > 0 && expected[i].light < 1;
         }
-        for (size_t i = 0; i < sizeof lane_counts / sizeof *lane_counts; i++) {
+        for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
             char what[40];
-            snprintf(what, sizeof what, "%s, %u lanes", precision_names[precisions[k]], lane_counts[i]);
-            trace_lanes(&scene, precisions[k], BVH_ON, lane_counts[i], rays, COUNT, hits);
+            snprintf(what, sizeof what, "%s, %u lanes", precision_names[precisions[k]], *lanes);
+            trace_lanes(&scene, precisions[k], BVH_ON, *lanes, rays, COUNT, hits);
             different += hits_differ(rays, hits, expected, what);
         }
     }

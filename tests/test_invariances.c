@@ -156,13 +156,11 @@ static void runs_bands_and_bvh_change_nothing(const Case *c)
     same_and_freed(c, &listed, "without a BVH");
 }
 
-// All widths at single; test_variants has them at strict.
 static void lanes_change_nothing(const Case *c)
 {
-    static const uint32_t lane_counts[] = {1, 4, 8, 16};
-    for (size_t i = 0; i < sizeof lane_counts / sizeof *lane_counts; i++) {
+    for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
         RenderSettings settings = c->settings;
-        settings.lanes = lane_counts[i];
+        settings.lanes = *lanes;
         if (settings.precision != PRECISION_SINGLE && settings.lanes > 1) break;
         char what[32];
         snprintf(what, sizeof what, "%u lanes", settings.lanes);
@@ -270,7 +268,7 @@ static void precision_holds(Precision precision)
         snprintf(name, sizeof name, "%s, seed %u", precision_names[precision], (unsigned)seed);
         Case c = {.scene = &scene, .settings = film_settings(WIDTH, HEIGHT, precision), .name = name};
         c.settings.bvh = BVH_ON;
-        c.settings.extra_features = features_of(&scene); // also where a changed scene needs fewer
+        c.settings.extra_features |= features_of(&scene); // also where a changed scene needs fewer
         assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_IMAGES, FEATURE_ALL);
         c.film = render(&scene, &c.settings);
         assert_int_equal(film_count_faulty(&c.film), 0);

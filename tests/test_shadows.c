@@ -29,9 +29,8 @@ static void takes_a_veils_light_once(void **state)
     settings.lanes = 1;
     settings.bvh = BVH_OFF;
     Film expected = film_render(&probe_compute, &scene, &settings, 0);
-    static const uint32_t lanes[] = {1, 4, 8, 16};
-    for (size_t i = 0; i < sizeof lanes / sizeof *lanes; i++) {
-        settings.lanes = lanes[i];
+    for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+        settings.lanes = *lanes;
         for (BvhChoice bvh = BVH_ON; bvh <= BVH_OFF; bvh++) {
             settings.bvh = bvh;
             Film film = film_render(&probe_compute, &scene, &settings, 0);

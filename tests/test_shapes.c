@@ -1,6 +1,7 @@
 // Every shape at every precision against the reference: hit or miss, distance and normal.
 // Sanitized in long tests only.
 #include "host/verify/reference.h"
+#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include <math.h>
@@ -12,7 +13,6 @@
 
 enum { SHAPES_OF_A_FORM = 3, RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SCENE_COUNT = 3 };
 
-static const uint32_t lane_counts[] = {1, 4, 8, 16};
 
 static ShapeForm forms[SHAPE_FORMS_LARGEST];
 static size_t form_count;
@@ -255,13 +255,13 @@ static void gives_the_same_bits_at_every_width(void **state)
     Scene scene = scene_of(objects, form_count, &material);
     prepare(&trial, &scene, shapes, form_count, false, false, &random);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
-        for (size_t width = 0; width < sizeof lane_counts / sizeof *lane_counts; width++) {
-            TraceHit *seen = hits[width > 0];
-            assert_true(probe_trace(&scene, precision, lane_counts[width], trial.rays, RAYS_PER_SHAPE, seen));
-            for (size_t i = 0; width > 0 && i < RAYS_PER_SHAPE; i++)
+        for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+            TraceHit *seen = hits[*lanes > 1];
+            assert_true(probe_trace(&scene, precision, *lanes, trial.rays, RAYS_PER_SHAPE, seen));
+            for (size_t i = 0; *lanes > 1 && i < RAYS_PER_SHAPE; i++)
                 if (!same_bits(&hits[0][i], &seen[i]))
                     fail_msg("%s: ray %zu differs between 1 and %u lanes", precision_names[precision], i,
-                             lane_counts[width]);
+                             *lanes);
         }
     }
 }

@@ -301,17 +301,16 @@ static void mirrors_filter_it_too(void **state)
 static void every_build_gives_the_same_bits(void **state)
 {
     (void)state;
-    static const uint32_t lane_counts[] = {1, 4, 8, 16};
     Scene scene = scene_of_file("scenes/globe.yaml");
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         RenderSettings settings = film_settings(71, 41, precision);
         settings.lanes = 1;
         Film expected = film_render(&probe_compute, &scene, &settings, 0);
         assert_int_equal(film_count_faulty(&expected), 0);
-        for (size_t i = 0; i < 4; i++) {
-            settings.lanes = lane_counts[i];
+        for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+            settings.lanes = *lanes;
             settings.bvh = BVH_ON;
-            settings.extra_features = i == 3 ? FEATURE_ALL : 0;
+            settings.extra_features = *lanes == 4 ? FEATURE_ALL : 0;
             Film film = film_render(&probe_compute, &scene, &settings, 0);
             film_assert_same(&film, &expected, precision_names[precision]);
             film_free(&film);

@@ -15,9 +15,6 @@
 // Neither is a whole number of tiles of any width.
 enum { WIDTH = 71, HEIGHT = 41 };
 
-static const uint32_t lane_counts[] = {1, 4, 8, 16};
-enum { LANE_CHOICES = sizeof lane_counts / sizeof *lane_counts };
-
 static const Precision exact_precisions[] = {PRECISION_SINGLE, PRECISION_STRICT};
 
 static Scene every_shape;
@@ -59,13 +56,13 @@ static void lanes_agree(void **state)
     for (size_t p = 0; p < 2; p++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
         Film expected = {0};
-        for (size_t i = 0; i < LANE_CHOICES; i++) {
-            settings.lanes = lane_counts[i];
+        for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+            settings.lanes = *lanes;
             char what[64];
             snprintf(what, sizeof what, "%s, %u lanes", precision_names[settings.precision], settings.lanes);
             Film film = render(&every_shape, &settings);
             assert_int_equal(film_count_faulty(&film), 0);
-            if (i == 0)
+            if (*lanes == 1)
                 expected = film;
             else
                 same_and_freed(&film, &expected, what);
@@ -78,7 +75,7 @@ static void lanes_agree_on_aovs(void **state)
 {
     (void)state;
     const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
-    for (size_t p = 0; p < 2; p++) {
+    for (size_t p = 0; p < (tests_are_long() ? 2 : 1); p++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
         settings.lanes = 1;
         Film expected = film_render(&probe_compute, &every_shape, &settings, aovs);
