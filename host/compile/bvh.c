@@ -18,7 +18,9 @@ enum {
     BIN_COUNT = 16,
     SMALL_RANGE = 32,
     SMALL_BIN_COUNT = 8,
-    HALVING_DEPTH = BVH_DEPTH_LARGEST - 32,
+    // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
+    // 2^28 primitives, and at most 7 cuts by kind follow.
+    HALVING_DEPTH = BVH_DEPTH_LARGEST - (25 + 7),
     THREAD_RANGE_SMALLEST = 8192
 };
 

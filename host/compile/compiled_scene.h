@@ -39,10 +39,11 @@ typedef struct {
 } CompiledTexture;
 
 typedef struct {
-    FlatArray arrays[FLAT_COUNT];        // in the order of the kernels' arguments
-    FeatureSet features;                 // that the kernels need
-    double unit;                         // scene units per unit of length in the arrays, a power of two
-    double flatten_seconds, bvh_seconds; // to build the BVH; all else
+    FlatArray arrays[FLAT_COUNT]; // in the order of the kernels' arguments
+    FeatureSet features;          // that the kernels need
+    double unit;                  // scene units per unit of length in the arrays, a power of two
+    double bvh_seconds;           // building the BVH
+    double flatten_seconds;       // everything else in scene_compile
     // What the stages leave for later ones and for the header.
     CompiledTexture *textures;           // of each of the scene's images
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays

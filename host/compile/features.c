@@ -22,7 +22,7 @@ static FeatureSet material_features(const Material *material)
     if (material->checker) set |= FEATURE_CHECKERS;
     if (material->image) set |= FEATURE_IMAGES;
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
-    // total reflection makes mirrors of glass
+    // which includes reflected rays: total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
     return set;
 }

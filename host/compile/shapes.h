@@ -16,7 +16,7 @@ enum { SHAPE_OPS_FORMS = 4 };
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
 typedef struct {
     int kind; // KIND_… of its primitives
-    // Offsets in Object, up to the first 0: of positions and of vectors between them; of lengths.
+    // Offsets in Object, up to the first 0: of positions and other vectors (axes, normals); of lengths.
     size_t vectors[7], lengths[3];
     // Restores what transforms of its vectors break; NULL: nothing.
     void (*restore)(Object *object);

@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Every position and every vector between two, but for those of meshes.
+// Every position and every other vector (axes, normals, directions), but for those of meshes. Scaling a
+// normal or a direction changes nothing: they need not be unit.
 static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
 {
     change(&scene->camera.position, factor);

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 enum {
-    BAND_BYTES_LARGEST = 4 << 20, // of one film
+    BAND_BYTES_LARGEST = 4 << 20, // color and shadow, the one layer that grows with the lights
     GROUPS_OF_UNIT_LEAST = 4
 };
 

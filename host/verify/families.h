@@ -1,6 +1,5 @@
-// Rays and meshes at random, the same on every machine, and the same as tests/oracle/families.py has them:
-// made by
-// + - * / and square roots only.
+// Pseudorandom rays and meshes. All but scene_far_sphere are computed by + - * / and sqrt alone, which IEEE
+// 754 rounds correctly, so that their bits are the same on every machine.
 #pragma once
 
 #include "host/render/trace.h"

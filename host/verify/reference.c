@@ -9,12 +9,10 @@ ReferenceRay reference_ray(Vector3 origin, Vector3 direction)
     return (ReferenceRay){quad3(origin), quad3(direction), 0, (Quad)FLT_MAX};
 }
 
-// The detour through memory keeps GCC 12 from dropping roundings where it merges stores
-// (-ftree-slp-vectorize).
 static void round_number(double *number)
 {
-    volatile float narrow = (float)*number;
-    *number = (double)narrow;
+    volatile float single = (float)*number; // volatile: see host/compile/rounding.c
+    *number = (double)single;
 }
 
 static void round_numbers(double *numbers, size_t count)

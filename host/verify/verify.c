@@ -85,8 +85,8 @@ double verify_ulp(const VerifyRun *run, double value)
 double verify_rounded(const VerifyRun *run, double value)
 {
     if (verify_is_wide(run)) return value;
-    volatile float narrow = (float)value; // keeps the rounding, as in host/compile/flatten.c
-    return narrow;
+    volatile float single = (float)value; // volatile: see host/compile/rounding.c
+    return single;
 }
 
 void verify_round_ray(const VerifyRun *run, TraceRay *ray)

@@ -291,7 +291,7 @@ static void vertices_add(Importer *importer, const Placed *placed)
     }
 }
 
-// Tested before the transform, whose rounding would give an empty mesh a width.
+// Tested before the transform, whose rounding could give a degenerate triangle an area.
 static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
 {
     Vector3 a = vector_of(&mesh->mVertices[corners[0]]), b = vector_of(&mesh->mVertices[corners[1]]),
@@ -299,7 +299,8 @@ static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
     return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
 }
 
-// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
+// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side. Degenerate
+// triangles collapse to a point, which no ray hits.
 static void triangle_add(Importer *importer, const Placed *placed, bool mirrored, const unsigned corners[3])
 {
     Mesh *mesh = &importer->mesh;
