@@ -100,7 +100,7 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, Preci
     tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_owed));
 
     Vector3 normal = vector_from(hit->normal);
-    double normal_owed = 8 * u + owed->turn * u * distance / (cosine * (double)expected->bend);
+    double normal_owed = 8 * u + owed->turn * u * distance / (cosine * (double)expected->curvature_radius);
     tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_owed);
     tally->length = fmax(tally->length, fabs(vector_length(normal) - 1) / (4 * u));
     if (vector_dot(normal, direction) > 0) tally->wrong++;

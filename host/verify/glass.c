@@ -42,7 +42,7 @@ void verify_nested_spheres(VerifyRun *run)
             if (image.object[i] != 1) {
                 // at the rim the coat may be missed, but the sphere behind it may not be seen without it
                 ReferenceHit exact = verify_pixel_hit(&coat, &image, i);
-                bool certain = exact.found && exact.margin > 1e-5 * coat.radius;
+                bool certain = exact.found && exact.margin > 1e-5 * coat.feature_radius;
                 run->result->wrong += image.object[i] != UINT32_MAX || certain;
                 continue;
             }

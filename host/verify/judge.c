@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+// The factors of u and ulp below are those of docs/verify.md, tiers B to D.
+
 int verify_reference_bits(void)
 {
     return QUAD_BITS;
@@ -18,7 +20,7 @@ static VerifyTarget target_from(const Object *object, Vector3 origin)
 {
     ReferenceSurface surface = reference_surface(object, quad3(origin));
     double distance = vector_length(vector_subtract(surface.center, origin));
-    return (VerifyTarget){*object, distance, surface.size, surface.radius};
+    return (VerifyTarget){*object, distance, surface.bounding_radius, surface.feature_radius};
 }
 
 VerifyTarget verify_target(const VerifyRun *run, const Object *object, Vector3 eye)
@@ -43,8 +45,8 @@ static bool is_open(const VerifyRun *run, const VerifyTarget *target, const Refe
     const double u = verify_roundoff(run);
     if (run->tier == TIER_A) return true;
     if (target->object.kind == SHAPE_TRIANGLE) return exact->margin <= 16 * u * target->distance;
-    if (run->tier == TIER_B) return exact->margin <= 4 * u * fmax(target->distance, target->radius);
-    return exact->margin <= 16 * u * target->radius;
+    if (run->tier == TIER_B) return exact->margin <= 4 * u * fmax(target->distance, target->feature_radius);
+    return exact->margin <= 16 * u * target->feature_radius;
 }
 
 // What t may be off, in its own unit.
@@ -57,8 +59,9 @@ static double bound_of(const VerifyRun *run, const VerifyTarget *target, const R
     if (run->tier == TIER_A) return INFINITY;
     double cosine = fmax((double)exact->cosine, 1e-30), slope = 1 / (cosine * length);
     if (run->tier == TIER_B)
-        return 8 * ulp + (cosine < 0.1 ? 16 * u * (target->distance + target->size) * slope : 0);
-    return 4 * ulp + 4 * u * (target->size > 0 ? target->size : target->distance) * slope;
+        return 8 * ulp + (cosine < 0.1 ? 16 * u * (target->distance + target->bounding_radius) * slope : 0);
+    return 4 * ulp +
+           4 * u * (target->bounding_radius > 0 ? target->bounding_radius : target->distance) * slope;
 }
 
 static void judge_distance(VerifyRun *run, const ReferenceHit *exact, double t, double bound)
@@ -142,12 +145,13 @@ void verify_judge_ray(VerifyRun *run, const Object *objects, size_t count, const
 }
 
 // How far a hit's point may be off the surface.
-static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length, double size)
+static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length,
+                            double bounding_radius)
 {
     const double u = verify_roundoff(run), *o = ray->origin;
     double start = fmax(fabs(o[0]), fmax(fabs(o[1]), fabs(o[2])));
-    if (run->tier == TIER_B) return 16 * u * (start + t * length + size);
-    return 2 * verify_ulp(run, t) * length + 8 * u * size;
+    if (run->tier == TIER_B) return 16 * u * (start + t * length + bounding_radius);
+    return 2 * verify_ulp(run, t) * length + 8 * u * bounding_radius;
 }
 
 // The angle between two nearly parallel vectors, the second a unit vector.
@@ -166,7 +170,7 @@ void verify_judge_surface(VerifyRun *run, const Object *object, const TraceRay *
     Quad3 point = quad3_add(quad3(origin), quad3_scale(quad3(direction), hit->t));
     ReferenceSurface surface = reference_surface(object, point);
     Quad distance = reference_surface_distance(&surface);
-    double bound = surface_bound(run, ray, hit->t, vector_length(direction), surface.size);
+    double bound = surface_bound(run, ray, hit->t, vector_length(direction), surface.bounding_radius);
     run->result->off += !(distance <= bound);
     run->result->surface_part = fmax(run->result->surface_part, (double)distance / bound);
 
@@ -177,7 +181,8 @@ void verify_judge_surface(VerifyRun *run, const Object *object, const TraceRay *
         const ReferenceSheet *sheet = &surface.sheets[i];
         if (sheet->distance > distance + bound) continue;
         double turned = turned_by(normal, sheet->normal);
-        double tolerance = 8 * verify_roundoff(run) * surface.condition + bound / (double)sheet->bend;
+        double tolerance =
+            8 * verify_roundoff(run) * surface.normal_condition + bound / (double)sheet->curvature_radius;
         least_part = fmin(least_part, turned / tolerance);
     }
     run->result->turned += !(least_part <= 1);

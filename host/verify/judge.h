@@ -8,8 +8,8 @@
 // An object as the renderer has it, seen from where rays start.
 typedef struct {
     Object object;
-    double distance;     // of the rays' origin from the object's center
-    double size, radius; // as of ReferenceSurface
+    double distance;                        // of the rays' origin from the object's center
+    double bounding_radius, feature_radius; // as of ReferenceSurface
 } VerifyTarget;
 
 // Relative to an eye, in the numbers of the precision at work.

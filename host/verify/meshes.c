@@ -128,10 +128,10 @@ void verify_facing_triangle(VerifyRun *run)
     }
 }
 
-static Vector3 random_point(unsigned seed, uint64_t index, unsigned place)
+static Vector3 random_point(unsigned seed, uint64_t index, unsigned dimension)
 {
-    return (Vector3){random_symmetric(seed, index, place), random_symmetric(seed, index, place + 1),
-                     random_symmetric(seed, index, place + 2)};
+    return (Vector3){random_symmetric(seed, index, dimension), random_symmetric(seed, index, dimension + 1),
+                     random_symmetric(seed, index, dimension + 2)};
 }
 
 static void add_random_triangles(Scene *scene, unsigned count, double size)
