@@ -15,16 +15,16 @@ typedef struct {
 
 typedef struct {
     BvhChild children[2];
-} BvhNodeBuild;
+} BvhBinaryNode;
 
 // An empty child adds nothing.
-static inline Bounds bvh_node_bounds(const BvhNodeBuild *node)
+static inline Bounds bvh_node_bounds(const BvhBinaryNode *node)
 {
     return bounds_join(node->children[0].box, node->children[1].box);
 }
 
 typedef struct {
-    BvhNodeBuild *nodes; // the root first; a tree of one leaf has a second child with an empty box
+    BvhBinaryNode *nodes; // the root first; a tree of one leaf has a second child with an empty box
     size_t node_count;
     uint32_t *order; // the primitives, leaf by leaf
     uint8_t *kinds;  // theirs, in this order
