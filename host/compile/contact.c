@@ -4,10 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 
-// As near as this, in parts of how far the scene reaches, surfaces count as touching. The kernels look five
-// errors ahead at most (kernels/shading/surface.h), of 16 u of a shape's numbers and 4 u of a point's, each
-// the sum of three coordinates: 5 * (16 * 7 + 4 * 3) u = 620 u at float for a cylinder, whose numbers are
-// most.
+// Surfaces count as touching within this, relative to the scene's largest coordinate. It has to exceed 620 u,
+// about 2^-14.7 with the u of float: the kernels look for an opaque surface behind a transparent one up to 5
+// error bounds away (surface_find_opaque), each of at most 16 u per number of a shape, 7 of a cylinder, and 4
+// u per coordinate of the point. For double it is larger than needed.
 #define NEARNESS 0x1p-14
 
 // More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives

@@ -7,6 +7,7 @@ static Revolution revolution_make(const Rounding *rounding, Vector3 from, Vector
 {
     Vector3 base = point_from_eye(rounding, from);
     Vector3 axis = whole_axis;
+    // both ends are rounded as points, so that they stay where the points of other objects are rounded to
     if (finite) axis = vector_subtract(point_from_eye(rounding, vector_add(from, whole_axis)), base);
     Vector3 scaled = vector_rounded(rounding, axis_scaled(axis));
     double length = vector_length(scaled);
