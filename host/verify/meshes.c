@@ -2,8 +2,8 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
+#include "host/verify/checks.h"
 #include "host/verify/families.h"
-#include "host/verify/judge.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

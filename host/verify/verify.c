@@ -65,7 +65,7 @@ static const struct {
 
 bool verify_holds(const VerifyResult *result)
 {
-    return result->wrong + result->leaks + result->unsound + result->off + result->turned +
+    return result->wrong + result->leaks + result->unsound + result->off_surface + result->wrong_normals +
                result->differing ==
            0;
 }

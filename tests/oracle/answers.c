@@ -6,7 +6,7 @@
 //
 // SAMPLES: how many random rays at each random object; FURTHER: the last ray, without an answer, to print of
 // each family that is closed. A line is a JSON object: a set's name, then its objects, then its rays.
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include "tests/random_ray.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -86,9 +86,9 @@ static void hit_print(const ReferenceHit *hit)
 
 // The nearest hit, and what the tiers leave open and allow; where nothing is hit, of the object that is
 // missed by the least.
-static void judged_print(bool wide, const Object *objects, size_t count, const VerifyJudgedRay *judged)
+static void test_ray_print(bool wide, const Object *objects, size_t count, const VerifyTestRay *test)
 {
-    ReferenceRay ray = verify_reference_ray(&judged->ray);
+    ReferenceRay ray = verify_reference_ray(&test->ray);
     size_t nearest = 0;
     ReferenceHit hit = reference_hit_object(&objects[0], &ray);
     for (size_t i = 1; i < count; i++) {
@@ -98,15 +98,15 @@ static void judged_print(bool wide, const Object *objects, size_t count, const V
         nearest = i;
         hit = other;
     }
-    ray_print(&judged->ray);
+    ray_print(&test->ray);
     hit_print(&hit);
     printf(", \"object\": %zu, \"tiers\": {", nearest);
     for (VerifyTier tier = wide ? TIER_D : TIER_A; tier <= (wide ? TIER_D : TIER_C); tier++) {
         const VerifyRun run = {.tier = tier};
-        VerifyExpected expected = verify_expected(&run, &objects[nearest], judged, hit);
+        VerifyExpected expected = verify_expected(&run, &objects[nearest], test, hit);
         printf("%s\"%c\": {\"open\": %s, \"decided\": %s, \"touch\": %s, \"bound\": %.17g}",
                tier % TIER_D > 0 ? ", " : "", 'A' + (int)tier, json_of(expected.open),
-               json_of(verify_is_decided(&run, judged)), json_of(expected.exact.found && !hit.found),
+               json_of(verify_is_decided(&run, test)), json_of(expected.exact.found && !hit.found),
                fmin(expected.bound, DBL_MAX));
     }
     printf("}}\n");
@@ -117,19 +117,19 @@ static void case_print(const VerifyRays *set, bool wide, size_t further)
     const VerifyRun run = {.tier = wide ? TIER_D : TIER_C};
     Scene scene = verify_rays_scene(set);
     Object *objects = verify_objects(&run, &scene);
-    VerifyJudgedRays judged = verify_rays_judged(&run, set);
+    VerifyTestRays tests = verify_test_rays(&run, set);
     set_print(set->name, wide);
     for (size_t i = 0; i < scene.objects.count; i++)
         object_print(&objects[i]);
-    for (size_t i = 0; i < judged.count; i++)
-        judged_print(wide, objects, scene.objects.count, &judged.items[i]);
-    for (size_t i = judged.count; set->closed && i < further; i++) {
+    for (size_t i = 0; i < tests.count; i++)
+        test_ray_print(wide, objects, scene.objects.count, &tests.items[i]);
+    for (size_t i = tests.count; set->closed && i < further; i++) {
         TraceRay ray = set->family(i);
         verify_round_ray(&run, &ray);
         ray_print(&ray);
         printf("}\n");
     }
-    free(judged.items);
+    free(tests.items);
     free(objects);
     scene_free(&scene);
 }
