@@ -266,7 +266,7 @@ static void shades_as_phong(void **state)
     light = (Light){.kind = LIGHT_SPOT,
                     .color = {2, 2, 2},
                     .position = {0, 4, 0},
-                    .angle = 60,
+                    .half_angle = 60,
                     .penumbra = 40,
                     .direction = {sin(halfway), -cos(halfway), 0}};
     assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), 0.2 + (0.4 + 0.25), 1e-15);

@@ -73,7 +73,7 @@ static bool perturb_read(const char *value, CommonOptions *common)
     return true;
 }
 
-static void choices_tell(const char *const *names, size_t count, const char *value)
+static void choices_print(const char *const *names, size_t count, const char *value)
 {
     for (size_t i = 0; i < count; i++)
         fprintf(stderr, "%s%s", i == 0 ? "" : i + 1 == count ? " or " : ", ", names[i]);
@@ -92,7 +92,7 @@ bool option_choice(const char *option, const char *value, const char *const *nam
             return true;
         }
     fprintf(stderr, "glint: --%s: expected ", option);
-    choices_tell(names, count, value);
+    choices_print(names, count, value);
     return false;
 }
 
@@ -108,7 +108,7 @@ bool option_set(const char *option, const char *value, const char *const *names,
         if (i == count) {
             char *word = strndup(at, length);
             fprintf(stderr, "glint: --%s: expected names separated by commas, of ", option);
-            choices_tell(names, count, word ? word : value);
+            choices_print(names, count, word ? word : value);
             free(word);
             return false;
         }

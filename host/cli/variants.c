@@ -130,7 +130,7 @@ bool variant_set_open(VariantSet *set, const VariantOptions *options, char *cons
 static bool all_settled(const VariantSet *set)
 {
     for (size_t i = 0; i < set->count; i++)
-        if (set->variants[i].renderer && !bench_settled(&set->rows[i].times, ENOUGH_RUNS)) return false;
+        if (set->variants[i].renderer && !bench_converged(&set->rows[i].times, ENOUGH_RUNS)) return false;
     return true;
 }
 

@@ -31,8 +31,7 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint verify [CASE...] [OPTIONS]\n\n"
     "Runs the hard cases, or those named, on a device and checks each against its bound; exit status 3 if "
-    "any "
-    "fails.\n\n"
+    "any fails.\n\n"
     "      --precision P     fast, single, strict or double (default: all that the device has)\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //

@@ -29,7 +29,7 @@ typedef struct {
     uint32_t *order; // the primitives, leaf by leaf
     uint8_t *kinds;  // theirs, in this order
     size_t primitive_count;
-    unsigned depth; // inner nodes on the longest way down
+    unsigned depth; // inner nodes on the longest path
 } Bvh;
 
 enum { BVH_LEAF_LARGEST = 8 }; // primitives per leaf, at most

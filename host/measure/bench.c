@@ -6,7 +6,7 @@
 const char *const bench_ray_names[BENCH_RAY_KINDS] = {"camera", "camera_hits", "reflected", "refracted",
                                                       "shadow"};
 
-static const double settled_spread = 0.02, largest_drift = 0.01;
+static const double converged_spread = 0.02, largest_drift = 0.01;
 // Over a shorter time the wait before a launch would pass for a drift.
 static const double drift_seconds = 1;
 
@@ -52,12 +52,12 @@ Summary bench_kernel(const BenchTimes *times)
     return series_summarize(bench_doubt(times) ? &times->host : &times->event);
 }
 
-bool bench_settled(const BenchTimes *times, size_t enough)
+bool bench_converged(const BenchTimes *times, size_t enough)
 {
     if (times->frame.count < enough) return false;
     Summary kernel = bench_kernel(times), frame = series_summarize(&times->frame);
-    return kernel.quartile_range <= settled_spread * kernel.median &&
-           frame.quartile_range <= settled_spread * frame.median;
+    return kernel.quartile_range <= converged_spread * kernel.median &&
+           frame.quartile_range <= converged_spread * frame.median;
 }
 
 void bench_row_free(BenchRow *row)

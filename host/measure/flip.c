@@ -82,7 +82,7 @@ static double color_distance(Triple p, Triple q)
     return pow(fabs(p.x - q.x) + hypot(p.y - q.y, p.z - q.z), color_exponent);
 }
 
-// One number a pixel.
+// One number per pixel.
 typedef struct {
     uint32_t width, height;
     float *values;

@@ -74,13 +74,13 @@ static void upload(Renderer *renderer, CompiledScene *compiled)
     }
 }
 
-// The definitions that distinguish the variants of the kernel text.
-static void prelude_write(Renderer *renderer)
+// The definitions and compiler options that distinguish the variants of the kernels.
+static void variant_set(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
     uint32_t seed = renderer->settings.perturb_seed, scale = renderer->settings.perturb_scale;
     const Device *device = renderer->compute->device;
-    // errors are repaired, as on a device that makes them
+    // injected errors make the device count as not correctly rounded, so that strict repairs them
     bool correct = device->correctly_rounded && seed == 0;
     // OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
     // vectors, unlike llvmpipe and Oclgrind
@@ -147,7 +147,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
         renderer_close(renderer);
         return NULL;
     }
-    prelude_write(renderer);
+    variant_set(renderer);
     return renderer;
 }
 
@@ -187,7 +187,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
         .no_cache = renderer->settings.no_cache,
     };
     program_build(renderer->compute, &slot->request, &slot->program);
-    // reports name the kernel that computes the result itself
+    // AOV kernels do not change the hash that identifies an image
     if (kind != KERNEL_AOV && kind != KERNEL_PATH) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;

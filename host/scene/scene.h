@@ -24,19 +24,21 @@ typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
 
 typedef struct {
     LightKind kind;
-    Color color;            // times intensity
-    Vector3 position;       // point, spot
-    Vector3 direction;      // directional: the way the light travels; spot: look_at - position; not unit
-    double angle, penumbra; // spot, degrees: no light beyond the half-angle; full within angle - penumbra
+    Color color;       // times intensity
+    Vector3 position;  // point, spot
+    Vector3 direction; // directional: the way the light travels; spot: look_at - position; not unit
+    // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
+    double half_angle, penumbra;
 } Light;
 
 typedef struct {
     Color color;
-    double ambient;   // ka
-    Color diffuse;    // kd, per channel
-    double specular;  // ks; the highlight has the light's color
-    double shininess; // Phong's power, >= 0
-    double reflection, transmission, ior;
+    double ambient;                  // ka
+    Color diffuse;                   // kd, per channel
+    double specular;                 // ks; the highlight has the light's color
+    double shininess;                // Phong's power, >= 0
+    double reflection, transmission; // weights of the reflected and the refracted ray
+    double ior;
     bool full_shadow; // casts a full shadow even if transparent
     bool checker;
     Color checker_colors[2]; // in place of color
@@ -79,7 +81,7 @@ typedef struct {
         struct {
             Vector3 center;
             double radius;
-            bool only_inside; // rays from outside pass the near side unseen
+            bool only_inside; // hit from inside only: rays that enter pass through
         } sphere;
         struct {
             Vector3 point, normal;
@@ -115,8 +117,8 @@ typedef struct {
             Vector3 center, axis;
             double major, minor;
         } torus;
-        // the points as far from the focus as from the plane as far behind the apex; finite: up to a height
-        // along the axis
+        // the points equidistant from the focus and the directrix plane; finite: up to a height along the
+        // axis
         struct {
             Vector3 apex, axis;
             double focal_length, height;
