@@ -124,10 +124,14 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     }
     struct stat old;
     bool exists = stat(target, &old) == 0;
+    int error = exists ? 0 : errno;
     // A symbolic link is kept: its target is replaced or created.
     char *resolved = exists ? realpath(target, NULL) : link_end(target);
     output->target = resolved ? resolved : memory_copy_text(target);
-    if (!exists && errno == ELOOP) return output_failed(output, "create", messages);
+    if (error == ELOOP) {
+        errno = error;
+        return output_failed(output, "create", messages);
+    }
     if (exists && !S_ISREG(old.st_mode)) return output_open_directly(output, messages);
     // Renaming would replace a read-only file.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);

@@ -134,16 +134,17 @@ static char *aov_path(const ImageOutputOptions *options, const char *name)
     return path.items;
 }
 
-bool image_output_spares_scene(const ImageOutputOptions *options, const Scene *scene, const char *scene_path)
+bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
+                                   const char *scene_path)
 {
-    bool spares = output_spares_scene(options->path, scene, scene_path);
-    for (Layer layer = 0; layer < LAYER_COUNT && spares; layer++) {
+    bool overwrites = output_overwrites_scene(options->path, scene, scene_path);
+    for (Layer layer = 0; layer < LAYER_COUNT && !overwrites; layer++) {
         if (!(options->aovs >> layer & 1)) continue;
         char *path = aov_path(options, layer_names[layer]);
-        spares = output_spares_scene(path, scene, scene_path);
+        overwrites = output_overwrites_scene(path, scene, scene_path);
         free(path);
     }
-    return spares;
+    return overwrites;
 }
 
 static bool files_open(ImageOutput *output, const Film *band, MessageList *messages)
@@ -263,7 +264,7 @@ bool image_output_write(ImageOutput *output, const Film *band, MessageList *mess
     output->messages = messages;
     band_keep(output, band);
     output->writing =
-        !output->options->apart && pthread_create(&output->thread, NULL, band_thread, output) == 0;
+        !output->options->synchronous && pthread_create(&output->thread, NULL, band_thread, output) == 0;
     if (output->writing) return true; // or reported with the next band
     band_thread(output);
     return !output->failed;

@@ -181,12 +181,12 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
     return loaded;
 }
 
-bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path)
+bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path)
 {
-    if (!scene_was_read_from(scene, scene_path, path)) return true;
+    if (!scene_was_read_from(scene, scene_path, path)) return false;
     fprintf(stderr, "glint: would overwrite '%s', which the scene is read from; choose another with -o\n",
             path);
-    return false;
+    return true;
 }
 
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height)

@@ -189,7 +189,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
     if (!options->has_transfer)
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
-    options->output.apart = options->timing != TIMING_NONE;
+    options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     if (!renderer) {
@@ -234,7 +234,7 @@ int command_render(int argument_count, char **arguments)
     double start = clock_seconds();
     status = EXIT_USER;
     if (image_output_path_known(options.output.path) && scene_open(&scene, options.scene, &options.common) &&
-        image_output_spares_scene(&options.output, &scene, options.scene)) {
+        !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         double parse_seconds = clock_seconds() - start;
         if (device_open(&open, options.common.device)) {
             status = scene_render(&options, &scene, &open.compute, parse_seconds);

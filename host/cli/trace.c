@@ -221,7 +221,7 @@ int command_trace(int argument_count, char **arguments)
     OpenDevice open;
     status = EXIT_USER;
     if (scene_open(&scene, options.scene, &options.common) &&
-        output_spares_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
+        !output_overwrites_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, options.common.device)) {
         status = rays_trace(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);

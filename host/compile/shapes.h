@@ -25,10 +25,10 @@ typedef struct {
     // Adds its primitives (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
 
-    // What a random one can be, up to the first NULL, and one of a form, of about made->reach around
-    // made->center, with made->axis if it has an axis or normal. Sets the object's shape, and the reach and
-    // the axis where they are others.
+    // What a random one can be, up to the first NULL.
     const char *forms[SHAPE_OPS_FORMS];
+    // Sets made->object's shape to a random one of a form, of about made->reach around made->center, along
+    // made->axis if it has an axis or normal; and the reach and the axis where it has others.
     void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
     // As `bounds`; NULL: always unbounded.

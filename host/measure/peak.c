@@ -3,12 +3,12 @@
 #include "host/base/clock.h"
 #include "host/base/text.h"
 
-static const double launch_seconds = 0.03, total_seconds = 0.3;
+static const double launch_seconds_wanted = 0.03, total_seconds = 0.3;
 
 enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of eight chains
 enum { COPY_BYTES_LARGEST = 128 << 20, COPY_BYTES_OF_ITEM = 16 };
 
-static double launch_length(Peak *peak, const LaunchTime *time)
+static double launch_seconds(Peak *peak, const LaunchTime *time)
 {
     peak->by_events &= time->trusted;
     return time->trusted ? time->event_seconds : time->host_seconds;
@@ -34,10 +34,10 @@ static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, u
     while (compute_ok(compute) && clock_seconds() - start < total_seconds) {
         kernel_argument(compute, kernel, 0, sizeof rounds, &rounds);
         LaunchTime time = kernel_launch(compute, kernel, 1, &items, &group);
-        double seconds = launch_length(peak, &time);
+        double seconds = launch_seconds(peak, &time);
         double rate = (double)items * lanes * rounds * FLOPS_OF_ROUND / seconds;
         if (rate > best) best = rate;
-        if (seconds < launch_seconds && rounds < 1u << 28) rounds *= 2;
+        if (seconds < launch_seconds_wanted && rounds < 1u << 28) rounds *= 2;
     }
     peak->flops_per_second[wide] = best;
     buffer_release(results);
@@ -60,7 +60,7 @@ static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
         kernel_argument(compute, kernel, 0, sizeof(cl_mem), &buffers[turn % 2]);
         kernel_argument(compute, kernel, 1, sizeof(cl_mem), &buffers[1 - turn % 2]);
         LaunchTime time = kernel_launch(compute, kernel, 1, &items, NULL);
-        double rate = 2 * (double)bytes / launch_length(peak, &time);
+        double rate = 2 * (double)bytes / launch_seconds(peak, &time);
         if (turn >= 2 && rate > best) best = rate;
     }
     peak->bytes_per_second = best;

@@ -109,7 +109,7 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
     device_describe(&device);
     for (size_t i = 0; i < list->count; i++) {
         const Device *other = &list->items[i];
-        if (other->platform == platform && strcmp(other->name, device.name) == 0) device.twin++;
+        if (other->platform == platform && strcmp(other->name, device.name) == 0) device.same_name_index++;
     }
     array_push(*list, device);
 }

@@ -11,8 +11,8 @@
 typedef struct {
     cl_platform_id platform;
     cl_device_id id;
-    unsigned index; // as `glint devices` numbers it, from 0 over all platforms
-    unsigned twin;  // 0 for the first device of this platform and name, 1 for the next …
+    unsigned index;           // as `glint devices` numbers it, from 0 over all platforms
+    unsigned same_name_index; // 0 for the first device of this platform and name, 1 for the next …
     cl_device_type type;
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
@@ -34,7 +34,8 @@ typedef struct {
     cl_int failed_status;
 } DeviceList;
 
-// Queries all platforms. Without any the list is empty, which is no failure.
+// Queries all platforms. Without any the list is empty, which is no failure. Sets PoCL's environment variable
+// POCL_WORK_GROUP_SPECIALIZATION unless it is set.
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
 

@@ -42,7 +42,7 @@ static size_t group_side(const Renderer *renderer)
 // The device buffers a band is rendered into.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, ray_counts, losses, layers[LAYER_COUNT];
+    cl_mem offsets, ray_counts, compensation, layers[LAYER_COUNT];
 } BandBuffers;
 
 // The film of these rows, without its layers.
@@ -78,7 +78,7 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
         if (layer_in(filled, layer))
             buffers->layers[layer] = film_buffer(renderer, empty ? 0 : film_layer_size(&film, layer));
     }
-    buffers->losses = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
+    buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     void *offsets = sample_pattern(sample_count, renderer->report.wide);
     buffers->offsets =
@@ -90,7 +90,7 @@ static void buffers_close(BandBuffers *buffers)
 {
     buffer_release(buffers->offsets);
     buffer_release(buffers->ray_counts);
-    buffer_release(buffers->losses);
+    buffer_release(buffers->compensation);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         buffer_release(buffers->layers[layer]);
     *buffers = (BandBuffers){0};
@@ -141,7 +141,7 @@ static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRo
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &buffers->offsets);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->losses);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->compensation);
     band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
