@@ -68,7 +68,7 @@ static Object random_object(Random *random, size_t index)
         const bool first = index < form_count;
         const ShapeForm *form = &forms[first ? index : (size_t)random_between(random, 0, (double)form_count)];
         RandomShape shape = random_shape(form, random);
-        if (shape.reach > 3 || (!form->bounded && !first)) continue;
+        if (shape.radius > 3 || (!form->bounded && !first)) continue;
         Object *object = &shape.object;
         // a plane behind the objects and a narrow cone beside them, not across the view
         if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);

@@ -378,9 +378,9 @@ static void measures_distances(void **state)
             RandomRay given = random_ray(&shape, &random);
             ReferenceRay ray = reference_ray(given.origin, given.direction);
             ReferenceHit hit = reference_hit_object(&shape.object, &ray);
-            double height = (i % 2 ? 1e-9 : -1e-9) * shape.reach;
+            double height = (i % 2 ? 1e-9 : -1e-9) * shape.radius;
             // near an edge another part of the surface may be nearer
-            if (!hit.found || hit.margin < 1e-6 * shape.reach || hit.cosine < 1e-3) continue;
+            if (!hit.found || hit.margin < 1e-6 * shape.radius || hit.cosine < 1e-3) continue;
             Quad3 point = quad3_add(reference_point(&ray, hit.t), quad3_scale(hit.normal, height));
             ReferenceSurface surface = reference_surface(&shape.object, point);
             double distance = (double)reference_surface_distance(&surface);

@@ -263,11 +263,11 @@ static void count_json(Json *json, const char *key, EdgeCount count)
     json_end(json);
 }
 
-static void extent_json(Json *json, const char *key, Extent extent)
+static void extremes_json(Json *json, const char *key, ErrorExtremes extremes)
 {
     if (key) json_begin_object(json, key);
-    json_number(json, "max", extent.largest);
-    json_number(json, "p99_9", extent.percentile_999);
+    json_number(json, "max", extremes.largest);
+    json_number(json, "p99_9", extremes.percentile_999);
     if (key) json_end(json);
 }
 
@@ -290,12 +290,12 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
     if (errors->surface_pixels > 0) {
         json_begin_object(json, "t");
         json_integer(json, "pixels", (int64_t)errors->surface_pixels);
-        extent_json(json, "relative", errors->t_relative);
-        extent_json(json, "ulps", errors->t_ulps);
+        extremes_json(json, "relative", errors->t_relative);
+        extremes_json(json, "ulps", errors->t_ulps);
         json_end(json);
         json_begin_object(json, "normal");
         json_integer(json, "pixels", (int64_t)errors->surface_pixels);
-        extent_json(json, NULL, errors->normal);
+        extremes_json(json, NULL, errors->normal);
         json_end(json);
     } else {
         absent_json(json, "t", "no pixel shows the same object");

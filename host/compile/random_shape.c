@@ -77,7 +77,7 @@ size_t shape_forms(ShapeForm forms[SHAPE_FORMS_LARGEST])
 static RandomShape shape_make(const ShapeForm *form, Vector3 center, double size, Vector3 axis,
                               Random *random)
 {
-    RandomShape made = {.object.kind = form->kind, .center = center, .reach = size, .axis = axis};
+    RandomShape made = {.object.kind = form->kind, .center = center, .radius = size, .axis = axis};
     shape_ops[form->kind]->randomize(&made, form->form, random);
     return made;
 }

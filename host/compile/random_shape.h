@@ -23,8 +23,8 @@ Vector3 vector_on_grid(Vector3 point);
 typedef struct {
     Object object;
     Vector3 center;
-    double reach; // radius around the center of what matters: all of a bounded object
-    Vector3 axis; // along which rays are special: an axis, a normal, an edge; not unit
+    double radius; // around the center, of what matters: all of a bounded object
+    Vector3 axis;  // along which rays are special: an axis, a normal, an edge; not unit
 } RandomShape;
 
 // A form of a shape, such as "open cylinder".

@@ -27,8 +27,8 @@ typedef struct {
 
     // What a random one can be, up to the first NULL.
     const char *forms[SHAPE_OPS_FORMS];
-    // Sets made->object's shape to a random one of a form, of about made->reach around made->center, along
-    // made->axis if it has an axis or normal; and the reach and the axis where it has others.
+    // Sets made->object's shape to a random one of a form, of about made->radius around made->center, along
+    // made->axis if it has an axis or normal; and the radius and the axis where it has others.
     void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
     // As `bounds`; NULL: always unbounded.
@@ -38,7 +38,7 @@ typedef struct {
     // A point and the normal, not unit, of a flat primitive; NULL: not flat.
     void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
     // The largest magnitude of an unbounded primitive's numbers, as distances from the origin.
-    double (*reach)(const void *primitive);
+    double (*largest_coordinate)(const void *primitive);
 
     // Floating-point operations of a ray's test, counted by hand up to where a miss is certain, in the usual
     // forms: the discriminant of a quadratic around the shape's center or axis, slabs for the box, the first

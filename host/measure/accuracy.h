@@ -44,7 +44,7 @@ typedef struct {
 
 typedef struct {
     double largest, percentile_999;
-} Extent;
+} ErrorExtremes;
 
 // Where an error of a kind is largest. Of the kinds that are counted: among the wrong ones away from edges,
 // or else those at edges, the one with the largest difference of color.
@@ -70,7 +70,7 @@ typedef struct {
     ErrorSummary shading;
     // where the object is the reference's, and is one
     size_t surface_pixels;
-    Extent t_relative, t_ulps, normal;
+    ErrorExtremes t_relative, t_ulps, normal;
     ErrorSummary image;                       // of every pixel
     ImageMetrics display;                     // as 8 bits and eyes see it: srgb_psnr, off_by_…, flip_…
     AccuracyWorst worst[ACCURACY_KIND_COUNT]; // none of FLIP

@@ -319,8 +319,8 @@ static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceH
     // With e the distance of the ray from the axis, seen along it, and s the radius of the body there,
     // the discriminant is proportional to s^2 - e^2.
     Quad steepness = quad_root(q.x * q.x + q.y * q.y);
-    Quad3 reach = {radius * q.x - growth * p.x, radius * q.y - growth * p.y, 0};
-    Quad silhouette = quad3_length(reach);
+    Quad3 outline = {radius * q.x - growth * p.x, radius * q.y - growth * p.y, 0};
+    Quad silhouette = quad3_length(outline);
     if (steepness > 0 && silhouette > 0) margin_reduce(hit, (b * b - a * c) / (silhouette * steepness));
     if (body->slope != 0) {
         Quad apex = -body->base / body->slope;
@@ -560,8 +560,8 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
                              2 * sum[0] * sum[1] - 2 * four * (p.x * q.x + p.y * q.y),
                              sum[1] * sum[1] + 2 * sum[0] - four * (q.x * q.x + q.y * q.y), 2 * sum[1], 1};
     const Quad cubic[4] = {quartic[1], 2 * quartic[2], 3 * quartic[3], 4};
-    Quad reach = 4 * (major + minor), turns[3], zeros[4];
-    int count = polynomial_zeros(quartic, 4, -reach, reach, zeros);
+    Quad half_span = 4 * (major + minor), turns[3], zeros[4];
+    int count = polynomial_zeros(quartic, 4, -half_span, half_span, zeros);
     for (int i = 0; i < count; i++) {
         if (polynomial_value(sum, 2, zeros[i]) < 0) continue;
         Quad3 at = quad3_add(p, quad3_scale(q, zeros[i]));
@@ -571,7 +571,7 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
         offer(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
     }
     // the hit is there because of the turns up to the next behind it
-    int turn_count = polynomial_zeros(cubic, 3, -reach, reach, turns);
+    int turn_count = polynomial_zeros(cubic, 3, -half_span, half_span, turns);
     bool behind = false;
     for (int i = 0; i < turn_count && !behind; i++) {
         Quad3 at = quad3_add(p, quad3_scale(q, turns[i]));

@@ -78,8 +78,8 @@ static Vector3 vector_from(const double parts[3])
 static RandomRay ladder_ray(const RandomShape *aim, double rung, Random *random)
 {
     Vector3 out = vector_normalize(random_in_sphere(random));
-    Vector3 eye = vector_add(aim->center, vector_scale(out, rung * aim->reach));
-    Vector3 target = vector_add(aim->center, vector_scale(random_in_sphere(random), 1.02 * aim->reach));
+    Vector3 eye = vector_add(aim->center, vector_scale(out, rung * aim->radius));
+    Vector3 target = vector_add(aim->center, vector_scale(random_in_sphere(random), 1.02 * aim->radius));
     return (RandomRay){eye, vector_normalize(vector_subtract(target, eye))};
 }
 
@@ -145,10 +145,10 @@ static void tally_add(Tally *tally, const RandomShape *aim, const Rays *rays, si
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
-    double distance = vector_length(vector_subtract(origin, aim->center)) + aim->reach;
-    // a plane may be hit far beyond the reach
+    double distance = vector_length(vector_subtract(origin, aim->center)) + aim->radius;
+    // a plane may be hit far beyond the radius
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
-    double scale = u * (tier->of_size ? aim->reach : distance);
+    double scale = u * (tier->of_size ? aim->radius : distance);
     // flat shapes have no compensated edges; a triangle's are open below 16 u of edge and distance
     double flat = aim->object.kind == SHAPE_TRIANGLE ? 16 : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);

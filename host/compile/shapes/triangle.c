@@ -116,7 +116,7 @@ static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
 {
     Vector3 *vertices = made->object.as.triangle.vertices, *normals = made->object.as.triangle.normals;
     for (int i = 0; i < 3; i++)
-        vertices[i] = vector_add(made->center, vector_scale(random_unit_vector(random), made->reach));
+        vertices[i] = vector_add(made->center, vector_scale(random_unit_vector(random), made->radius));
     made->axis = vector_subtract(vertices[1], vertices[0]);
     if (form != TRIANGLE_SMOOTH) return;
     Vector3 normal = vector_normalize(vector_cross(made->axis, vector_subtract(vertices[2], vertices[0])));
