@@ -145,7 +145,7 @@ bool output_write(OutputFile *output, const void *bytes, size_t size, MessageLis
     return false;
 }
 
-bool output_settle(OutputFile *output, MessageList *messages)
+bool output_finish(OutputFile *output, MessageList *messages)
 {
     FILE *file = output->file;
     output->file = NULL;
@@ -160,7 +160,7 @@ bool output_settle(OutputFile *output, MessageList *messages)
 
 bool output_commit(OutputFile *output, MessageList *messages)
 {
-    if (!output_settle(output, messages)) return false;
+    if (!output_finish(output, messages)) return false;
     if (output->temporary) {
         if (rename(output->temporary, output->target) != 0) return output_failed(output, "write", messages);
         pending_drop(output->temporary);

@@ -285,9 +285,9 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
         return false;
     }
     double start = clock_seconds();
-    bool whole = image_writer_settle(output->image, messages);
+    bool whole = image_writer_finish(output->image, messages);
     for (Layer i = 0; i < LAYER_COUNT && whole; i++)
-        if (output->aovs[i]) whole = image_writer_settle(output->aovs[i], messages);
+        if (output->aovs[i]) whole = image_writer_finish(output->aovs[i], messages);
     if (!whole) {
         image_output_abandon(output);
         return false;

@@ -127,7 +127,7 @@ bool variant_set_open(VariantSet *set, const VariantOptions *options, char *cons
     return true;
 }
 
-static bool all_settled(const VariantSet *set)
+static bool all_converged(const VariantSet *set)
 {
     for (size_t i = 0; i < set->count; i++)
         if (set->variants[i].renderer && !bench_converged(&set->rows[i].times, ENOUGH_RUNS)) return false;
@@ -158,7 +158,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
         if (!round_run(set, true)) return false;
     start = clock_seconds();
     double spent = 0;
-    while (spent < bound && !all_settled(set)) {
+    while (spent < bound && !all_converged(set)) {
         if (!round_run(set, false)) return false;
         spent = clock_seconds() - start;
         progress_show(progress, fmin(spent / bound, 1));

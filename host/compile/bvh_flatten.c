@@ -110,7 +110,7 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
                        const Bounds *empty, unsigned width, void *node)
 {
     double *planes = node;
-    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *what = first + width;
+    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *leaf_info = first + width;
     uint32_t next_node = wide->first_node;
     for (unsigned i = 0; i < width; i++) {
         const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
@@ -123,10 +123,10 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
         }
         if (child && child->count > 0) {
             first[i] = order[child->first];
-            what[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+            leaf_info[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
         } else if (child) {
             first[i] = next_node++;
-            what[i] = BVH_NODE;
+            leaf_info[i] = BVH_NODE;
         }
     }
 }

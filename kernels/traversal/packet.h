@@ -223,10 +223,10 @@ static inline void traverse_group(Traversal *traversal, const Scene *scene, cons
     for (;; next = entries[--stack.count]) {
         uint lanes = next.lanes & group->active;
         if (next.near <= group->largest_limit && lanes != 0) {
-            if (next.what == BVH_NODE) {
+            if (next.leaf_info == BVH_NODE) {
                 visit_node(&stack, scene, &scene->nodes[next.first], group, lanes);
             } else {
-                intersect_leaf(traversal, scene, ray, next.what, next.first);
+                intersect_leaf(traversal, scene, ray, next.leaf_info, next.first);
                 group->active = lanes_bits(traversal->active);
                 if (group->active == 0) return;
                 group->limit = traversal_limit(traversal);

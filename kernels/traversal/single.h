@@ -34,10 +34,10 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.near <= limit) {
-            if (next.what == BVH_NODE) {
+            if (next.leaf_info == BVH_NODE) {
                 visit_node(&stack, scene, &scene->nodes[next.first], &box_ray, octant, limit);
             } else {
-                intersect_leaf(traversal, scene, ray, next.what, next.first);
+                intersect_leaf(traversal, scene, ray, next.leaf_info, next.first);
                 if (!traversal->active) return;
                 limit = traversal_limit(traversal);
             }
