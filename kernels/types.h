@@ -161,7 +161,7 @@ typedef struct {
     // order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of 2^-48, for
     // double.
     uint4 optical_depth;
-    uint4 image; // x: 1 + the index of its texture's first level, 0: none; y: number of levels
+    uint4 texture; // x: 1 + the index of its first level, 0: none; y: number of levels
 } Material;
 
 // One level of a texture's mipmap, each half the size of the one before, down to one texel.

@@ -60,7 +60,7 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, image)                      \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \

@@ -22,7 +22,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
                     BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
     [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
-    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, image),
+    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, texture),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
     [FLAT_TEXELS] = LAYOUT(Texel, color, color),

@@ -45,7 +45,7 @@ typedef struct {
     double bvh_seconds;           // building the BVH
     double flatten_seconds;       // everything else in scene_compile
     // What the stages leave for later ones and for the header.
-    CompiledTexture *textures;           // of each of the scene's images
+    CompiledTexture *textures;           // of each of the scene's textures
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;                   // of these; 0 where there are none
     uint32_t cull_sphere_count;          // of each common origin

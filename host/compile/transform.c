@@ -43,7 +43,7 @@ void scene_scale(Scene *scene, double factor)
             vector_grow(&scene->meshes.items[i].vertices[k], factor);
     for (size_t i = 0; i < scene->materials.count; i++) {
         scene->materials.items[i].checker_size *= factor;
-        scene->materials.items[i].image_size *= factor;
+        scene->materials.items[i].texture_size *= factor;
     }
 }
 

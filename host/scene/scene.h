@@ -43,15 +43,15 @@ typedef struct {
     bool checker;
     Color checker_colors[2]; // in place of color
     double checker_size;     // side of a square, > 0, in scene units
-    uint32_t image;          // in place of color: 1 + index into the scene's images; 0: none
-    double image_size;       // width of a texture on a plane or disc, > 0, in scene units
+    uint32_t texture;        // in place of color: 1 + index into the scene's textures; 0: none
+    double texture_size;     // width of a texture on a plane or disc, > 0, in scene units
 } Material;
 
-// An image file for textures; scene_compile reads it.
+// A texture's image file; scene_compile reads it.
 typedef struct {
     char *path;
     size_t offset; // of its name in the scene's text
-} SceneImage;
+} SceneTexture;
 
 // Every shape, by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
 // then the mesh.
@@ -170,10 +170,10 @@ typedef struct {
         size_t count, capacity;
     } meshes;
     struct {
-        SceneImage *items;
+        SceneTexture *items;
         size_t count, capacity;
-    } images;
-    char *file; // of a scene that has images, and
+    } textures;
+    char *file; // of a scene that has textures, and
     Text text;  // what was read from it: for messages about them, see scene_source
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0

@@ -51,10 +51,10 @@ static uint32_t normals_add(Flattening *flattening, Vector3 a, Vector3 b, Vector
 // What a triangle's id.z holds.
 static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const uint32_t *corners, uint32_t material)
 {
-    uint32_t image = flattening->scene->materials.items[material].image;
-    if (!mesh->uvs || image == 0) return 0;
+    uint32_t texture = flattening->scene->materials.items[material].texture;
+    if (!mesh->uvs || texture == 0) return 0;
     TriangleUvs *uvs = flattening->compiled->arrays[FLAT_TRIANGLE_UVS].items;
-    uvs[flattening->uvs_count++] = triangle_uvs(mesh, corners, &flattening->compiled->textures[image - 1]);
+    uvs[flattening->uvs_count++] = triangle_uvs(mesh, corners, &flattening->compiled->textures[texture - 1]);
     return (uint32_t)flattening->uvs_count;
 }
 

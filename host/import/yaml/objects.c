@@ -179,7 +179,7 @@ typedef struct {
     // Checks fields against each other and derives members. Reports an error and returns false if they do not
     // fit. May be NULL.
     bool (*finish)(YamlReader *reader, const YamlNode *mapping, Form form, Object *object);
-    bool takes_image; // of its material
+    bool takes_texture; // of its material
 } Shape;
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
@@ -223,7 +223,7 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         return;
     if (shape->finish && !shape->finish(reader, mapping, form, &object)) return;
     if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-    if (reader->scene->materials.items[object.material].image > 0 && !shape->takes_image) {
+    if (reader->scene->materials.items[object.material].texture > 0 && !shape->takes_texture) {
         report_error(&reader->report, field_node(reader, mapping, "material")->offset,
                      "an image lies on a sphere, plane, disc or mesh, not on a %s", shape_names[kind]);
         return;
