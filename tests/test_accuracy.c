@@ -223,7 +223,7 @@ static void test_distances_and_normals(void **state)
     assert_near(compare(&reference, &variant).normal.largest, tiny, 1e-24);
 
     // in units of double, where it was computed in double
-    variant.wide = true;
+    variant.is_double = true;
     variant.t[at(2, 2)] = 8 + 8 * DBL_EPSILON;
     assert_near(compare(&reference, &variant).t_ulps.largest, 1, 0);
     // no number is as far off as can be

@@ -121,18 +121,18 @@ static RandomRay move_beside(const RandomRay *given, const Scene *scene, double 
     return (RandomRay){vector_add(place, vector_scale(normal, height)), random_in_sphere(random)};
 }
 
-// Rays and what they should hit; `wide`: taken in double, else what a float holds of them; `beside`: from
-// next to the surface.
-static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, size_t aim_count, bool wide,
-                    bool beside, Random *random)
+// Rays and what they should hit; `is_double`: taken in double, else what a float holds of them; `beside`:
+// from next to the surface.
+static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, size_t aim_count,
+                    bool is_double, bool beside, Random *random)
 {
-    for (size_t i = 0; !wide && i < scene->objects.count; i++)
+    for (size_t i = 0; !is_double && i < scene->objects.count; i++)
         scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
     for (size_t i = 0; i < RAYS_PER_SHAPE; i++) {
         RandomRay given = random_ray(&aims[aim_count > 0 ? i % aim_count : 0], random);
         if (beside) given = move_beside(&given, scene, trial->radius, random);
-        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
-                                : reference_ray_rounded(given.origin, given.direction);
+        ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
+                                     : reference_ray_rounded(given.origin, given.direction);
         // one in three looks behind its start, too
         if (i % 3 == 2) ray.tmin = -0x1p10;
         trial->rays[i] = (TraceRay){
@@ -173,12 +173,12 @@ static void hold(const RandomShape *shapes, size_t count, Vector3 center, double
     Scene scene = scene_of(objects, count, &material);
     trial.center = center;
     trial.radius = radius;
-    for (int wide = 0; wide < 2; wide++) {
+    for (int is_double = 0; is_double < 2; is_double++) {
         for (size_t i = 0; i < count; i++)
             objects[i] = shapes[i].object;
-        prepare(&trial, &scene, shapes, count, wide, beside, random);
+        prepare(&trial, &scene, shapes, count, is_double, beside, random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-            if (wide != (precision == PRECISION_DOUBLE)) continue;
+            if (is_double != (precision == PRECISION_DOUBLE)) continue;
             hold_at(&trial, &scene, precision, 1, what);
             hold_at(&trial, &scene, precision, 0, what);
         }

@@ -80,11 +80,11 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);
     if (variant->renderer) {
         const RenderReport *report = renderer_report(variant->renderer);
-        row->wide = report->wide;
+        row->is_double = report->is_double;
         row->traverses_bvh = (report->features & FEATURE_BVH) != 0;
         row->flops_per_ray = work_flops_per_ray(variant->scene);
-        size_t bytes =
-            (size_t)settings->width * settings->height * 3 * (row->wide ? sizeof(double) : sizeof(float));
+        size_t bytes = (size_t)settings->width * settings->height * 3 *
+                       (row->is_double ? sizeof(double) : sizeof(float));
         row->image_bytes = (double)bytes;
     } else {
         row->failure = memory_copy_text(messages.count > 0 ? messages.items[0].text : "unknown");

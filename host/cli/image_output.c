@@ -118,9 +118,9 @@ static ImageHeader layer_header(const Film *film, Layer layer)
         .height = film->height,
         .channels = film_components(film, layer),
         .bits = 8,
-        .npy_type = integer      ? 'u'
-                    : film->wide ? 'd'
-                                 : 'f',
+        .npy_type = integer           ? 'u'
+                    : film->is_double ? 'd'
+                                      : 'f',
     };
 }
 
@@ -204,7 +204,7 @@ static const double *positions_in_world(ImageOutput *output, const Film *band)
 {
     size_t count = 3 * film_pixel_count(band);
     double *world = scratch_reserve(&output->converted, count * sizeof *world);
-    numbers_widen(world, band->layers[LAYER_POSITION], count, band->wide);
+    numbers_widen(world, band->layers[LAYER_POSITION], count, band->is_double);
     Vector3 eye = output->scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
     for (size_t i = 0; i < count; i++)
@@ -216,7 +216,7 @@ static bool band_write(ImageOutput *output)
 {
     const Film *band = &output->band;
     MessageList *messages = output->messages;
-    bool narrows = band->wide && image_format_of(output->options->path) != IMAGE_NPY;
+    bool narrows = band->is_double && image_format_of(output->options->path) != IMAGE_NPY;
     const void *color = narrows ? color_narrowed(output, band) : band->layers[LAYER_COLOR];
     if (!image_writer_rows(output->image, color, band->height, messages)) return false;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {

@@ -130,13 +130,13 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
     return read;
 }
 
-static bool hits_write(const char *path, const TraceHit *hits, size_t count, bool wide)
+static bool hits_write(const char *path, const TraceHit *hits, size_t count, bool is_double)
 {
     MessageList messages = {0};
     OutputFile output;
     bool written = output_open(&output, path, &messages);
     if (written) {
-        int digits = wide ? 17 : 9;
+        int digits = is_double ? 17 : 9;
         fputs("object,t,nx,ny,nz\n", output.file);
         for (size_t i = 0; i < count; i++) {
             const TraceHit *hit = &hits[i];
@@ -181,7 +181,8 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     bool traced = renderer_trace(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
         hits[i].t = ldexp(hits[i].t, -exponents[i]);
-    bool written = traced && hits_write(options->output, hits, rays->count, renderer_report(renderer)->wide);
+    bool written =
+        traced && hits_write(options->output, hits, rays->count, renderer_report(renderer)->is_double);
     free(exponents);
     free(hits);
     free(scaled);

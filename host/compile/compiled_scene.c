@@ -71,19 +71,19 @@ void compiled_scene_free(CompiledScene *compiled)
     *compiled = (CompiledScene){0};
 }
 
-size_t flat_array_size(const FlatArray *array, bool wide)
+size_t flat_array_size(const FlatArray *array, bool is_double)
 {
     const FlatLayout *layout = &array->layout;
-    size_t size =
-        wide ? layout->size : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+    size_t size = is_double ? layout->size
+                            : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
     return array->count * size;
 }
 
-void flat_array_write(const FlatArray *array, bool wide, void *target)
+void flat_array_write(const FlatArray *array, bool is_double, void *target)
 {
     const FlatLayout *layout = &array->layout;
-    if (wide) {
-        memcpy(target, array->items, flat_array_size(array, wide));
+    if (is_double) {
+        memcpy(target, array->items, flat_array_size(array, is_double));
         return;
     }
     char *out = target;

@@ -71,5 +71,5 @@ void *flat_array_at(const FlatArray *array, size_t index);
 uint32_t *flat_id(const FlatArray *array, size_t index);
 
 // Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
-size_t flat_array_size(const FlatArray *array, bool wide);
-void flat_array_write(const FlatArray *array, bool wide, void *target);
+size_t flat_array_size(const FlatArray *array, bool is_double);
+void flat_array_write(const FlatArray *array, bool is_double, void *target);

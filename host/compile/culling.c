@@ -50,9 +50,9 @@ static void row_fill(const CompiledScene *compiled, Vector3 common_origin, doubl
 // 16 MiB of floats; a scene that would need more does without.
 enum { CULL_SPHERES_LARGEST = 1 << 20 };
 
-void culling_fill(CompiledScene *compiled, bool wide)
+void culling_fill(CompiledScene *compiled, bool is_double)
 {
-    double roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
+    double roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
     const FlatArray *lights = &compiled->arrays[FLAT_LIGHTS];
     size_t count = 1;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {

@@ -4,7 +4,7 @@
 // keeps it.
 double rounded(const Rounding *rounding, double value)
 {
-    if (rounding->wide) return value;
+    if (rounding->is_double) return value;
     volatile float narrow = (float)value;
     return narrow;
 }

@@ -79,7 +79,7 @@ Figure bench_peak_fraction(const BenchRow *row, const Peak *peak)
     if (row->traverses_bvh) return (Figure){.why_not = "unknown with a BVH"};
     uint64_t rays = row->rays[BENCH_CAMERA] + row->rays[BENCH_REFLECTED] + row->rays[BENCH_REFRACTED];
     double rate = row->flops_per_ray * (double)rays / bench_kernel(&row->times).median;
-    return (Figure){.value = rate / peak->flops_per_second[row->wide]};
+    return (Figure){.value = rate / peak->flops_per_second[row->is_double]};
 }
 
 double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak)

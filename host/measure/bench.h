@@ -51,8 +51,8 @@ typedef struct {
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
     uint64_t rays[BENCH_RAY_KINDS];
-    bool wide, traverses_bvh; // computes in double; rays traversed a BVH
-    double flops_per_ray;     // as work.h counts
+    bool is_double, traverses_bvh; // computes in double; rays traversed a BVH
+    double flops_per_ray;          // as work.h counts
     double image_bytes;
 } BenchRow;
 

@@ -54,8 +54,8 @@ const char *device_selector(const char *option);
 bool device_usable(const Device *device, const char **why);
 
 // The default number of rays per work-item: on a CPU the native vector width of float, or of double where
-// `wide`, rounded down to 1, 4, 8 or 16; elsewhere 1.
-unsigned device_lanes(const Device *device, bool wide);
+// `is_double`, rounded down to 1, 4, 8 or 16; elsewhere 1.
+unsigned device_lanes(const Device *device, bool is_double);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
 

@@ -52,7 +52,7 @@ static Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t 
                   .height = row_count,
                   .light_count = (uint32_t)renderer->light_count,
                   .first_row = first_row,
-                  .wide = renderer->report.wide,
+                  .is_double = renderer->report.is_double,
                   .real_size = renderer_scalar_size(renderer)};
 }
 
@@ -80,7 +80,7 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
     }
     buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
-    void *offsets = sample_pattern(sample_count, renderer->report.wide);
+    void *offsets = sample_pattern(sample_count, renderer->report.is_double);
     buffers->offsets =
         buffer_create(renderer->compute, 2 * sample_count * film.real_size, offsets, CL_MEM_READ_ONLY);
     free(offsets);
@@ -284,7 +284,7 @@ bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
     const RenderSettings *settings = &renderer->settings;
     *film =
         film_allocate(settings->region_width, settings->region_height, (uint32_t)renderer->light_count, aovs);
-    film->wide = renderer->report.wide;
+    film->is_double = renderer->report.is_double;
     bool whole = renderer_render(renderer, aovs, film_take_band, film);
     if (!whole) film_free(film);
     return whole;

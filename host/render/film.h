@@ -40,7 +40,7 @@ extern const LayerType layer_types[LAYER_COUNT];
 typedef struct {
     uint32_t width, height, light_count;
     uint32_t first_row; // of a band in its region
-    bool wide;          // computed in double
+    bool is_double;     // computed in double
     size_t real_size;   // sizeof(double); sizeof(float) in a band that was not
     union {
         void *layers[LAYER_COUNT];

@@ -65,7 +65,7 @@ typedef struct {
 typedef struct {
     FeatureSet features;
     uint32_t lanes;
-    bool wide; // structs in double
+    bool is_double; // structs in double
     uint64_t kernel_hash;
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was

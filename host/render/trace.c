@@ -7,38 +7,38 @@
 
 enum { TRACE_GROUP = 64, TRACE_RAYS_OF_LAUNCH = 1 << 18 };
 
-static void scalar_set(void *scalars, size_t index, bool wide, double value)
+static void scalar_set(void *scalars, size_t index, bool is_double, double value)
 {
-    if (wide)
+    if (is_double)
         ((double *)scalars)[index] = value;
     else
         ((float *)scalars)[index] = (float)value;
 }
 
-static double scalar_at(const void *scalars, size_t index, bool wide)
+static double scalar_at(const void *scalars, size_t index, bool is_double)
 {
-    return wide ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
+    return is_double ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
 }
 
-static void vector_at(const void *scalars, size_t index, bool wide, double vector[3])
+static void vector_at(const void *scalars, size_t index, bool is_double, double vector[3])
 {
     for (size_t axis = 0; axis < 3; axis++)
-        vector[axis] = scalar_at(scalars, index + axis, wide);
+        vector[axis] = scalar_at(scalars, index + axis, is_double);
 }
 
 // The scalars of one hit, from `index` on.
-static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object, double unit)
+static TraceHit hit_at(const void *scalars, size_t index, bool is_double, uint32_t object, double unit)
 {
     TraceHit hit = {.object = object,
-                    .t = scalar_at(scalars, index + RESULT_T, wide),
-                    .transmission = scalar_at(scalars, index + RESULT_TRANSMISSION, wide),
-                    .light = scalar_at(scalars, index + RESULT_LIGHT, wide)};
-    vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
-    vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
-    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, wide, hit.reflected_origin);
-    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, wide, hit.reflected_direction);
-    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, wide, hit.refracted_origin);
-    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, wide, hit.refracted_direction);
+                    .t = scalar_at(scalars, index + RESULT_T, is_double),
+                    .transmission = scalar_at(scalars, index + RESULT_TRANSMISSION, is_double),
+                    .light = scalar_at(scalars, index + RESULT_LIGHT, is_double)};
+    vector_at(scalars, index + RESULT_NORMAL, is_double, hit.normal);
+    vector_at(scalars, index + RESULT_POSITION, is_double, hit.position);
+    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, hit.reflected_origin);
+    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, hit.reflected_direction);
+    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, hit.refracted_origin);
+    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, hit.refracted_direction);
     hit.t *= unit;
     for (size_t axis = 0; axis < 3; axis++) {
         hit.position[axis] *= unit;
@@ -51,8 +51,8 @@ static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t ob
 // The rays' scalars as the kernel reads them; caller frees.
 static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t count)
 {
-    bool wide = renderer->report.wide;
-    double unit = renderer->unit, farthest = wide ? DBL_MAX : (double)FLT_MAX;
+    bool is_double = renderer->report.is_double;
+    double unit = renderer->unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
     void *scalars = memory_allocate((size_t)count * RAY_SCALARS, renderer_scalar_size(renderer));
     for (uint32_t i = 0; i < count; i++) {
         const double *origin = rays[i].origin, *direction = rays[i].direction;
@@ -60,7 +60,7 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
             origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
             direction[1],     direction[2],     rays[i].tmin / unit, fmin(rays[i].tmax / unit, farthest)};
         for (size_t k = 0; k < RAY_SCALARS; k++)
-            scalar_set(scalars, i * RAY_SCALARS + k, wide, ray[k]);
+            scalar_set(scalars, i * RAY_SCALARS + k, is_double, ray[k]);
     }
     return scalars;
 }
@@ -85,7 +85,7 @@ static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_m
     const uint32_t *object = renderer_map(renderer, objects, (size_t)count * sizeof *object);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
         hits[i] =
-            hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.wide, object[i], renderer->unit);
+            hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i], renderer->unit);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     compute_try(compute, clFinish(compute->queue));

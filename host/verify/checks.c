@@ -13,7 +13,7 @@ int verify_reference_bits(void)
 
 static Object object_at_work(const VerifyRun *run, const Object *object)
 {
-    return verify_is_wide(run) ? *object : reference_round_object(object);
+    return verify_is_double(run) ? *object : reference_round_object(object);
 }
 
 static VerifyTarget target_from(const Object *object, Vector3 origin)

@@ -26,7 +26,7 @@ Scene verify_rays_scene(const VerifyRays *set)
 
 static double nudged(const VerifyRun *run, double value, double toward)
 {
-    return verify_is_wide(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
+    return verify_is_double(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
 }
 
 // The ray and those beside it. A component of 0 has only subnormal numbers beside it, and stays.

@@ -72,7 +72,7 @@ bool verify_holds(const VerifyResult *result)
 
 double verify_roundoff(const VerifyRun *run)
 {
-    return verify_is_wide(run) ? 0x1p-53 : 0x1p-24;
+    return verify_is_double(run) ? 0x1p-53 : 0x1p-24;
 }
 
 double verify_ulp(const VerifyRun *run, double value)
@@ -84,7 +84,7 @@ double verify_ulp(const VerifyRun *run, double value)
 
 double verify_rounded(const VerifyRun *run, double value)
 {
-    if (verify_is_wide(run)) return value;
+    if (verify_is_double(run)) return value;
     volatile float single = (float)value; // volatile: see host/compile/rounding.c
     return single;
 }
@@ -96,7 +96,7 @@ void verify_round_ray(const VerifyRun *run, TraceRay *ray)
         ray->direction[axis] = verify_rounded(run, ray->direction[axis]);
     }
     ray->tmin = verify_rounded(run, ray->tmin);
-    ray->tmax = fmin(ray->tmax, verify_is_wide(run) ? DBL_MAX : (double)FLT_MAX);
+    ray->tmax = fmin(ray->tmax, verify_is_double(run) ? DBL_MAX : (double)FLT_MAX);
 }
 
 static bool is_finite(const double vector[3])

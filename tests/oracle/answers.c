@@ -33,9 +33,9 @@ static const char *json_of(bool value)
     return value ? "true" : "false";
 }
 
-static void set_print(const char *name, bool wide)
+static void set_print(const char *name, bool is_double)
 {
-    printf("{\"set\": \"%s\", \"wide\": %s}\n", name, json_of(wide));
+    printf("{\"set\": \"%s\", \"wide\": %s}\n", name, json_of(is_double));
 }
 
 static void flags_print(bool finite, bool caps)
@@ -86,7 +86,7 @@ static void hit_print(const ReferenceHit *hit)
 
 // The nearest hit, and what the tiers leave open and allow; where nothing is hit, of the object that is
 // missed by the least.
-static void test_ray_print(bool wide, const Object *objects, size_t count, const VerifyTestRay *test)
+static void test_ray_print(bool is_double, const Object *objects, size_t count, const VerifyTestRay *test)
 {
     ReferenceRay ray = verify_reference_ray(&test->ray);
     size_t nearest = 0;
@@ -101,7 +101,7 @@ static void test_ray_print(bool wide, const Object *objects, size_t count, const
     ray_print(&test->ray);
     hit_print(&hit);
     printf(", \"object\": %zu, \"tiers\": {", nearest);
-    for (VerifyTier tier = wide ? TIER_D : TIER_A; tier <= (wide ? TIER_D : TIER_C); tier++) {
+    for (VerifyTier tier = is_double ? TIER_D : TIER_A; tier <= (is_double ? TIER_D : TIER_C); tier++) {
         const VerifyRun run = {.tier = tier};
         VerifyExpected expected = verify_expected(&run, &objects[nearest], test, hit);
         printf("%s\"%c\": {\"open\": %s, \"decided\": %s, \"touch\": %s, \"bound\": %.17g}",
@@ -112,17 +112,17 @@ static void test_ray_print(bool wide, const Object *objects, size_t count, const
     printf("}}\n");
 }
 
-static void case_print(const VerifyRays *set, bool wide, size_t further)
+static void case_print(const VerifyRays *set, bool is_double, size_t further)
 {
-    const VerifyRun run = {.tier = wide ? TIER_D : TIER_C};
+    const VerifyRun run = {.tier = is_double ? TIER_D : TIER_C};
     Scene scene = verify_rays_scene(set);
     Object *objects = verify_objects(&run, &scene);
     VerifyTestRays tests = verify_test_rays(&run, set);
-    set_print(set->name, wide);
+    set_print(set->name, is_double);
     for (size_t i = 0; i < scene.objects.count; i++)
         object_print(&objects[i]);
     for (size_t i = 0; i < tests.count; i++)
-        test_ray_print(wide, objects, scene.objects.count, &tests.items[i]);
+        test_ray_print(is_double, objects, scene.objects.count, &tests.items[i]);
     for (size_t i = tests.count; set->closed && i < further; i++) {
         TraceRay ray = set->family(i);
         verify_round_ray(&run, &ray);
@@ -159,8 +159,8 @@ int main(int argument_count, char **arguments)
     size_t samples = argument_count > 1 ? strtoul(arguments[1], NULL, 10) : 0;
     size_t further = argument_count > 2 ? strtoul(arguments[2], NULL, 10) : 0;
     for (size_t i = 0; i < verify_rays_count; i++)
-        for (int wide = 0; wide < 2; wide++)
-            case_print(&verify_rays[i], wide, further);
+        for (int is_double = 0; is_double < 2; is_double++)
+            case_print(&verify_rays[i], is_double, further);
     ShapeForm forms[SHAPE_FORMS_LARGEST];
     const size_t form_count = shape_forms(forms);
     for (size_t i = 0; i < form_count && samples > 0; i++)

@@ -29,7 +29,7 @@ static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Ve
     Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
             seen_c = point_from_eye(rounding, c);
     Vector3 ab = vector_subtract(seen_b, seen_a), ac = vector_subtract(seen_c, seen_a);
-    if (rounding->wide) { // the products of floats fit double, those of doubles may not
+    if (rounding->is_double) { // the products of floats fit double, those of doubles may not
         ab = axis_scaled(ab);
         ac = axis_scaled(ac);
     }
