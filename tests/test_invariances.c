@@ -58,7 +58,7 @@ static Material random_material(Random *random, size_t index)
     return material;
 }
 
-static ShapeForm forms[SHAPE_FORMS_LARGEST];
+static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
 
 // One of each form, then bounded ones; none so large that it hides the rest.

@@ -369,7 +369,7 @@ static void measures_distances(void **state)
 {
     (void)state;
     size_t measured = 0;
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     for (size_t kind = 0; kind < form_count; kind++) {
         Random random = {kind};

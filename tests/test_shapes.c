@@ -14,7 +14,7 @@ enum { SHAPES_OF_A_FORM = 3, RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SCENE_
 
 static const uint32_t lane_counts[] = {1, 4, 8, 16};
 
-static ShapeForm forms[SHAPE_FORMS_LARGEST];
+static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
 
 typedef struct {
@@ -245,8 +245,8 @@ static void gives_the_same_bits_at_every_width(void **state)
     static Trial trial;
     static TraceHit hits[2][RAYS_PER_SHAPE];
     Random random = {form_count + 1};
-    RandomShape shapes[SHAPE_FORMS_LARGEST];
-    Object objects[SHAPE_FORMS_LARGEST];
+    RandomShape shapes[SHAPE_FORMS_MAX];
+    Object objects[SHAPE_FORMS_MAX];
     for (size_t i = 0; i < form_count; i++) {
         shapes[i] = random_shape(&forms[i], &random);
         objects[i] = shapes[i].object;
@@ -268,7 +268,7 @@ static void gives_the_same_bits_at_every_width(void **state)
 
 int main(void)
 {
-    struct CMUnitTest tests[SHAPE_FORMS_LARGEST + 3] = {0};
+    struct CMUnitTest tests[SHAPE_FORMS_MAX + 3] = {0};
     form_count = shape_forms(forms);
     for (size_t i = 0; i < form_count; i++)
         tests[i] = (struct CMUnitTest){forms[i].name, hits_each_shape, NULL, NULL, &forms[i]};

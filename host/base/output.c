@@ -99,9 +99,9 @@ static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *mes
 // The end of a chain of symbolic links, whether a file exists there or not; `target` itself if it is no link.
 static char *link_end(const char *target)
 {
-    enum { STEPS_LARGEST = 40 }; // as in Linux; a longer chain is a cycle
+    enum { STEPS_MAX = 40 }; // as in Linux; a longer chain is a cycle
     char *path = memory_copy_text(target), aim[PATH_MAX];
-    for (int step = 0; step < STEPS_LARGEST; step++) {
+    for (int step = 0; step < STEPS_MAX; step++) {
         ssize_t length = readlink(path, aim, sizeof aim);
         if (length < 0) break;
         const char *slash = aim[0] == '/' ? NULL : strrchr(path, '/');

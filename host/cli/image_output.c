@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOTE_COUNT_LARGEST = 16 };
+enum { NOTE_COUNT_MAX = 16 };
 
 typedef struct {
     void *items;
@@ -71,7 +71,7 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 
 typedef struct {
     Text text;
-    size_t starts[NOTE_COUNT_LARGEST][2];
+    size_t starts[NOTE_COUNT_MAX][2];
     size_t count;
 } Notes;
 
@@ -151,7 +151,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
 {
     Notes notes = {0};
     notes_write(&notes, output);
-    ImageNote list[NOTE_COUNT_LARGEST + 1] = {0};
+    ImageNote list[NOTE_COUNT_MAX + 1] = {0};
     for (size_t i = 0; i < notes.count; i++)
         list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
 

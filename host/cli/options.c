@@ -39,7 +39,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
 
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
 {
-    const uint64_t largest = IMAGE_SIDE_LARGEST;
+    const uint64_t largest = IMAGE_SIDE_MAX;
     const char *at;
     uint64_t w, h;
     if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||
@@ -60,12 +60,12 @@ static bool perturb_read(const char *value, CommonOptions *common)
     uint64_t seed, scale = 1;
     bool valid = digits_read(value, &at, &seed) && seed >= 1 && seed <= UINT32_MAX;
     if (valid && *at == ':')
-        valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_LARGEST;
+        valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_MAX;
     if (!valid || *at != '\0') {
         fprintf(stderr,
                 "glint: --perturb: expected a seed from 1 to %u, or SEED:SCALE with a scale from 1 to %d, "
                 "not \"%s\"\n",
-                UINT32_MAX, PERTURB_SCALE_LARGEST, value);
+                UINT32_MAX, PERTURB_SCALE_MAX, value);
         return false;
     }
     common->perturb_seed = (uint32_t)seed;
@@ -211,7 +211,7 @@ void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
     if (*width > 0) return;
     *width = scene->width > 0 ? scene->width : 1280;
     double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
-    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_LARGEST));
+    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_MAX));
     *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
 }
 

@@ -68,7 +68,7 @@ enum {
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT
 
-enum { IMAGE_SIDE_LARGEST = 1 << 20, SAMPLES_LARGEST = 1 << 20, BOUNCES_DEFAULT = 5 };
+enum { IMAGE_SIDE_MAX = 1 << 20, SAMPLES_MAX = 1 << 20, BOUNCES_DEFAULT = 5 };
 
 enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];

@@ -33,11 +33,11 @@ static bool option_samples(VariantOptions *options, const char *value)
         char *word = memory_copy_text(at);
         word[length] = '\0';
         uint32_t samples = 0;
-        bool valid = option_count("samples", word, 1, SAMPLES_LARGEST, &samples);
+        bool valid = option_count("samples", word, 1, SAMPLES_MAX, &samples);
         free(word);
         if (!valid) return false;
-        if (options->sample_choices == SAMPLE_CHOICES_LARGEST) {
-            fprintf(stderr, "glint: --samples: at most %d numbers\n", SAMPLE_CHOICES_LARGEST);
+        if (options->sample_choices == SAMPLE_CHOICES_MAX) {
+            fprintf(stderr, "glint: --samples: at most %d numbers\n", SAMPLE_CHOICES_MAX);
             return false;
         }
         options->samples[options->sample_choices++] = samples;
@@ -68,7 +68,7 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
         *valid = option_samples(options, value);
         return true;
     case OPTION_BOUNCES:
-        *valid = option_count("bounces", value, 0, BOUNCES_LARGEST, &options->bounce_count);
+        *valid = option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
         return true;
     default:
         return option_common(&options->common, option, value, valid);

@@ -6,13 +6,13 @@
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 
-enum { SAMPLE_CHOICES_LARGEST = 16 };
+enum { SAMPLE_CHOICES_MAX = 16 };
 
 typedef struct {
     CommonOptions common;
     unsigned precisions, lanes, bvhs; // sets; lanes empty: the device's default
     uint32_t width, height;           // 0: default
-    uint32_t samples[SAMPLE_CHOICES_LARGEST];
+    uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0: one sample
     uint32_t bounce_count;
     double seconds; // 0: default

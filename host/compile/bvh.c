@@ -20,8 +20,8 @@ enum {
     SMALL_BIN_COUNT = 8,
     // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
     // 2^28 primitives, and at most 7 cuts by kind follow.
-    HALVING_DEPTH = BVH_DEPTH_LARGEST - (25 + 7),
-    THREAD_RANGE_SMALLEST = 8192 // below it a thread costs more than it saves
+    HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
+    THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };
 
 // SAH costs of the binary tree: visiting a node, testing a primitive. (bvh_widen has those of wide nodes.)
@@ -247,7 +247,7 @@ static size_t range_partition_by_area(Builder *builder, Range range)
     float area = box_half_area(bounds.boxes);
     bool pays = split.found && split.cost * intersection_cost + traversal_cost * area <
                                    (float)count * intersection_cost * area;
-    if (!pays && !(split.found && count > BVH_LEAF_LARGEST)) return range.end;
+    if (!pays && !(split.found && count > BVH_LEAF_MAX)) return range.end;
     size_t middle = range_partition(builder, range, &map, &split);
     return middle > range.begin ? middle : range.end;
 }
@@ -260,7 +260,7 @@ static size_t range_split(Builder *builder, Range range, unsigned depth)
         size_t middle = range_partition_by_area(builder, range);
         if (middle < range.end) return middle;
     }
-    if (count > BVH_LEAF_LARGEST) return range.begin + count / 2;
+    if (count > BVH_LEAF_MAX) return range.begin + count / 2;
     range_sort_by_kind(builder, range);
     return range_kind_boundary(builder, range);
 }
@@ -283,7 +283,7 @@ static void *range_task_run(void *context)
 // Builds both sides of a node, in two threads where one is idle and the range is worth it.
 static void sides_build(Builder *builder, Range left, Range right, unsigned depth, BvhBinaryNode *node)
 {
-    bool large = right.end - left.begin >= THREAD_RANGE_SMALLEST;
+    bool large = right.end - left.begin >= THREAD_RANGE_MIN;
     if (large && atomic_fetch_sub(&builder->idle_threads, 1) > 0) {
         RangeTask task = {builder, left, depth, &node->children[0]};
         pthread_t thread;

@@ -176,8 +176,7 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
     free(bounded.boxes);
     bounded.boxes = NULL;
-    nodes_write(compiled, &bvh, &bounded,
-                settings->lanes < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : settings->lanes);
+    nodes_write(compiled, &bvh, &bounded, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         array_reorder(compiled, kind, &bvh, &bounded);
     memcpy(compiled->bounded_counts, bounded.kind_counts, sizeof compiled->bounded_counts);

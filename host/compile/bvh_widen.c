@@ -19,7 +19,7 @@ static const float tie_cost = 0x1p-40f;
 // Entry i: a subtree's least cost where it takes at most i slots of the wide node above it, minus
 // leaves_cost; entry 0 is unused. In one slot it is a wide node of its own, or a leaf. The leaves cost the
 // same in all slots: left out, they leave the float's digits, and ties, to what differs.
-typedef float Costs[BVH_WIDTH_LARGEST + 1];
+typedef float Costs[BVH_WIDTH_MAX + 1];
 
 typedef struct {
     Costs costs;
@@ -73,7 +73,7 @@ static void subtree_count(const Widening *widening, const Subtree *first, const 
                           Subtree *subtree)
 {
     const uint8_t *kinds = widening->bvh->kinds;
-    bool joins = first->count > 0 && second->count > 0 && first->count + second->count <= BVH_LEAF_LARGEST &&
+    bool joins = first->count > 0 && second->count > 0 && first->count + second->count <= BVH_LEAF_MAX &&
                  kinds[first->first] == kinds[second->first];
     subtree->first = first->first < second->first ? first->first : second->first;
     subtree->count = joins ? first->count + second->count : 0;
@@ -139,7 +139,7 @@ static void child_gather(const Widening *widening, const BvhChild *child, unsign
 
 void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
 {
-    if (width < 2 || width > BVH_WIDTH_LARGEST) fault("a node of %u children", width);
+    if (width < 2 || width > BVH_WIDTH_MAX) fault("a node of %u children", width);
     double root_area = bounds_half_area(bvh_node_bounds(&bvh->nodes[0]));
     Widening widening = {
         .bvh = bvh,

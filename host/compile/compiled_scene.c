@@ -18,8 +18,8 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
     // the widest; flat_nodes_make makes them as wide as the kernel's
-    [FLAT_NODES] = {BVH_WIDTH_LARGEST / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
-                    BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
+    [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
+                    BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
     [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
     [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, texture),
@@ -46,7 +46,7 @@ FlatArray flat_array_make(size_t kind, size_t count)
 FlatArray flat_nodes_make(size_t count, unsigned width)
 {
     const FlatLayout widest = layouts[FLAT_NODES];
-    const unsigned parts = BVH_WIDTH_LARGEST / width;
+    const unsigned parts = BVH_WIDTH_MAX / width;
     return array_make(
         (FlatLayout){widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts}, count);
 }

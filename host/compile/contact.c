@@ -12,7 +12,7 @@
 
 // More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives
 // takes their place.
-#define PAIRS_LARGEST ((size_t)1 << 19)
+#define PAIRS_MAX ((size_t)1 << 19)
 
 // Where a primitive is: in its box, infinite where it is unbounded; what is flat also in its plane, normal .
 // p = offset.
@@ -153,8 +153,8 @@ static Bounds lists_meet(ContactRegionList *transparent, ContactRegionList *opaq
     regions_keep_near(opaque, transparent, margin);
     regions_keep_near(transparent, opaque, margin);
     if (transparent->count == 0) return bounds_empty();
-    if (opaque->count > PAIRS_LARGEST / transparent->count) regions_join_bounded(opaque);
-    if (opaque->count > PAIRS_LARGEST / transparent->count) return everywhere();
+    if (opaque->count > PAIRS_MAX / transparent->count) regions_join_bounded(opaque);
+    if (opaque->count > PAIRS_MAX / transparent->count) return everywhere();
     Bounds all = bounds_empty();
     for (size_t i = 0; i < transparent->count; i++)
         for (size_t k = 0; k < opaque->count; k++)

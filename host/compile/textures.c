@@ -10,7 +10,7 @@
 
 // Of a side: beyond it a position in float, 24 bits, cannot resolve a texel. Of all textures: a kernel
 // counts texels in 32 bits.
-enum { SIDE_LARGEST = 1 << 16, TEXELS_LARGEST = 1 << 28 };
+enum { SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
 typedef struct {
     uint32_t width, height;
@@ -101,9 +101,8 @@ static bool level_fill(Level *level, const Image *image, bool decodes)
 // What is wrong with the image, or NULL.
 static const char *levels_add(LevelList *list, const Image *image, bool as_displayed)
 {
-    if (image->width > SIDE_LARGEST || image->height > SIDE_LARGEST)
-        return "a side of more than 65536 texels";
-    if ((size_t)image->width * image->height > TEXELS_LARGEST - list->texel_count)
+    if (image->width > SIDE_MAX || image->height > SIDE_MAX) return "a side of more than 65536 texels";
+    if ((size_t)image->width * image->height > TEXELS_MAX - list->texel_count)
         return "too many texels in all textures";
     Level level = level_open(image->width, image->height);
     array_push(list->levels, level);
@@ -114,7 +113,7 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
         array_push(list->levels, level);
         list->texel_count += (size_t)level.width * level.height;
     }
-    return list->texel_count > TEXELS_LARGEST ? "too many texels in all textures" : NULL;
+    return list->texel_count > TEXELS_MAX ? "too many texels in all textures" : NULL;
 }
 
 static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,

@@ -104,10 +104,10 @@ static float *channel_row(const Channel *channel, uint32_t y)
 }
 
 // Weights of the neighbors -radius..radius, the same across and down.
-enum { RADIUS_LARGEST = 15 };
+enum { RADIUS_MAX = 15 };
 typedef struct {
     int radius;
-    float weights[2 * RADIUS_LARGEST + 1];
+    float weights[2 * RADIUS_MAX + 1];
 } Filter;
 
 // Outside the image its border goes on.
@@ -159,8 +159,8 @@ static Channel channel_filter(const Channel *in, const Filter *across, const Fil
 // the negative ones.
 static Filter filter_make(double (*shape)(double x, double deviation), double deviation, int radius)
 {
-    if (radius > RADIUS_LARGEST) fault("a filter of FLIP is too wide: %d", radius);
-    double weights[2 * RADIUS_LARGEST + 1] = {0}, positive = 0, negative = 0;
+    if (radius > RADIUS_MAX) fault("a filter of FLIP is too wide: %d", radius);
+    double weights[2 * RADIUS_MAX + 1] = {0}, positive = 0, negative = 0;
     for (int x = -radius; x <= radius; x++) {
         double weight = shape(x, deviation);
         weights[x + radius] = weight;

@@ -6,7 +6,7 @@
 static const double launch_seconds_wanted = 0.03, total_seconds = 0.3;
 
 enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of eight chains
-enum { COPY_BYTES_LARGEST = 128 << 20, COPY_BYTES_OF_ITEM = 16 };
+enum { COPY_BYTES_MAX = 128 << 20, COPY_BYTES_OF_ITEM = 16 };
 
 static double launch_seconds(Peak *peak, const LaunchTime *time)
 {
@@ -46,7 +46,7 @@ static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, u
 static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
 {
     const Device *device = compute->device;
-    uint64_t size = COPY_BYTES_LARGEST;
+    uint64_t size = COPY_BYTES_MAX;
     if (size > device->largest_buffer_bytes / 4) size = device->largest_buffer_bytes / 4;
     if (size > device->memory_bytes / 16) size = device->memory_bytes / 16;
     size_t items = (size_t)size / COPY_BYTES_OF_ITEM, bytes = items * COPY_BYTES_OF_ITEM;

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 
 enum {
-    BAND_BYTES_LARGEST = 4 << 20, // color and shadow, the one layer that grows with the lights
-    GROUPS_OF_UNIT_LEAST = 4
+    BAND_BYTES_MAX = 4 << 20, // color and shadow, the one layer that grows with the lights
+    GROUPS_OF_UNIT_MIN = 4
 };
 
 typedef struct {
@@ -25,7 +25,7 @@ static TileShape tile_shape(uint32_t lanes)
 static TileShape item_shape(uint32_t lanes)
 {
     TileShape shape = tile_shape(lanes);
-    if (lanes > 1) shape.width *= ITEM_TILES_LARGEST;
+    if (lanes > 1) shape.width *= ITEM_TILES_MAX;
     return shape;
 }
 
@@ -207,11 +207,11 @@ static uint32_t rows_step(const Renderer *renderer)
 }
 
 // Enough rows for several groups per compute unit: with fewer, the last group to end would idle the others.
-static uint32_t rows_least(const Renderer *renderer)
+static uint32_t rows_min(const Renderer *renderer)
 {
     uint32_t group_width = item_shape(renderer->report.lanes).width * (uint32_t)group_side(renderer);
     uint32_t of_row = (renderer->settings.region_width + group_width - 1) / group_width;
-    uint32_t wanted = GROUPS_OF_UNIT_LEAST * renderer->compute->device->compute_units;
+    uint32_t wanted = GROUPS_OF_UNIT_MIN * renderer->compute->device->compute_units;
     return (wanted + of_row - 1) / of_row * rows_step(renderer);
 }
 
@@ -221,20 +221,20 @@ static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t m
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
     uint64_t rows = pace_band_samples(pace) / row_samples;
-    uint32_t least = rows_least(renderer);
+    uint32_t least = rows_min(renderer);
     if (rows < least) rows = least;
     rows -= rows % rows_step(renderer);
     return rows < most ? (uint32_t)rows : most;
 }
 
-static uint32_t rows_largest(const Renderer *renderer, unsigned aovs)
+static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows;
     const Film row = film_of_rows(renderer, 0, 1);
     size_t row_bytes = film_layer_size(&row, LAYER_COLOR);
     if (aovs & AOV_SHADOW) row_bytes += film_layer_size(&row, LAYER_SHADOW);
-    size_t rows = BAND_BYTES_LARGEST / row_bytes;
+    size_t rows = BAND_BYTES_MAX / row_bytes;
     size_t step = rows_step(renderer);
     rows = rows < step ? step : rows - rows % step;
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
@@ -245,7 +245,7 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
     BandBuffers buffers = {0};
-    buffers_open(&buffers, renderer, aovs, rows_largest(renderer, aovs));
+    buffers_open(&buffers, renderer, aovs, rows_max(renderer, aovs));
     Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
     bool go_on = compute_ok(compute);
     BandRows rows = {0};

@@ -22,14 +22,14 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
         message_add(messages, MESSAGE_ERROR, "lanes must be 1, 4, 8 or 16, not %u", lanes);
         return false;
     }
-    if (settings->bounce_count > BOUNCES_LARGEST) {
-        message_add(messages, MESSAGE_ERROR, "bounces must be at most %d, not %u", BOUNCES_LARGEST,
+    if (settings->bounce_count > BOUNCES_MAX) {
+        message_add(messages, MESSAGE_ERROR, "bounces must be at most %d, not %u", BOUNCES_MAX,
                     settings->bounce_count);
         return false;
     }
-    if (settings->perturb_scale > PERTURB_SCALE_LARGEST) {
+    if (settings->perturb_scale > PERTURB_SCALE_MAX) {
         message_add(messages, MESSAGE_ERROR, "errors can be at most %d times as large, not %u",
-                    PERTURB_SCALE_LARGEST, settings->perturb_scale);
+                    PERTURB_SCALE_MAX, settings->perturb_scale);
         return false;
     }
     if (settings->precision == PRECISION_DOUBLE && !device->fp64) {

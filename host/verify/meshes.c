@@ -200,7 +200,7 @@ enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 20, CROWD_RAYS = 1 << 16, CROWD_B
 // Triangles, and some of every bounded form of every shape.
 static Scene crowd_make(void)
 {
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     Scene scene = scene_empty();
     add_random_triangles(&scene, CROWD_TRIANGLES, 0.05);

@@ -11,12 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CHECKS_LARGEST = 3 };
+enum { CHECKS_MAX = 3 };
 
 // Each has the tables of its name, and its own checks.
 static const struct {
     const char *name, *title;
-    VerifyCheck *checks[CHECKS_LARGEST];
+    VerifyCheck *checks[CHECKS_MAX];
 } cases[] = {
     {"S1", "sphere, from 100 to a million radii away", {0}},
     {"S2", "sphere seen from up to 10,000 radii away", {verify_far_fringe}},
@@ -345,7 +345,7 @@ VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const
                          .kernels = &kernels};
         for (size_t k = 0; k < verify_rays_count; k++)
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
-        for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
+        for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
         if (!sink(context, &result)) break;
     }

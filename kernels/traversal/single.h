@@ -30,7 +30,7 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     scalar limit = traversal_limit(traversal);
     if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, limit)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
-    StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, 1, box_ray.near};
+    StackEntry entries[STACK_MAX], next = {0, BVH_NODE, 1, box_ray.near};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.near <= limit) {

@@ -161,7 +161,7 @@ int main(int argument_count, char **arguments)
     for (size_t i = 0; i < verify_rays_count; i++)
         for (int is_double = 0; is_double < 2; is_double++)
             case_print(&verify_rays[i], is_double, further);
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     for (size_t i = 0; i < form_count && samples > 0; i++)
         shapes_print(&forms[i], i, samples);

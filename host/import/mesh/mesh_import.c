@@ -18,7 +18,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-enum { MESH_TRIANGLES_LARGEST = 1 << 28, MESH_POLYGON_LARGEST = 1 << 14 };
+enum { MESH_TRIANGLES_MAX = 1 << 28, MESH_POLYGON_MAX = 1 << 14 };
 
 // Three rows of a matrix, the last column the translation.
 typedef struct {
@@ -212,7 +212,7 @@ static Vector3 vector_of(const struct aiVector3D *v)
 
 static bool is_in_range(Vector3 v)
 {
-    return fabs(v.x) <= NUMBER_LARGEST && fabs(v.y) <= NUMBER_LARGEST && fabs(v.z) <= NUMBER_LARGEST;
+    return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
 }
 
 static void warn_default(const Importer *importer, const struct aiMaterial *material, const char *what)
@@ -243,7 +243,7 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
     ai_real number;
     if (aiGetMaterialFloatArray(material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
         return otherwise;
-    if (fabs(number) <= NUMBER_LARGEST) return number >= 0 ? number : otherwise;
+    if (fabs(number) <= NUMBER_MAX) return number >= 0 ? number : otherwise;
     warn_default(importer, material, "number");
     return otherwise;
 }
@@ -364,9 +364,9 @@ static bool face_is_sound(Importer *importer, const struct aiMesh *mesh, unsigne
 {
     const struct aiFace *face = &mesh->mFaces[number];
     char fault[100];
-    if (face->mNumIndices > MESH_POLYGON_LARGEST)
+    if (face->mNumIndices > MESH_POLYGON_MAX)
         return import_fails(importer, "face %u (from 0) has %u corners, more than %d", number,
-                            face->mNumIndices, MESH_POLYGON_LARGEST);
+                            face->mNumIndices, MESH_POLYGON_MAX);
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         if (face->mIndices[i] >= mesh->mNumVertices) {
             snprintf(fault, sizeof fault, "face %u (from 0) names vertex %u, which is not there", number,
@@ -417,8 +417,8 @@ static bool mesh_reserve(Importer *importer)
         has_normals |= from->mNormals != NULL;
         has_uvs |= from->mTextureCoords[0] != NULL;
     }
-    if (vertex_count >= UINT32_MAX || triangle_count > MESH_TRIANGLES_LARGEST)
-        return import_fails(importer, "%zu triangles, more than %d", triangle_count, MESH_TRIANGLES_LARGEST);
+    if (vertex_count >= UINT32_MAX || triangle_count > MESH_TRIANGLES_MAX)
+        return import_fails(importer, "%zu triangles, more than %d", triangle_count, MESH_TRIANGLES_MAX);
     Mesh *mesh = &importer->mesh;
     mesh->vertices = memory_allocate(vertex_count + 1, sizeof *mesh->vertices);
     mesh->triangles = memory_allocate(triangle_count + 1, sizeof *mesh->triangles);

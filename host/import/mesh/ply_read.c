@@ -130,9 +130,9 @@ static bool is_digit(char character)
 // More digits before the point or in an exponent overflow in assimp.
 static const char *digits_skip(const char *at, const char *end)
 {
-    enum { DIGITS_MOST = 19 };
+    enum { DIGITS_MAX = 19 };
     const char *first = at;
-    while (at < end && is_digit(*at) && at - first < DIGITS_MOST)
+    while (at < end && is_digit(*at) && at - first < DIGITS_MAX)
         at++;
     return at;
 }

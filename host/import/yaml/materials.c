@@ -5,7 +5,7 @@
 #include <string.h>
 
 // Bounds the cost of wrong names and many textures in a hostile file.
-enum { NAMES_COMPARED = 1000, TEXTURES_LARGEST = 1000 };
+enum { NAMES_COMPARED = 1000, TEXTURES_MAX = 1000 };
 
 typedef struct {
     Color colors[2];
@@ -55,8 +55,8 @@ static bool read_texture(YamlReader *reader, const Field *field, const YamlNode 
     size_t index = 0;
     while (index < scene->textures.count && strcmp(scene->textures.items[index].path, path) != 0)
         index++;
-    if (index == TEXTURES_LARGEST) {
-        report_error(&reader->report, node->offset, "more than %d textures", TEXTURES_LARGEST);
+    if (index == TEXTURES_MAX) {
+        report_error(&reader->report, node->offset, "more than %d textures", TEXTURES_MAX);
         free(path);
         return false;
     }
