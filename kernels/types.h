@@ -115,31 +115,31 @@ enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 }
 // box of an empty slot is inverted, low above high.
 //
 // The host makes nodes as wide as the kernel's packets, and at least 4 wide.
-enum { BVH_WIDTH_LEAST = 4, BVH_WIDTH_LARGEST = 16 };
+enum { BVH_WIDTH_MIN = 4, BVH_WIDTH_MAX = 16 };
 enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #ifdef __OPENCL_VERSION__
-#define BVH_WIDTH   (LANES < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : LANES)
+#define BVH_WIDTH   (LANES < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : LANES)
 #define BVH_QUARTER (BVH_WIDTH >> 2)
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
-    uint4 first[BVH_QUARTER]; // the child's node or first primitive
-    uint4 what[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits
+    uint4 first[BVH_QUARTER];     // the child's node or first primitive
+    uint4 leaf_info[BVH_QUARTER]; // BVH_NODE, or a leaf's count << 8 | kind; 16 bits
 } BvhNode;
 #endif
 
-enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
+enum { BVH_NODE = 0xff, BVH_DEPTH_MAX = 80 };
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
 // a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
 // whole BVH, then one of each primitive outside it, kind by kind; planes have none.
 //
 // xyz: from the common origin to the center; w: the origin's power |xyz|^2 - radius^2, lowered by
-// CULL_SPHERE_SLACK u |xyz|^2, or -CULL_SPHERE_LARGEST around the unbounded.
+// CULL_SPHERE_SLACK u |xyz|^2, or -CULL_SPHERE_MAX around the unbounded.
 typedef struct {
     scalar4 center_power;
 } CullSphere;
 
-#define CULL_SPHERE_LARGEST 1e37f
+#define CULL_SPHERE_MAX 1e37f
 
 // The enlargement of cull spheres, in units of roundoff: of |xyz|^2, and of the ray's direction squared.
 enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
@@ -161,7 +161,7 @@ typedef struct {
     // order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of 2^-48, for
     // double.
     uint4 optical_depth;
-    uint4 image; // x: 1 + the index of its texture's first level, 0: none; y: number of levels
+    uint4 texture; // x: 1 + the index of its first level, 0: none; y: number of levels
 } Material;
 
 // One level of a texture's mipmap, each half the size of the one before, down to one texel.
@@ -176,7 +176,7 @@ typedef struct {
 enum { OPAQUE = 0x7fffffff }; // in optical_depth.x: no light passes
 
 // The largest bounce depth. While one of a ray's two bounces is traced the other is pending, one per depth.
-enum { BOUNCES_LARGEST = 16 };
+enum { BOUNCES_MAX = 16 };
 
 // The signature of a ray tree: PATH_START, then per ray, depth first and reflected before refracted,
 // 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is that of the object hit,
@@ -192,7 +192,7 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 
 // Neighboring tiles along a row that a work-item of several lanes renders in turn. On a CPU each work-item is
 // a work-group of its own, which costs PoCL some hundred cycles to start.
-enum { ITEM_TILES_LARGEST = 8 };
+enum { ITEM_TILES_MAX = 8 };
 
 // The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_NEAR = 6, RAY_FAR, RAY_SCALARS };

@@ -16,7 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { SECONDS_ALLOWED = 5, LENGTH_LIMIT = 1 << 16, EDIT_LIMIT = 6 };
+enum { SECONDS_ALLOWED = 5, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };
 
 typedef struct {
     Text *items;
@@ -120,7 +120,7 @@ static void edit_repeat_line(Text *text)
     end += end < text->count;
     Text line = {0};
     text_append(&line, text->items + start, end - start);
-    for (size_t times = 1 + random_below(40); times && text->count < LENGTH_LIMIT; times--)
+    for (size_t times = 1 + random_below(40); times && text->count < LENGTH_MAX; times--)
         text_replace(text, start, 0, line.items, line.count);
     text_free(&line);
 }
@@ -137,7 +137,7 @@ static void text_damage(Text *text, const Seeds *seeds)
     void (*const edits[])(Text *) = {edit_truncate,        edit_flip_bits, edit_replace_by_word,
                                      edit_replace_by_word, edit_remove,    edit_random_bytes,
                                      edit_repeat_line};
-    for (size_t left = 1 + random_below(EDIT_LIMIT); left; left--) {
+    for (size_t left = 1 + random_below(EDITS_MAX); left; left--) {
         size_t edit = random_below(sizeof edits / sizeof *edits + 1);
         if (edit < sizeof edits / sizeof *edits)
             edits[edit](text);

@@ -16,7 +16,7 @@ static RandomRay torus_ray(const RandomShape *shape, Random *random)
     Vector3 in_tube = vector_add(on_circle, vector_scale(random_in_sphere(random), 0.9 * minor));
     Vector3 on_other = vector_add(shape->center, vector_scale(other, major));
     Vector3 in_hole = vector_add(shape->center, vector_scale(random_in_sphere(random), major - minor));
-    double distance = shape->reach * random_power(random, log10(1.001), 4);
+    double distance = shape->radius * random_power(random, log10(1.001), 4);
     switch (random_bits(random) % 4) {
     case 0:
         return ray_between(in_tube, vector_add(in_tube, random_in_sphere(random)), random);
@@ -24,7 +24,7 @@ static RandomRay torus_ray(const RandomShape *shape, Random *random)
         return ray_between(in_hole, vector_add(in_hole, random_in_sphere(random)), random);
     case 2: {
         // Seen along the plane the outline is the same whatever the height.
-        Vector3 beside = vector_scale(other, shape->reach * random_between(random, -1.1, 1.1));
+        Vector3 beside = vector_scale(other, shape->radius * random_between(random, -1.1, 1.1));
         return ray_between(vector_add(shape->center, vector_scale(in_plane, distance)),
                            vector_add(shape->center, beside), random);
     }
@@ -37,15 +37,15 @@ static RandomRay torus_ray(const RandomShape *shape, Random *random)
 RandomRay random_ray(const RandomShape *shape, Random *random)
 {
     Vector3 center = shape->center;
-    double reach = shape->reach;
-    double distance = reach * random_power(random, log10(1.001), 4);
+    double radius = shape->radius;
+    double distance = radius * random_power(random, log10(1.001), 4);
     Vector3 eye = vector_add(center, vector_scale(random_unit_vector(random), distance));
-    Vector3 near = vector_add(center, vector_scale(random_in_sphere(random), 1.1 * reach));
+    Vector3 near = vector_add(center, vector_scale(random_in_sphere(random), 1.1 * radius));
     Vector3 axis;
     if (shape->object.kind == SHAPE_TORUS && random_coin(random)) return torus_ray(shape, random);
     switch (random_bits(random) % 8) {
     case 0:
-        return ray_between(vector_add(center, vector_scale(random_in_sphere(random), 0.3 * reach)), eye,
+        return ray_between(vector_add(center, vector_scale(random_in_sphere(random), 0.3 * radius)), eye,
                            random);
     case 1:
         axis = random_world_axis(random);
@@ -55,11 +55,11 @@ RandomRay random_ray(const RandomShape *shape, Random *random)
         eye = vector_subtract(near, vector_scale(vector_normalize(axis), distance));
         return (RandomRay){eye, axis};
     case 3: {
-        // What a sphere of that reach shows as its outline, a little inside or outside.
+        // What a sphere of that radius shows as its outline, a little inside or outside.
         Vector3 across =
             vector_normalize(vector_cross(vector_subtract(eye, center), random_unit_vector(random)));
         double miss = random_power(random, -6, -1) * (random_coin(random) ? 1 : -1);
-        return ray_between(eye, vector_add(center, vector_scale(across, reach * (1 + miss))), random);
+        return ray_between(eye, vector_add(center, vector_scale(across, radius * (1 + miss))), random);
     }
     default:
         return ray_between(eye, near, random);

@@ -62,14 +62,15 @@ static Color checker_color(const Object *object, const Material *material, const
     return material->checker_colors[fmodl(squares, 2) != 0];
 }
 
-// Full within angle - penumbra, none beyond the angle, the smooth step 3 x^2 - 2 x^3 of 1 - cos between.
+// Full within half_angle - penumbra, none beyond half_angle, the smooth step 3 x^2 - 2 x^3 of 1 - cos
+// between.
 static Quad spot_factor(const Light *light, Quad3 from_light)
 {
     const long double degree = acosl(-1) / 180;
     Quad along = quad3_dot(quad3_unit(quad3(light->direction)), quad3_unit(from_light));
     Quad versine = 1 - along;
-    Quad outer = 1 - cosl(light->angle * degree);
-    Quad inner = 1 - cosl((light->angle - light->penumbra) * degree);
+    Quad outer = 1 - cosl(light->half_angle * degree);
+    Quad inner = 1 - cosl((light->half_angle - light->penumbra) * degree);
     if (versine <= inner) return 1;
     if (versine >= outer) return 0;
     Quad x = (outer - versine) / (outer - inner);

@@ -131,7 +131,7 @@ static void test_wrong_objects(void **state)
     assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT - 3);
     assert_true(errors.t_relative.largest == 0 && errors.shading.largest == 0);
     assert_near(errors.image.largest, 0.4, 1e-15);
-    assert_int_equal(accuracy_faults(&errors), CROSSED_OBJECT);
+    assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_OBJECT);
     assert_true(worst->x == 1 && worst->y == 1 && worst->away && worst->variant == (double)UINT32_MAX);
     assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
     film_free(&reference);
@@ -157,7 +157,7 @@ static void test_wrong_shadows(void **state)
     errors = compare(&reference, &variant);
     assert_int_equal(errors.shadow.edge, 2);
     assert_int_equal(errors.shadow.away, 2);
-    assert_int_equal(accuracy_faults(&errors), CROSSED_SHADOW);
+    assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_SHADOW);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];
     assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
     film_free(&reference);
@@ -223,7 +223,7 @@ static void test_distances_and_normals(void **state)
     assert_near(compare(&reference, &variant).normal.largest, tiny, 1e-24);
 
     // in units of double, where it was computed in double
-    variant.wide = true;
+    variant.is_double = true;
     variant.t[at(2, 2)] = 8 + 8 * DBL_EPSILON;
     assert_near(compare(&reference, &variant).t_ulps.largest, 1, 0);
     // no number is as far off as can be
@@ -246,7 +246,7 @@ static void test_unsound_pixels(void **state)
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.nonfinite, 2);
     assert_int_equal(errors.negative, 2);
-    assert_int_equal(accuracy_faults(&errors), CROSSED_NONFINITE | CROSSED_NEGATIVE);
+    assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_NONFINITE | DISQUALIFIED_NEGATIVE);
     assert_int_equal(errors.image.count, 3 * PIXELS - 2);
     assert_true(isfinite(errors.image.rmse) && isfinite(errors.display.flip_mean));
     assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);
@@ -293,7 +293,7 @@ static void test_judgement(void **state)
     scene.variants[4].status = ACCURACY_REFERENCE;
     accuracy_judge(&scene);
     const unsigned shading = 1u << ACCURACY_SHADING;
-    assert_int_equal(scene.variants[0].crossed_out, CROSSED_OBJECT);
+    assert_int_equal(scene.variants[0].disqualified, DISQUALIFIED_OBJECT);
     assert_int_equal(scene.variants[0].pareto, 0);
     assert_true(scene.variants[1].pareto & shading);
     assert_true(scene.variants[2].pareto & shading);
@@ -302,21 +302,21 @@ static void test_judgement(void **state)
     // all but the first have no wrong object: only the fastest of them is on that front
     assert_true(scene.variants[1].pareto & 1u << ACCURACY_OBJECT);
     assert_false(scene.variants[2].pareto & 1u << ACCURACY_OBJECT);
-    assert_int_equal(scene.picks[0].measure, ACCURACY_SHADING);
-    assert_int_equal(scene.picks[0].variant, 1);
-    assert_int_equal(scene.picks[1].variant, 2);
-    assert_int_equal(scene.picks[2].variant, 4);
+    assert_int_equal(scene.recommendations[0].measure, ACCURACY_SHADING);
+    assert_int_equal(scene.recommendations[0].variant, 1);
+    assert_int_equal(scene.recommendations[1].variant, 2);
+    assert_int_equal(scene.recommendations[2].variant, 4);
 
     // a reference that is faster than all leaves nothing to pick but itself
     rows[4].times.frame.items[0] = 0.5;
     accuracy_judge(&scene);
-    assert_int_equal(scene.picks[0].variant, 4);
+    assert_int_equal(scene.recommendations[0].variant, 4);
     assert_int_equal(scene.variants[1].pareto | scene.variants[2].pareto, 0);
 
     // no reference among them, and none exact enough
     scene.variants[4].status = ACCURACY_UNAVAILABLE;
     accuracy_judge(&scene);
-    assert_true(scene.picks[2].variant == SIZE_MAX);
+    assert_true(scene.recommendations[2].variant == SIZE_MAX);
     for (size_t i = 0; i < VARIANTS; i++)
         bench_times_free(&rows[i].times);
     accuracy_scene_free(&scene);

@@ -321,21 +321,21 @@ static void test_output_where_there_are_no_modes(void **state)
     unlink("new");
 }
 
-static void test_output_settle(void **state)
+static void test_output_finish(void **state)
 {
     (void)state;
     MessageList messages = {0};
     OutputFile output;
     file_write("kept", "old");
     output_write_new(&output, "kept", &messages);
-    assert_true(output_settle(&output, &messages));
+    assert_true(output_finish(&output, &messages));
     check_content(output.temporary, "new");
     check_content("kept", "old");
     assert_true(output_commit(&output, &messages));
     check_content("kept", "new");
     assert_true(output_open(&output, "/dev/full", &messages));
     assert_true(output_write(&output, "x", 1, &messages));
-    assert_false(output_settle(&output, &messages));
+    assert_false(output_finish(&output, &messages));
     check_only_message(&messages, "cannot write '/dev/full': No space left on device");
     unlink("kept");
 }
@@ -449,7 +449,7 @@ int main(void)
         cmocka_unit_test(test_output_replaces_what_a_link_leads_to),
         cmocka_unit_test(test_output_makes_what_a_link_leads_to),
         cmocka_unit_test(test_output_where_there_are_no_modes),
-        cmocka_unit_test(test_output_settle),
+        cmocka_unit_test(test_output_finish),
         cmocka_unit_test(test_output_failures),
         cmocka_unit_test(test_output_abandon),
         cmocka_unit_test(test_base64),

@@ -71,8 +71,8 @@ static void test_events_that_agree(void **state)
     assert_null(bench_doubt(&times));
     assert_near(bench_kernel(&times).median, 0.030 * 1.001, 1e-12);
     assert_int_equal(bench_kernel(&times).count, 30);
-    assert_true(bench_settled(&times, 30));
-    assert_false(bench_settled(&times, 31));
+    assert_true(bench_converged(&times, 30));
+    assert_false(bench_converged(&times, 31));
     bench_times_free(&times);
 }
 
@@ -110,7 +110,7 @@ static void test_runs_that_scatter(void **state)
         bench_add_launch(&times, &launch);
         bench_end_run(&times, 0.045);
     }
-    assert_false(bench_settled(&times, 20));
+    assert_false(bench_converged(&times, 20));
     bench_times_free(&times);
 }
 

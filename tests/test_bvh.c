@@ -47,7 +47,7 @@ static void assert_contains(const Bounds *outer, const Bounds *inner)
 
 static void leaf_check(Walk *walk, const BvhChild *leaf)
 {
-    assert_true(leaf->count <= BVH_LEAF_LARGEST);
+    assert_true(leaf->count <= BVH_LEAF_MAX);
     assert_true(leaf->first + leaf->count <= walk->bvh->primitive_count);
     const uint32_t *order = walk->bvh->order + leaf->first;
     for (uint32_t i = 0; i < leaf->count; i++) {
@@ -64,7 +64,7 @@ static void node_check(Walk *walk, uint32_t index, unsigned depth)
     for (int side = 0; side < 2; side++) {
         const BvhChild *child = &walk->bvh->nodes[index].children[side];
         if (bounds_is_empty(&child->box)) {
-            assert_int_equal(walk->bvh->primitive_count > BVH_LEAF_LARGEST, 0);
+            assert_int_equal(walk->bvh->primitive_count > BVH_LEAF_MAX, 0);
         } else if (child->count > 0) {
             leaf_check(walk, child);
         } else {
@@ -81,7 +81,7 @@ static void node_check(Walk *walk, uint32_t index, unsigned depth)
 static void wide_node_check(Walk *walk, const BvhWide *wide, unsigned width, uint32_t index, unsigned depth)
 {
     assert_true(index < wide->node_count);
-    assert_true(depth <= BVH_DEPTH_LARGEST);
+    assert_true(depth <= BVH_DEPTH_MAX);
     const BvhWideNode *node = &wide->nodes[index];
     assert_true(node->child_count <= width);
     uint32_t next = node->first_node;
@@ -121,9 +121,9 @@ static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
     node_check(&walk, 0, 1);
     for (size_t i = 0; i < count; i++)
         assert_int_equal(walk.seen[i], 1);
-    assert_true(walk.depth <= BVH_DEPTH_LARGEST);
+    assert_true(walk.depth <= BVH_DEPTH_MAX);
     assert_int_equal(walk.depth, bvh.depth);
-    for (unsigned width = BVH_WIDTH_LEAST; width <= BVH_WIDTH_LARGEST; width *= 2)
+    for (unsigned width = BVH_WIDTH_MIN; width <= BVH_WIDTH_MAX; width *= 2)
         wide_check(&bvh, boxes, kinds, width);
     free(walk.seen);
     bvh_free(&bvh);
@@ -242,7 +242,7 @@ static Object aligned_object(size_t index, Vector3 center, double size)
 // Every bounded form of every shape, mostly small ones, a third triangles, and a plane.
 static Scene random_scene(size_t count)
 {
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     const ShapeForm triangle = {.kind = SHAPE_TRIANGLE};
     Scene scene = {0};

@@ -31,7 +31,7 @@ static const char kernel_text[] =
     "}\n";
 
 typedef struct {
-    bool wide;
+    bool is_double;
     double unit_roundoff;
     Random random;
     double scale; // of all lengths but the eye's directions
@@ -44,7 +44,7 @@ typedef struct {
 
 static double trial_rounded(const Trial *trial, double value)
 {
-    if (trial->wide) return value;
+    if (trial->is_double) return value;
     volatile float narrow = (float)value;
     return narrow;
 }
@@ -72,7 +72,7 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
     double along = trial->scale * random_between(random, -1, 1) * random_power(random, -2, 4);
     double radius = trial_rounded(trial, trial->scale * random_power(random, -3, 3));
     double off =
-        random_power(random, trial->wide ? -15 : -8, 1) * (random_between(random, -1, 1) < 0 ? -1 : 1);
+        random_power(random, trial->is_double ? -15 : -8, 1) * (random_between(random, -1, 1) < 0 ? -1 : 1);
     Vector3 across = vector_normalize(vector_cross(direction, random_in_sphere(random)));
     Vector3 point = vector_add(trial->common_origin, vector_scale(vector_normalize(direction), along));
     Vector3 center =
@@ -96,17 +96,17 @@ static void trial_open(Trial *trial, bool from_eye)
         (scalar4){trial->common_origin.x, trial->common_origin.y, trial->common_origin.z, 0};
     for (size_t i = 0; i < SPHERES_PER_ORIGIN; i++)
         line_make(trial, i, from_eye);
-    culling_fill(&trial->flat, trial->wide);
+    culling_fill(&trial->flat, trial->is_double);
 }
 
 // What the device finds, with the arrays in its width.
 static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
 {
-    size_t scalar = trial->wide ? sizeof(double) : sizeof(float),
+    size_t scalar = trial->is_double ? sizeof(double) : sizeof(float),
            lines_size = SPHERES_PER_ORIGIN * 6 * scalar;
     char *lines = memory_allocate(SPHERES_PER_ORIGIN * 6, scalar);
     for (size_t i = 0; i < (size_t)SPHERES_PER_ORIGIN * 6; i++) {
-        if (trial->wide)
+        if (trial->is_double)
             ((double *)(void *)lines)[i] = trial->lines[i];
         else
             ((float *)(void *)lines)[i] = (float)trial->lines[i];
@@ -116,9 +116,9 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
     FlatArray row = {
         flat_array_at(cull_spheres, (common_origin - COMMON_ORIGIN_EYE) * trial->flat.cull_sphere_count + 1),
         SPHERES_PER_ORIGIN, cull_spheres->layout};
-    size_t row_size = flat_array_size(&row, trial->wide);
+    size_t row_size = flat_array_size(&row, trial->is_double);
     void *row_bytes = memory_allocate(row_size, 1);
-    flat_array_write(&row, trial->wide, row_bytes);
+    flat_array_write(&row, trial->is_double, row_bytes);
 
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "misses");
     const size_t count = SPHERES_PER_ORIGIN, missed_size = SPHERES_PER_ORIGIN * sizeof(int);
@@ -174,20 +174,22 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
     }
 }
 
-static void balls_check(bool wide, bool from_eye)
+static void balls_check(bool is_double, bool from_eye)
 {
-    if (wide && !probe_has(PRECISION_DOUBLE)) skip();
+    if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
     Text prelude = {0};
     text_appendf(&prelude,
                  "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 0\n#define IS_DOUBLE %d\n"
                  "#define REPAIRS_DIVIDE 0\n#define HAS_FMA 1\n#define IS_COUNTING 0\n#define PERTURB "
                  "0\n#define PERTURB_SEED "
                  "0u\n#define PERTURB_SCALE 1\n",
-                 wide);
+                 is_double);
     features_write_prelude(&prelude, FEATURE_ALL);
     cl_program program = probe_program(kernel_text, text_c(&prelude), "-cl-std=CL1.2");
     text_free(&prelude);
-    Trial trial = {.wide = wide, .unit_roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2, .random = {7}};
+    Trial trial = {.is_double = is_double,
+                   .unit_roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2,
+                   .random = {7}};
     trial.lines = memory_allocate((size_t)SPHERES_PER_ORIGIN * 6, sizeof *trial.lines);
     trial.missed = memory_allocate(SPHERES_PER_ORIGIN, sizeof *trial.missed);
     for (size_t i = 0; i < ORIGIN_COUNT; i++) {

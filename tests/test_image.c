@@ -344,7 +344,7 @@ static void test_disk_full(void **state)
         ImageWriter *writer = image_writer_open("/dev/full", &header, &messages);
         if (writer) {
             image_writer_rows(writer, values, SIDE, &messages);
-            if (i % 2) assert_false(image_writer_settle(writer, &messages));
+            if (i % 2) assert_false(image_writer_finish(writer, &messages));
             assert_false(image_writer_commit(writer, &messages));
         }
         assert_int_equal(messages.count, 1);
@@ -354,7 +354,7 @@ static void test_disk_full(void **state)
     free(values);
 }
 
-static void test_settled_is_yet_to_be_renamed(void **state)
+static void test_finished_is_yet_to_be_renamed(void **state)
 {
     (void)state;
     float *values = values_make(8 * 40 * 3);
@@ -366,7 +366,7 @@ static void test_settled_is_yet_to_be_renamed(void **state)
         for (int commits = 0; commits < 2; commits++) {
             ImageWriter *writer = writer_of_8_by_40(path, &messages);
             assert_true(image_writer_rows(writer, values, 40, &messages));
-            assert_true(image_writer_settle(writer, &messages));
+            assert_true(image_writer_finish(writer, &messages));
             check_content(path, "old");
             if (commits)
                 assert_true(image_writer_commit(writer, &messages));
@@ -492,7 +492,7 @@ int main(void)
         cmocka_unit_test(test_png_notes),
         cmocka_unit_test(test_exr_notes),
         cmocka_unit_test(test_abandoned_leaves_the_old_file),
-        cmocka_unit_test(test_settled_is_yet_to_be_renamed),
+        cmocka_unit_test(test_finished_is_yet_to_be_renamed),
         cmocka_unit_test(test_disk_full),
         cmocka_unit_test(test_folder_that_is_not_there),
         cmocka_unit_test(test_format_by_ending),

@@ -58,7 +58,7 @@ static Material random_material(Random *random, size_t index)
     return material;
 }
 
-static ShapeForm forms[SHAPE_FORMS_LARGEST];
+static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
 
 // One of each form, then bounded ones; none so large that it hides the rest.
@@ -68,7 +68,7 @@ static Object random_object(Random *random, size_t index)
         const bool first = index < form_count;
         const ShapeForm *form = &forms[first ? index : (size_t)random_between(random, 0, (double)form_count)];
         RandomShape shape = random_shape(form, random);
-        if (shape.reach > 3 || (!form->bounded && !first)) continue;
+        if (shape.radius > 3 || (!form->bounded && !first)) continue;
         Object *object = &shape.object;
         // a plane behind the objects and a narrow cone beside them, not across the view
         if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
@@ -103,7 +103,7 @@ static Scene random_scene(uint64_t seed)
         Light light = {.kind = kinds[i], .color = random_color(&random)};
         light.position = vector_subtract(random_place(&random, 5, 15), vector_scale(up, 8));
         light.direction = vector_subtract(random_place(&random, 0, 3), light.position);
-        light.angle = random_between(&random, 15, 40);
+        light.half_angle = random_between(&random, 15, 40);
         light.penumbra = random_between(&random, 0, 10);
         array_push(scene.lights, light);
     }

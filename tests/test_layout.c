@@ -14,7 +14,7 @@
 // A node's width is its kernel's: this is that of one lane.
 typedef struct {
     scalar4 planes[BVH_PLANES];
-    uint4 first[1], what[1];
+    uint4 first[1], leaf_info[1];
 } HostBvhNode;
 
 // Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
@@ -51,7 +51,7 @@ typedef struct {
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[4])                           \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, first[0])                         \
-    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, what[0])                          \
+    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, leaf_info[0])                          \
     REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
@@ -60,7 +60,7 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, image)                      \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
@@ -103,14 +103,14 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "  - mesh: {file: tests/textures/quad.obj, material: {image: "
                                  "scenes/images/globe.png}}\n";
 
-static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool wide)
+static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
 {
     Scene scene = scene_of_text("layout.yaml", scene_text);
     CompiledScene compiled;
     const CompileSettings settings = {.width = 1,
                                       .height = 1,
                                       .sample_count = 1,
-                                      .precision = wide ? PRECISION_DOUBLE : PRECISION_SINGLE,
+                                      .precision = is_double ? PRECISION_DOUBLE : PRECISION_SINGLE,
                                       .lanes = 1,
                                       .bvh = BVH_ON,
                                       .shift_to_eye = true};
@@ -145,12 +145,12 @@ static void kernels_write(Text *text)
     text_appendf(text, "    }\n}\n");
 }
 
-static cl_program program_make(bool wide)
+static cl_program program_make(bool is_double)
 {
     Text text = {0};
     kernels_write(&text);
     const char *prelude =
-        wide ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
+        is_double ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
     cl_program program = probe_program(text_c(&text), prelude, "-cl-std=CL1.2");
     text_free(&text);
     return program;
@@ -177,24 +177,25 @@ static void kernel_run(cl_program program, const char *name, void *first, size_t
 
 // Where the rule of types.h puts a member: scalar4 members first, as many bytes as the kernel's four numbers
 // have.
-static size_t member_offset(const Member *member, const FlatLayout *layout, bool wide)
+static size_t member_offset(const Member *member, const FlatLayout *layout, bool is_double)
 {
-    if (wide) return member->host_offset;
+    if (is_double) return member->host_offset;
     size_t reals_size = layout->scalar4_count * sizeof(scalar4);
     if (!member->integers) return member->host_offset / 2;
     return member->host_offset - reals_size / 2;
 }
 
-static void layout_check(bool wide)
+static void layout_check(bool is_double)
 {
     FlatLayout layouts[FLAT_COUNT];
-    layouts_of_host(layouts, wide);
-    cl_program program = program_make(wide);
+    layouts_of_host(layouts, is_double);
+    cl_program program = program_make(is_double);
     uint32_t sizes[MEMBER_COUNT] = {0}, offsets[MEMBER_COUNT] = {0};
     kernel_run(program, "layout", sizes, sizeof sizes, offsets, sizeof offsets, 0);
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
         const FlatArray one = {NULL, 1, layouts[members[i].kind]};
-        size_t size = flat_array_size(&one, wide), offset = member_offset(&members[i], &one.layout, wide);
+        size_t size = flat_array_size(&one, is_double),
+               offset = member_offset(&members[i], &one.layout, is_double);
         if (sizes[i] != size)
             fail_msg("sizeof(%s): %u on the device, %zu here", members[i].type, sizes[i], size);
         if (offsets[i] != offset)
@@ -234,7 +235,7 @@ static FlatArray array_fill(size_t kind, const FlatLayout *layout)
     return array;
 }
 
-static void member_check(cl_program program, size_t index, void *bytes, size_t size, bool wide)
+static void member_check(cl_program program, size_t index, void *bytes, size_t size, bool is_double)
 {
     union {
         double wide[4];
@@ -244,7 +245,7 @@ static void member_check(cl_program program, size_t index, void *bytes, size_t s
     kernel_run(program, "member", bytes, size, &values, sizeof values, (uint32_t)index);
     for (size_t k = 0; k < 4; k++) {
         bool equal = members[index].integers ? values.integers[k] == integer_at(index, k)
-                     : wide                  ? values.wide[k] == real_at(index, k)
+                     : is_double             ? values.wide[k] == real_at(index, k)
                                              : (double)values.narrow[k] == real_at(index, k);
         if (!equal)
             fail_msg("%s.%s, component %zu: what the host uploaded is not what the device reads",
@@ -252,18 +253,18 @@ static void member_check(cl_program program, size_t index, void *bytes, size_t s
     }
 }
 
-static void values_check(bool wide)
+static void values_check(bool is_double)
 {
     FlatLayout layouts[FLAT_COUNT];
-    layouts_of_host(layouts, wide);
-    cl_program program = program_make(wide);
+    layouts_of_host(layouts, is_double);
+    cl_program program = program_make(is_double);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         FlatArray array = array_fill(kind, &layouts[kind]);
-        size_t size = flat_array_size(&array, wide);
+        size_t size = flat_array_size(&array, is_double);
         char *bytes = memory_allocate(size, 1);
-        flat_array_write(&array, wide, bytes);
+        flat_array_write(&array, is_double, bytes);
         for (size_t i = 0; i < MEMBER_COUNT; i++)
-            if (members[i].kind == kind) member_check(program, i, bytes, size, wide);
+            if (members[i].kind == kind) member_check(program, i, bytes, size, is_double);
         free(bytes);
         free(array.items);
     }

@@ -38,7 +38,7 @@ static void machine_fill(Machine *machine)
     items[2].compiler = false;
     items[3] = fabricated(3, CL_DEVICE_TYPE_GPU, "Force RTX 3090", "Vendor CUDA");
     items[4] = fabricated(4, CL_DEVICE_TYPE_GPU, "Force RTX 3090", "Vendor CUDA");
-    items[4].twin = 1;
+    items[4].same_name_index = 1;
     items[5] = fabricated(5, CL_DEVICE_TYPE_CPU, "Xeon", "Acme");
     machine->list = (DeviceList){.items = items, .count = 6, .platform_count = 3};
 }
@@ -146,14 +146,14 @@ static void list_look(void *result)
     facts->sound = list.empty_platform_count <= list.platform_count;
     for (size_t i = 0; i < list.count; i++) {
         const Device *device = &list.items[i];
-        unsigned twins_before = 0;
+        unsigned same_name_count = 0;
         for (size_t j = 0; j < i; j++)
-            twins_before +=
+            same_name_count +=
                 list.items[j].platform == device->platform && strcmp(list.items[j].name, device->name) == 0;
         facts->sound &= device->index == i && device->name[0] != '\0' && device->platform_name[0] != '\0' &&
                         device->compute_units > 0 && device->native_float_width > 0 &&
                         (device->native_double_width > 0) == device->fp64 && device->memory_bytes > 0 &&
-                        device->twin == twins_before;
+                        device->same_name_index == same_name_count;
     }
     device_list_close(&list);
     device_list_close(&list);

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-enum { WIDTH = 640, HEIGHT = 360, ROWS_LARGEST = 512 };
+enum { WIDTH = 640, HEIGHT = 360, ROWS_MAX = 512 };
 
 static const double target = 0.1, cheap = 2e-8, dear = 2e-5; // seconds; of a sample: sky, glass
 
@@ -24,7 +24,7 @@ static Run run(uint32_t sample_count, uint32_t glass_row)
     Pace pace = {.target_seconds = target};
     for (uint32_t row = 0; row < HEIGHT;) {
         uint64_t rows = pace_band_samples(&pace) / ((uint64_t)WIDTH * sample_count);
-        rows = rows < 4 ? 4 : rows > ROWS_LARGEST ? ROWS_LARGEST : rows;
+        rows = rows < 4 ? 4 : rows > ROWS_MAX ? ROWS_MAX : rows;
         if (rows > HEIGHT - row) rows = HEIGHT - row;
         uint64_t pixels = rows * WIDTH;
         double seconds_of_sample = 0; // of all pixels

@@ -266,7 +266,7 @@ static void shades_as_phong(void **state)
     light = (Light){.kind = LIGHT_SPOT,
                     .color = {2, 2, 2},
                     .position = {0, 4, 0},
-                    .angle = 60,
+                    .half_angle = 60,
                     .penumbra = 40,
                     .direction = {sin(halfway), -cos(halfway), 0}};
     assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), 0.2 + (0.4 + 0.25), 1e-15);
@@ -369,7 +369,7 @@ static void measures_distances(void **state)
 {
     (void)state;
     size_t measured = 0;
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     for (size_t kind = 0; kind < form_count; kind++) {
         Random random = {kind};
@@ -378,9 +378,9 @@ static void measures_distances(void **state)
             RandomRay given = random_ray(&shape, &random);
             ReferenceRay ray = reference_ray(given.origin, given.direction);
             ReferenceHit hit = reference_hit_object(&shape.object, &ray);
-            double height = (i % 2 ? 1e-9 : -1e-9) * shape.reach;
+            double height = (i % 2 ? 1e-9 : -1e-9) * shape.radius;
             // near an edge another part of the surface may be nearer
-            if (!hit.found || hit.margin < 1e-6 * shape.reach || hit.cosine < 1e-3) continue;
+            if (!hit.found || hit.margin < 1e-6 * shape.radius || hit.cosine < 1e-3) continue;
             Quad3 point = quad3_add(reference_point(&ray, hit.t), quad3_scale(hit.normal, height));
             ReferenceSurface surface = reference_surface(&shape.object, point);
             double distance = (double)reference_surface_distance(&surface);

@@ -59,7 +59,7 @@ static void test_lights(void **state)
     assert_int_equal(spot->kind, LIGHT_SPOT);
     assert_vector(spot->position, 0, 5, 0);
     assert_vector(spot->direction, 0, -4, 0);
-    assert_number(spot->angle, 30);
+    assert_number(spot->half_angle, 30);
     assert_number(spot->penumbra, 5);
     assert_vector(other->direction, 0, -2, 0);
     assert_vector(other->color, 2, 2, 2);

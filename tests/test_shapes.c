@@ -14,12 +14,12 @@
 enum { SHAPES_OF_A_FORM = 3, RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SCENE_COUNT = 3 };
 
 
-static ShapeForm forms[SHAPE_FORMS_LARGEST];
+static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
 
 typedef struct {
     Vector3 center;
-    double reach;
+    double radius;
     TraceRay rays[RAYS_PER_SHAPE];
     ReferenceHit hits[RAYS_PER_SHAPE];
 } Trial;
@@ -78,10 +78,10 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, Preci
     const int bits = bits_of(precision);
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
-    double distance = vector_length(vector_subtract(origin, trial->center)) + trial->reach;
-    // A plane may be hit far beyond the reach.
+    double distance = vector_length(vector_subtract(origin, trial->center)) + trial->radius;
+    // A plane may be hit far beyond the radius.
     if (expected->found) distance = fmax(distance, fabs((double)expected->t) * vector_length(direction));
-    double scale = u * (owed->compensated ? trial->reach : distance);
+    double scale = u * (owed->compensated ? trial->radius : distance);
     // Flat shapes have no compensated edges.
     double band = fmax(owed->band * scale, 4 * u * distance);
     if (expected->margin <= band) return;
@@ -100,39 +100,39 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, Preci
     tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_owed));
 
     Vector3 normal = vector_from(hit->normal);
-    double normal_owed = 8 * u + owed->turn * u * distance / (cosine * (double)expected->bend);
+    double normal_owed = 8 * u + owed->turn * u * distance / (cosine * (double)expected->curvature_radius);
     tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_owed);
     tally->length = fmax(tally->length, fabs(vector_length(normal) - 1) / (4 * u));
     if (vector_dot(normal, direction) > 0) tally->wrong++;
 }
 
 // A ray from next to where one meets the scene, off it to either side by a hundredth to a hundred thousandth
-// of the reach, to anywhere.
-static RandomRay move_beside(const RandomRay *given, const Scene *scene, double reach, Random *random)
+// of the radius, to anywhere.
+static RandomRay move_beside(const RandomRay *given, const Scene *scene, double radius, Random *random)
 {
     ReferenceRay ray = reference_ray(given->origin, given->direction);
     ReferenceHit hit = reference_hit(scene, &ray);
     if (!hit.found) return *given;
     Quad3 p = reference_point(&ray, hit.t);
     double side = random_between(random, -1, 1) < 0 ? -1 : 1;
-    double height = side * reach * pow(10, random_between(random, -5, -2));
+    double height = side * radius * pow(10, random_between(random, -5, -2));
     Vector3 normal = {(double)hit.normal.x, (double)hit.normal.y, (double)hit.normal.z};
     Vector3 place = {(double)p.x, (double)p.y, (double)p.z};
     return (RandomRay){vector_add(place, vector_scale(normal, height)), random_in_sphere(random)};
 }
 
-// Rays and what they should hit; `wide`: taken in double, else what a float holds of them; `beside`: from
-// next to the surface.
-static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, size_t aim_count, bool wide,
-                    bool beside, Random *random)
+// Rays and what they should hit; `is_double`: taken in double, else what a float holds of them; `beside`:
+// from next to the surface.
+static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, size_t aim_count,
+                    bool is_double, bool beside, Random *random)
 {
-    for (size_t i = 0; !wide && i < scene->objects.count; i++)
+    for (size_t i = 0; !is_double && i < scene->objects.count; i++)
         scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
     for (size_t i = 0; i < RAYS_PER_SHAPE; i++) {
         RandomRay given = random_ray(&aims[aim_count > 0 ? i % aim_count : 0], random);
-        if (beside) given = move_beside(&given, scene, trial->reach, random);
-        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
-                                : reference_ray_rounded(given.origin, given.direction);
+        if (beside) given = move_beside(&given, scene, trial->radius, random);
+        ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
+                                     : reference_ray_rounded(given.origin, given.direction);
         // one in three looks behind its start, too
         if (i % 3 == 2) ray.tmin = -0x1p10;
         trial->rays[i] = (TraceRay){
@@ -164,7 +164,7 @@ static void hold_at(const Trial *trial, const Scene *scene, Precision precision,
     assert_true(right);
 }
 
-static void hold(const RandomShape *shapes, size_t count, Vector3 center, double reach, bool beside,
+static void hold(const RandomShape *shapes, size_t count, Vector3 center, double radius, bool beside,
                  const char *what, Random *random)
 {
     static Trial trial;
@@ -172,13 +172,13 @@ static void hold(const RandomShape *shapes, size_t count, Vector3 center, double
     Material material;
     Scene scene = scene_of(objects, count, &material);
     trial.center = center;
-    trial.reach = reach;
-    for (int wide = 0; wide < 2; wide++) {
+    trial.radius = radius;
+    for (int is_double = 0; is_double < 2; is_double++) {
         for (size_t i = 0; i < count; i++)
             objects[i] = shapes[i].object;
-        prepare(&trial, &scene, shapes, count, wide, beside, random);
+        prepare(&trial, &scene, shapes, count, is_double, beside, random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-            if (wide != (precision == PRECISION_DOUBLE)) continue;
+            if (is_double != (precision == PRECISION_DOUBLE)) continue;
             hold_at(&trial, &scene, precision, 1, what);
             hold_at(&trial, &scene, precision, 0, what);
         }
@@ -191,7 +191,7 @@ static void hits_each_shape(void **state)
     Random random = {(uint64_t)(form - forms)};
     for (int i = 0; i < SHAPES_OF_A_FORM; i++) {
         RandomShape shape = random_shape(form, &random);
-        hold(&shape, 1, shape.center, shape.reach, false, form->name, &random);
+        hold(&shape, 1, shape.center, shape.radius, false, form->name, &random);
     }
 }
 
@@ -201,12 +201,12 @@ static void hits_the_nearest_of_many(void **state)
     Random random = {form_count};
     for (int scene = 0; scene < SCENE_COUNT; scene++) {
         RandomShape shapes[SHAPES_IN_SCENE];
-        double reach = 0;
+        double radius = 0;
         for (size_t i = 0; i < SHAPES_IN_SCENE; i++) {
             shapes[i] = random_shape(&forms[i % form_count], &random);
-            reach = fmax(reach, vector_length(shapes[i].center) + shapes[i].reach);
+            radius = fmax(radius, vector_length(shapes[i].center) + shapes[i].radius);
         }
-        hold(shapes, SHAPES_IN_SCENE, (Vector3){0, 0, 0}, reach, false, "many shapes", &random);
+        hold(shapes, SHAPES_IN_SCENE, (Vector3){0, 0, 0}, radius, false, "many shapes", &random);
     }
 }
 
@@ -227,7 +227,7 @@ static void hits_from_beside_the_side(void **state)
         for (int i = 0; i < SHAPES_OF_A_FORM; i++) {
             RandomShape shape = random_shape(form, &random);
             if (i == 0 && form->kind == SHAPE_CONE) make_steep(&shape);
-            hold(&shape, 1, shape.center, shape.reach, true, form->name, &random);
+            hold(&shape, 1, shape.center, shape.radius, true, form->name, &random);
         }
     }
 }
@@ -245,8 +245,8 @@ static void gives_the_same_bits_at_every_width(void **state)
     static Trial trial;
     static TraceHit hits[2][RAYS_PER_SHAPE];
     Random random = {form_count + 1};
-    RandomShape shapes[SHAPE_FORMS_LARGEST];
-    Object objects[SHAPE_FORMS_LARGEST];
+    RandomShape shapes[SHAPE_FORMS_MAX];
+    Object objects[SHAPE_FORMS_MAX];
     for (size_t i = 0; i < form_count; i++) {
         shapes[i] = random_shape(&forms[i], &random);
         objects[i] = shapes[i].object;
@@ -268,7 +268,7 @@ static void gives_the_same_bits_at_every_width(void **state)
 
 int main(void)
 {
-    struct CMUnitTest tests[SHAPE_FORMS_LARGEST + 3] = {0};
+    struct CMUnitTest tests[SHAPE_FORMS_MAX + 3] = {0};
     form_count = shape_forms(forms);
     for (size_t i = 0; i < form_count; i++)
         tests[i] = (struct CMUnitTest){forms[i].name, hits_each_shape, NULL, NULL, &forms[i]};

@@ -426,10 +426,10 @@ static void textures_are_shared(void **state)
     Scene scene = scene_of_text(
         "there/s.yaml",
         MATERIALS "  a: {image: a.png}\n  b: {image: b.png}\n  c: {image: a.png}\n  d: {image: /a.png}\n");
-    assert_int_equal(scene.images.count, 3);
-    assert_string_equal(scene.images.items[0].path, "there/a.png");
-    assert_string_equal(scene.images.items[2].path, "/a.png");
-    assert_int_equal(scene.materials.items[2].image, 1);
+    assert_int_equal(scene.textures.count, 3);
+    assert_string_equal(scene.textures.items[0].path, "there/a.png");
+    assert_string_equal(scene.textures.items[2].path, "/a.png");
+    assert_int_equal(scene.materials.items[2].texture, 1);
     scene_free(&scene);
 }
 

@@ -12,15 +12,15 @@ wide=D
 holds() { "$GLINT" verify "$@" >"$scratch/lines" 2>"$scratch/errors" || { grep FAIL "$scratch/lines" "$scratch/errors"; return 1; }; }
 if is_sanitized; then
     check 'cases at single' holds S1 P7 C7 M3 R1 R3 R4 R8 --precision single
-    check 'tier B holds' grep -q '^  tier B: 8 of 8 cases held' "$scratch/lines"
+    check 'tier B holds' grep -q '^  tier B: 8 of 8 cases passed' "$scratch/lines"
 elif is_long; then
     check 'glint verify' holds
     for tier in A B C $wide; do
-        check "tier $tier holds" grep -q "^  tier $tier: 43 of 43 cases held" "$scratch/lines"
+        check "tier $tier holds" grep -q "^  tier $tier: 43 of 43 cases passed" "$scratch/lines"
     done
 else
     check 'all cases at single' holds --precision single
-    check 'tier B holds' grep -q '^  tier B: 43 of 43 cases held' "$scratch/lines"
+    check 'tier B holds' grep -q '^  tier B: 43 of 43 cases passed' "$scratch/lines"
     for precision in fast strict ${wide:+double}; do
         check "some cases at $precision" holds S1 P7 C7 T3 M3 R1 --precision $precision
     done

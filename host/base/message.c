@@ -19,13 +19,13 @@ static bool character_is_control(const unsigned char *bytes, size_t size)
            (size == 2 && bytes[0] == 0xC2 && bytes[1] < 0xA0);
 }
 
-// At most `character_limit` characters of the text, with `?` for each control character and each byte that is
+// At most `characters_max` characters of the text, with `?` for each control character and each byte that is
 // not UTF-8. Tabs are kept on request.
-static char *printable_copy(const char *bytes, size_t length, size_t character_limit, bool keep_tabs)
+static char *printable_copy(const char *bytes, size_t length, size_t characters_max, bool keep_tabs)
 {
     Text shown = {0};
     text_append(&shown, "", 0);
-    for (size_t i = 0, characters = 0; i < length && characters < character_limit; characters++) {
+    for (size_t i = 0, characters = 0; i < length && characters < characters_max; characters++) {
         const unsigned char *here = (const unsigned char *)bytes + i;
         size_t size = text_character_size(bytes + i, length - i);
         bool printable = size && (!character_is_control(here, size) || (keep_tabs && *here == '\t'));

@@ -8,9 +8,9 @@ void numbers_narrow(float *target, const double *values, size_t count)
         target[i] = (float)values[i];
 }
 
-void numbers_widen(double *target, const void *values, size_t count, bool wide)
+void numbers_widen(double *target, const void *values, size_t count, bool is_double)
 {
-    if (wide)
+    if (is_double)
         memcpy(target, values, count * sizeof *target);
     else
         for (size_t i = 0; i < count; i++)

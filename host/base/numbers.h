@@ -5,5 +5,5 @@
 #include <stddef.h>
 
 void numbers_narrow(float *target, const double *values, size_t count);
-// `values` are doubles where `wide`, else floats.
-void numbers_widen(double *target, const void *values, size_t count, bool wide);
+// `values` are doubles where `is_double`, else floats.
+void numbers_widen(double *target, const void *values, size_t count, bool is_double);

@@ -99,9 +99,9 @@ static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *mes
 // The end of a chain of symbolic links, whether a file exists there or not; `target` itself if it is no link.
 static char *link_end(const char *target)
 {
-    enum { STEPS_LARGEST = 40 }; // as in Linux; a longer chain is a cycle
+    enum { STEPS_MAX = 40 }; // as in Linux; a longer chain is a cycle
     char *path = memory_copy_text(target), aim[PATH_MAX];
-    for (int step = 0; step < STEPS_LARGEST; step++) {
+    for (int step = 0; step < STEPS_MAX; step++) {
         ssize_t length = readlink(path, aim, sizeof aim);
         if (length < 0) break;
         const char *slash = aim[0] == '/' ? NULL : strrchr(path, '/');
@@ -124,10 +124,14 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     }
     struct stat old;
     bool exists = stat(target, &old) == 0;
+    int error = exists ? 0 : errno;
     // A symbolic link is kept: its target is replaced or created.
     char *resolved = exists ? realpath(target, NULL) : link_end(target);
     output->target = resolved ? resolved : memory_copy_text(target);
-    if (!exists && errno == ELOOP) return output_failed(output, "create", messages);
+    if (error == ELOOP) {
+        errno = error;
+        return output_failed(output, "create", messages);
+    }
     if (exists && !S_ISREG(old.st_mode)) return output_open_directly(output, messages);
     // Renaming would replace a read-only file.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
@@ -141,7 +145,7 @@ bool output_write(OutputFile *output, const void *bytes, size_t size, MessageLis
     return false;
 }
 
-bool output_settle(OutputFile *output, MessageList *messages)
+bool output_finish(OutputFile *output, MessageList *messages)
 {
     FILE *file = output->file;
     output->file = NULL;
@@ -156,7 +160,7 @@ bool output_settle(OutputFile *output, MessageList *messages)
 
 bool output_commit(OutputFile *output, MessageList *messages)
 {
-    if (!output_settle(output, messages)) return false;
+    if (!output_finish(output, messages)) return false;
     if (output->temporary) {
         if (rename(output->temporary, output->target) != 0) return output_failed(output, "write", messages);
         pending_drop(output->temporary);

@@ -18,7 +18,8 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages);
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);
 // Flushes, checks for write errors (disk full) and closes, which leaves only the renaming to output_commit.
 // On failure adds a message and removes the temporary.
-bool output_settle(OutputFile *output, MessageList *messages);
-// Settles the file if it is not settled, and renames it. On failure adds a message and removes the temporary.
+bool output_finish(OutputFile *output, MessageList *messages);
+// Finishes the file if it is not finished, and renames it. On failure adds a message and removes the
+// temporary.
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);

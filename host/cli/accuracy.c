@@ -115,7 +115,7 @@ static bool reference_read(Accuracy *accuracy)
                     image.height, settings->width, settings->height);
     accuracy->reference = (Film){.width = image.width,
                                  .height = image.height,
-                                 .wide = true,
+                                 .is_double = true,
                                  .real_size = sizeof *colors,
                                  .color = colors};
     image_free(&image);

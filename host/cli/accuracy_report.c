@@ -49,13 +49,13 @@ static const char *crossed_words(const AccuracyVariant *variant, size_t index)
         unsigned fault;
         const char *words;
     } faults[] = {
-        {CROSSED_NONFINITE, "pixels that are not finite"},
-        {CROSSED_NEGATIVE, "negative pixels"},
-        {CROSSED_OBJECT, "another object away from the silhouettes"},
-        {CROSSED_SHADOW, "wrong shadows away from edges"},
+        {DISQUALIFIED_NONFINITE, "pixels that are not finite"},
+        {DISQUALIFIED_NEGATIVE, "negative pixels"},
+        {DISQUALIFIED_OBJECT, "another object away from the silhouettes"},
+        {DISQUALIFIED_SHADOW, "wrong shadows away from edges"},
     };
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
-        if ((variant->crossed_out & faults[i].fault) && index-- == 0) return faults[i].words;
+        if ((variant->disqualified & faults[i].fault) && index-- == 0) return faults[i].words;
     return NULL;
 }
 
@@ -67,7 +67,7 @@ static double frame_ms(const AccuracyVariant *variant)
 // "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06".
 static void pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
 {
-    const AccuracyPick *picked = &scene->picks[pick];
+    const AccuracyRecommendation *picked = &scene->recommendations[pick];
     text_appendf(text, "for an error of at most %g: ", accuracy_budgets[pick]);
     if (picked->variant == SIZE_MAX) {
         text_appendf(text, "none of these");
@@ -117,12 +117,12 @@ static void errors_print(const AccuracyErrors *errors, FILE *stream)
 
 static void crossed_print(const AccuracyVariant *variant, FILE *stream)
 {
-    if (variant->crossed_out == 0) return;
+    if (variant->disqualified == 0) return;
     fputs("            crossed out:", stream);
     const char *words;
     for (size_t i = 0; (words = crossed_words(variant, i)); i++)
         fprintf(stream, "%s %s", i > 0 ? "," : "", words);
-    if (variant->crossed_out & (CROSSED_NONFINITE | CROSSED_NEGATIVE))
+    if (variant->disqualified & (DISQUALIFIED_NONFINITE | DISQUALIFIED_NEGATIVE))
         fprintf(stream, " (%zu not finite, %zu negative)", variant->errors.nonfinite,
                 variant->errors.negative);
     fputc('\n', stream);
@@ -131,7 +131,7 @@ static void crossed_print(const AccuracyVariant *variant, FILE *stream)
 static void variant_print(const AccuracyVariant *variant, FILE *stream)
 {
     const BenchKey *key = &variant->row->key;
-    fprintf(stream, "%c %-9s %5u %-4s %5u", variant->crossed_out ? 'x' : ' ', key->precision, key->lanes,
+    fprintf(stream, "%c %-9s %5u %-4s %5u", variant->disqualified ? 'x' : ' ', key->precision, key->lanes,
             key->bvh, variant->samples);
     if (variant->status == ACCURACY_UNAVAILABLE) {
         fprintf(stream, "  unavailable: %s\n", variant->row->failure);
@@ -263,11 +263,11 @@ static void count_json(Json *json, const char *key, EdgeCount count)
     json_end(json);
 }
 
-static void extent_json(Json *json, const char *key, Extent extent)
+static void extremes_json(Json *json, const char *key, ErrorExtremes extremes)
 {
     if (key) json_begin_object(json, key);
-    json_number(json, "max", extent.largest);
-    json_number(json, "p99_9", extent.percentile_999);
+    json_number(json, "max", extremes.largest);
+    json_number(json, "p99_9", extremes.percentile_999);
     if (key) json_end(json);
 }
 
@@ -290,12 +290,12 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
     if (errors->surface_pixels > 0) {
         json_begin_object(json, "t");
         json_integer(json, "pixels", (int64_t)errors->surface_pixels);
-        extent_json(json, "relative", errors->t_relative);
-        extent_json(json, "ulps", errors->t_ulps);
+        extremes_json(json, "relative", errors->t_relative);
+        extremes_json(json, "ulps", errors->t_ulps);
         json_end(json);
         json_begin_object(json, "normal");
         json_integer(json, "pixels", (int64_t)errors->surface_pixels);
-        extent_json(json, NULL, errors->normal);
+        extremes_json(json, NULL, errors->normal);
         json_end(json);
     } else {
         absent_json(json, "t", "no pixel shows the same object");
@@ -351,7 +351,7 @@ static void worst_json(Json *json, AccuracyKind kind, const AccuracyWorst *worst
 
 static void measured_json(Json *json, const AccuracyVariant *variant)
 {
-    json_boolean(json, "crossed_out", variant->crossed_out != 0);
+    json_boolean(json, "crossed_out", variant->disqualified != 0);
     json_begin_array(json, "why");
     const char *words;
     for (size_t i = 0; (words = crossed_words(variant, i)); i++)
@@ -393,7 +393,7 @@ static void variant_json(Json *json, const AccuracyReport *report, size_t scene,
 
 static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
 {
-    const AccuracyPick *pick = &scene->picks[index];
+    const AccuracyRecommendation *pick = &scene->recommendations[index];
     json_begin_object(json, NULL);
     json_number(json, "budget", accuracy_budgets[index]);
     json_text(json, "measure", accuracy_kind_names[pick->measure]);

@@ -109,10 +109,10 @@ static int bench_run(Bench *bench, const Baseline *baseline)
 {
     Compute *compute = &bench->open.compute;
     const VariantOptions *options = &bench->options.variants;
-    bool wide = (options->precisions >> PRECISION_DOUBLE & 1) && compute->device->fp64;
+    bool with_double = (options->precisions >> PRECISION_DOUBLE & 1) && compute->device->fp64;
     Progress progress;
     progress_open(&progress, bench->options.as_json);
-    peak_measure(&bench->peak, compute, wide);
+    peak_measure(&bench->peak, compute, with_double);
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
     if (!whole) {

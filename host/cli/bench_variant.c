@@ -14,7 +14,7 @@ static bool band_skip(void *context, const Film *band, double fraction_done)
 }
 
 // From the start of the build to the end of the first launch: drivers may finish the build there.
-static double build_length(const RenderReport *report)
+static double build_seconds_with_launch(const RenderReport *report)
 {
     double seconds = report->build_seconds;
     if (report->launches.count > 0) {
@@ -36,7 +36,7 @@ static bool build_try(Compute *compute, const Variant *variant, bool no_cache, d
     Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
     if (!renderer) return false;
     renderer_render(renderer, 0, band_skip, NULL);
-    *seconds = build_length(renderer_report(renderer));
+    *seconds = build_seconds_with_launch(renderer_report(renderer));
     *from_cache = renderer_report(renderer)->build_from_cache;
     renderer_close(renderer);
     return true;
@@ -80,11 +80,11 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);
     if (variant->renderer) {
         const RenderReport *report = renderer_report(variant->renderer);
-        row->wide = report->wide;
+        row->is_double = report->is_double;
         row->traverses_bvh = (report->features & FEATURE_BVH) != 0;
         row->flops_per_ray = work_flops_per_ray(variant->scene);
-        size_t bytes =
-            (size_t)settings->width * settings->height * 3 * (row->wide ? sizeof(double) : sizeof(float));
+        size_t bytes = (size_t)settings->width * settings->height * 3 *
+                       (row->is_double ? sizeof(double) : sizeof(float));
         row->image_bytes = (double)bytes;
     } else {
         row->failure = memory_copy_text(messages.count > 0 ? messages.items[0].text : "unknown");
@@ -92,7 +92,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
     message_list_free(&messages);
 }
 
-enum { LINE_BYTES = 64 };
+enum { CACHE_LINE_BYTES = 64 };
 
 // Reads one value per cache line, as an encoder would: a driver may leave the pixels on the device until
 // then.
@@ -101,7 +101,7 @@ static bool band_read(void *context, const Film *band, double fraction_done)
     (void)fraction_done;
     double *end_seconds = context;
     const volatile unsigned char *bytes = band->layers[LAYER_COLOR];
-    for (size_t i = 0; i < film_layer_size(band, LAYER_COLOR); i += LINE_BYTES)
+    for (size_t i = 0; i < film_layer_size(band, LAYER_COLOR); i += CACHE_LINE_BYTES)
         (void)bytes[i];
     *end_seconds = clock_seconds();
     return true;

@@ -150,10 +150,10 @@ static bool images_are_there(const Scene *scene, MessageList *messages)
 {
     const Source source = scene_source(scene);
     Report report = report_open(&source, messages);
-    for (size_t i = 0; i < scene->images.count && !report_is_full(&report); i++) {
-        const SceneImage *image = &scene->images.items[i];
-        if (access(image->path, R_OK) != 0)
-            report_error(&report, image->offset, "cannot read '%s': %s", image->path, strerror(errno));
+    for (size_t i = 0; i < scene->textures.count && !report_is_full(&report); i++) {
+        const SceneTexture *texture = &scene->textures.items[i];
+        if (access(texture->path, R_OK) != 0)
+            report_error(&report, texture->offset, "cannot read '%s': %s", texture->path, strerror(errno));
     }
     return report_close(&report);
 }

@@ -35,7 +35,7 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         const char *why;
         json_begin_object(json, NULL);
         json_integer(json, "index", device->index);
-        json_integer(json, "twin", device->twin);
+        json_integer(json, "twin", device->same_name_index);
         json_boolean(json, "default", device == chosen);
         json_boolean(json, "usable", device_usable(device, &why));
         json_text(json, "unusable_because", why);
@@ -106,7 +106,7 @@ static void row_fill(Row *row, const Device *device, bool is_chosen)
     size_append(cell++, device->memory_bytes);
     size_append(cell++, device->largest_buffer_bytes);
     text_appendf(cell, "%s, %s", device->platform_name, device->driver);
-    if (device->twin) text_appendf(cell, "; twin %u", device->twin);
+    if (device->same_name_index) text_appendf(cell, "; twin %u", device->same_name_index);
     if (!device_usable(device, &why)) text_appendf(cell, "; unusable: %s", why);
 }
 

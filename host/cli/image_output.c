@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOTE_COUNT_LARGEST = 16 };
+enum { NOTE_COUNT_MAX = 16 };
 
 typedef struct {
     void *items;
@@ -71,7 +71,7 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 
 typedef struct {
     Text text;
-    size_t starts[NOTE_COUNT_LARGEST][2];
+    size_t starts[NOTE_COUNT_MAX][2];
     size_t count;
 } Notes;
 
@@ -118,9 +118,9 @@ static ImageHeader layer_header(const Film *film, Layer layer)
         .height = film->height,
         .channels = film_components(film, layer),
         .bits = 8,
-        .npy_type = integer      ? 'u'
-                    : film->wide ? 'd'
-                                 : 'f',
+        .npy_type = integer           ? 'u'
+                    : film->is_double ? 'd'
+                                      : 'f',
     };
 }
 
@@ -134,23 +134,24 @@ static char *aov_path(const ImageOutputOptions *options, const char *name)
     return path.items;
 }
 
-bool image_output_spares_scene(const ImageOutputOptions *options, const Scene *scene, const char *scene_path)
+bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
+                                   const char *scene_path)
 {
-    bool spares = output_spares_scene(options->path, scene, scene_path);
-    for (Layer layer = 0; layer < LAYER_COUNT && spares; layer++) {
+    bool overwrites = output_overwrites_scene(options->path, scene, scene_path);
+    for (Layer layer = 0; layer < LAYER_COUNT && !overwrites; layer++) {
         if (!(options->aovs >> layer & 1)) continue;
         char *path = aov_path(options, layer_names[layer]);
-        spares = output_spares_scene(path, scene, scene_path);
+        overwrites = output_overwrites_scene(path, scene, scene_path);
         free(path);
     }
-    return spares;
+    return overwrites;
 }
 
 static bool files_open(ImageOutput *output, const Film *band, MessageList *messages)
 {
     Notes notes = {0};
     notes_write(&notes, output);
-    ImageNote list[NOTE_COUNT_LARGEST + 1] = {0};
+    ImageNote list[NOTE_COUNT_MAX + 1] = {0};
     for (size_t i = 0; i < notes.count; i++)
         list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
 
@@ -203,7 +204,7 @@ static const double *positions_in_world(ImageOutput *output, const Film *band)
 {
     size_t count = 3 * film_pixel_count(band);
     double *world = scratch_reserve(&output->converted, count * sizeof *world);
-    numbers_widen(world, band->layers[LAYER_POSITION], count, band->wide);
+    numbers_widen(world, band->layers[LAYER_POSITION], count, band->is_double);
     Vector3 eye = output->scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
     for (size_t i = 0; i < count; i++)
@@ -215,7 +216,7 @@ static bool band_write(ImageOutput *output)
 {
     const Film *band = &output->band;
     MessageList *messages = output->messages;
-    bool narrows = band->wide && image_format_of(output->options->path) != IMAGE_NPY;
+    bool narrows = band->is_double && image_format_of(output->options->path) != IMAGE_NPY;
     const void *color = narrows ? color_narrowed(output, band) : band->layers[LAYER_COLOR];
     if (!image_writer_rows(output->image, color, band->height, messages)) return false;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
@@ -263,7 +264,7 @@ bool image_output_write(ImageOutput *output, const Film *band, MessageList *mess
     output->messages = messages;
     band_keep(output, band);
     output->writing =
-        !output->options->apart && pthread_create(&output->thread, NULL, band_thread, output) == 0;
+        !output->options->synchronous && pthread_create(&output->thread, NULL, band_thread, output) == 0;
     if (output->writing) return true; // or reported with the next band
     band_thread(output);
     return !output->failed;
@@ -284,9 +285,9 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
         return false;
     }
     double start = clock_seconds();
-    bool whole = image_writer_settle(output->image, messages);
+    bool whole = image_writer_finish(output->image, messages);
     for (Layer i = 0; i < LAYER_COUNT && whole; i++)
-        if (output->aovs[i]) whole = image_writer_settle(output->aovs[i], messages);
+        if (output->aovs[i]) whole = image_writer_finish(output->aovs[i], messages);
     if (!whole) {
         image_output_abandon(output);
         return false;

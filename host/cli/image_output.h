@@ -10,7 +10,7 @@ typedef struct {
     unsigned aovs; // color: the linear values
     Transfer transfer;
     unsigned bits;
-    bool apart; // a band is encoded before the next one is rendered: neither takes the other's time
+    bool synchronous; // a band is encoded before the next one is rendered: neither takes the other's time
 } ImageOutputOptions;
 
 typedef struct ImageOutput ImageOutput;
@@ -18,14 +18,15 @@ typedef struct ImageOutput ImageOutput;
 // The scene's name with .png, in this folder; caller frees.
 char *image_output_default_path(const char *scene_path);
 bool image_output_path_known(const char *path); // false: the endings there are were printed
-// Whether none of the files is one that the scene was read from; which one is was printed.
-bool image_output_spares_scene(const ImageOutputOptions *options, const Scene *scene, const char *scene_path);
+// True, with a message, if one of the files is one that the scene was read from.
+bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
+                                   const char *scene_path);
 
 // Files are opened with the first band, when the kernels' hash is known.
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
                                const RenderSettings *settings, const Renderer *renderer,
                                const Device *device);
-// Encodes a copy of the band while the caller goes on, unless options.apart; the messages belong to the
+// Encodes a copy of the band while the caller goes on, unless options.synchronous; the messages belong to the
 // output until it is committed or abandoned. False: this band could not be written, or an earlier one.
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages);
 // Puts all files in place; frees the output. False with a message if one could not be. *seconds: spent on

@@ -39,7 +39,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
 
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
 {
-    const uint64_t largest = IMAGE_SIDE_LARGEST;
+    const uint64_t largest = IMAGE_SIDE_MAX;
     const char *at;
     uint64_t w, h;
     if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||
@@ -60,12 +60,12 @@ static bool perturb_read(const char *value, CommonOptions *common)
     uint64_t seed, scale = 1;
     bool valid = digits_read(value, &at, &seed) && seed >= 1 && seed <= UINT32_MAX;
     if (valid && *at == ':')
-        valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_LARGEST;
+        valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_MAX;
     if (!valid || *at != '\0') {
         fprintf(stderr,
                 "glint: --perturb: expected a seed from 1 to %u, or SEED:SCALE with a scale from 1 to %d, "
                 "not \"%s\"\n",
-                UINT32_MAX, PERTURB_SCALE_LARGEST, value);
+                UINT32_MAX, PERTURB_SCALE_MAX, value);
         return false;
     }
     common->perturb_seed = (uint32_t)seed;
@@ -73,7 +73,7 @@ static bool perturb_read(const char *value, CommonOptions *common)
     return true;
 }
 
-static void choices_tell(const char *const *names, size_t count, const char *value)
+static void choices_print(const char *const *names, size_t count, const char *value)
 {
     for (size_t i = 0; i < count; i++)
         fprintf(stderr, "%s%s", i == 0 ? "" : i + 1 == count ? " or " : ", ", names[i]);
@@ -92,7 +92,7 @@ bool option_choice(const char *option, const char *value, const char *const *nam
             return true;
         }
     fprintf(stderr, "glint: --%s: expected ", option);
-    choices_tell(names, count, value);
+    choices_print(names, count, value);
     return false;
 }
 
@@ -108,7 +108,7 @@ bool option_set(const char *option, const char *value, const char *const *names,
         if (i == count) {
             char *word = strndup(at, length);
             fprintf(stderr, "glint: --%s: expected names separated by commas, of ", option);
-            choices_tell(names, count, word ? word : value);
+            choices_print(names, count, word ? word : value);
             free(word);
             return false;
         }
@@ -181,12 +181,12 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
     return loaded;
 }
 
-bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path)
+bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path)
 {
-    if (!scene_was_read_from(scene, scene_path, path)) return true;
+    if (!scene_was_read_from(scene, scene_path, path)) return false;
     fprintf(stderr, "glint: would overwrite '%s', which the scene is read from; choose another with -o\n",
             path);
-    return false;
+    return true;
 }
 
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height)
@@ -211,7 +211,7 @@ void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
     if (*width > 0) return;
     *width = scene->width > 0 ? scene->width : 1280;
     double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
-    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_LARGEST));
+    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_MAX));
     *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
 }
 

@@ -68,14 +68,14 @@ enum {
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT
 
-enum { IMAGE_SIDE_LARGEST = 1 << 20, SAMPLES_LARGEST = 1 << 20, BOUNCES_DEFAULT = 5 };
+enum { IMAGE_SIDE_MAX = 1 << 20, SAMPLES_MAX = 1 << 20, BOUNCES_DEFAULT = 5 };
 
 enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
 extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 
-// False, with a message, if writing `path` would overwrite a file that the scene was read from.
-bool output_spares_scene(const char *path, const Scene *scene, const char *scene_path);
+// True, with a message, if writing `path` would overwrite a file that the scene was read from.
+bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path);
 
 // Result of reading a command line if the command is to run; otherwise it is the exit status.
 enum { OPTIONS_READ = -1 };

@@ -76,7 +76,7 @@ static bool region_read(const char *value, uint32_t region[4])
         errno = 0;
         unsigned long number = strtoul(at, &end, 10);
         bool digit_first = *at >= '0' && *at <= '9';
-        if (!digit_first || errno != 0 || number > IMAGE_SIDE_LARGEST || *end != (i < 3 ? ',' : '\0')) break;
+        if (!digit_first || errno != 0 || number > IMAGE_SIDE_MAX || *end != (i < 3 ? ',' : '\0')) break;
         region[i] = (uint32_t)number;
         at = end + 1;
         if (i == 3 && region[2] > 0 && region[3] > 0) return true;
@@ -99,7 +99,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     case OPTION_SIZE:
         return option_size("size", value, &options->width, &options->height);
     case OPTION_SAMPLES:
-        return option_count("samples", value, 1, SAMPLES_LARGEST, &options->sample_count);
+        return option_count("samples", value, 1, SAMPLES_MAX, &options->sample_count);
     case OPTION_REGION:
         options->has_region = true;
         return region_read(value, options->region);
@@ -117,7 +117,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         options->output.bits = choice == 0 ? 8 : 16;
         return true;
     case OPTION_BOUNCES:
-        return option_count("bounces", value, 0, BOUNCES_LARGEST, &options->bounce_count);
+        return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
     case OPTION_QUIET:
         options->quiet = true;
         return true;
@@ -189,7 +189,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
     if (!options->has_transfer)
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
-    options->output.apart = options->timing != TIMING_NONE;
+    options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     if (!renderer) {
@@ -234,7 +234,7 @@ int command_render(int argument_count, char **arguments)
     double start = clock_seconds();
     status = EXIT_USER;
     if (image_output_path_known(options.output.path) && scene_open(&scene, options.scene, &options.common) &&
-        image_output_spares_scene(&options.output, &scene, options.scene)) {
+        !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         double parse_seconds = clock_seconds() - start;
         if (device_open(&open, options.common.device)) {
             status = scene_render(&options, &scene, &open.compute, parse_seconds);

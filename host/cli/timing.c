@@ -48,13 +48,13 @@ static void line_print(const char *what, double seconds, const char *remark)
 
 static void launches_print(const char *what, const NamedLaunch *launches, size_t count)
 {
-    enum { SHOWN_LARGEST = 12 };
+    enum { SHOWN_MAX = 12 };
     LaunchSum sum = launches_sum(launches, count);
     char remark[160];
     snprintf(remark, sizeof remark, "%zu %s; %.3f ms by the host's clock", count,
              count == 1 ? "command" : "commands", 1e3 * sum.host_seconds);
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
-    for (size_t i = 0; i < count && i < SHOWN_LARGEST; i++) {
+    for (size_t i = 0; i < count && i < SHOWN_MAX; i++) {
         const LaunchTime *time = &launches[i].time;
         const char *doubt = launch_time_doubt(time);
         fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms%s%s\n", launches[i].name, 1e3 * time->event_seconds,
@@ -64,7 +64,7 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
                     1e3 * launch_delay(time),
                     i == 0 ? "finishes its build at the first launch" : "or another program kept the device");
     }
-    if (count > SHOWN_LARGEST) fprintf(stderr, "    … and %zu more\n", count - SHOWN_LARGEST);
+    if (count > SHOWN_MAX) fprintf(stderr, "    … and %zu more\n", count - SHOWN_MAX);
     if (sum.untrusted_count)
         fprintf(
             stderr,

@@ -76,41 +76,41 @@ static double farthest_of(Precision precision)
     return precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
 }
 
+// Whether the numbers of a line are a ray at the precision; reports an error if not.
+static bool ray_check(Report *report, size_t line, const double numbers[8], int count, Precision precision)
+{
+    bool beyond = numbers[7] == -INFINITY, has_direction = false;
+    for (int i = 0; i < 7; i++)
+        beyond |= fabs(numbers[i]) > farthest_of(precision);
+    for (int i = 3; i < 6 && !beyond; i++)
+        has_direction |= precision == PRECISION_DOUBLE ? numbers[i] != 0 : (float)numbers[i] != 0;
+    if (count != 6 && count != 8)
+        report_error(report, line, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
+    else if (beyond)
+        report_error(report, line, "a number is beyond the precision's range; only tmax may be infinite");
+    else if (!has_direction)
+        report_error(report, line, "a ray's direction cannot be 0 0 0 at its precision");
+    else
+        return true;
+    return false;
+}
+
+static TraceRay ray_make(const double n[8], int count, double farthest)
+{
+    return (TraceRay){
+        {n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
+}
+
 static bool rays_read(RayList *rays, const Source *source, const CommonOptions *common, MessageList *messages)
 {
-    double farthest = farthest_of(common->precision);
     Report report = report_open(source, messages);
     for (size_t start = 0; start < source->length && !report_is_full(&report);) {
         const char *newline = memchr(source->bytes + start, '\n', source->length - start);
         size_t end = newline ? (size_t)(newline - source->bytes) : source->length;
-        double n[8] = {0};
-        int count = line_numbers(&report, start, end, n);
-        double narrow[3] = {n[3], n[4], n[5]};
-        bool beyond = n[7] == -INFINITY;
-        for (int i = 0; i < 7; i++)
-            beyond |= fabs(n[i]) > farthest;
-        if (common->precision != PRECISION_DOUBLE)
-            for (int i = 0; i < 3; i++)
-                narrow[i] = (double)(float)fmax(-farthest, fmin(n[i + 3], farthest));
-        if (count > 0) {
-            if (count != 6 && count != 8) {
-                report_error(&report, start,
-                             "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
-                count = -1;
-            } else if (beyond) {
-                report_error(&report, start,
-                             "a number is beyond the precision's range; only tmax may be infinite");
-                count = -1;
-            } else if (narrow[0] == 0 && narrow[1] == 0 && narrow[2] == 0) {
-                report_error(&report, start, "a ray's direction cannot be 0 0 0 at its precision");
-                count = -1;
-            }
-        }
-        if (count > 0) {
-            TraceRay ray = {
-                {n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
-            array_push(*rays, ray);
-        }
+        double numbers[8] = {0};
+        int count = line_numbers(&report, start, end, numbers);
+        if (count > 0 && ray_check(&report, start, numbers, count, common->precision))
+            array_push(*rays, ray_make(numbers, count, farthest_of(common->precision)));
         start = end + 1;
     }
     return report_close(&report);
@@ -130,13 +130,13 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
     return read;
 }
 
-static bool hits_write(const char *path, const TraceHit *hits, size_t count, bool wide)
+static bool hits_write(const char *path, const TraceHit *hits, size_t count, bool is_double)
 {
     MessageList messages = {0};
     OutputFile output;
     bool written = output_open(&output, path, &messages);
     if (written) {
-        int digits = wide ? 17 : 9;
+        int digits = is_double ? 17 : 9;
         fputs("object,t,nx,ny,nz\n", output.file);
         for (size_t i = 0; i < count; i++) {
             const TraceHit *hit = &hits[i];
@@ -181,7 +181,8 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     bool traced = renderer_trace(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
         hits[i].t = ldexp(hits[i].t, -exponents[i]);
-    bool written = traced && hits_write(options->output, hits, rays->count, renderer_report(renderer)->wide);
+    bool written =
+        traced && hits_write(options->output, hits, rays->count, renderer_report(renderer)->is_double);
     free(exponents);
     free(hits);
     free(scaled);
@@ -221,7 +222,7 @@ int command_trace(int argument_count, char **arguments)
     OpenDevice open;
     status = EXIT_USER;
     if (scene_open(&scene, options.scene, &options.common) &&
-        output_spares_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
+        !output_overwrites_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, options.common.device)) {
         status = rays_trace(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);

@@ -33,11 +33,11 @@ static bool option_samples(VariantOptions *options, const char *value)
         char *word = memory_copy_text(at);
         word[length] = '\0';
         uint32_t samples = 0;
-        bool valid = option_count("samples", word, 1, SAMPLES_LARGEST, &samples);
+        bool valid = option_count("samples", word, 1, SAMPLES_MAX, &samples);
         free(word);
         if (!valid) return false;
-        if (options->sample_choices == SAMPLE_CHOICES_LARGEST) {
-            fprintf(stderr, "glint: --samples: at most %d numbers\n", SAMPLE_CHOICES_LARGEST);
+        if (options->sample_choices == SAMPLE_CHOICES_MAX) {
+            fprintf(stderr, "glint: --samples: at most %d numbers\n", SAMPLE_CHOICES_MAX);
             return false;
         }
         options->samples[options->sample_choices++] = samples;
@@ -68,7 +68,7 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
         *valid = option_samples(options, value);
         return true;
     case OPTION_BOUNCES:
-        *valid = option_count("bounces", value, 0, BOUNCES_LARGEST, &options->bounce_count);
+        *valid = option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
         return true;
     default:
         return option_common(&options->common, option, value, valid);
@@ -127,10 +127,10 @@ bool variant_set_open(VariantSet *set, const VariantOptions *options, char *cons
     return true;
 }
 
-static bool all_settled(const VariantSet *set)
+static bool all_converged(const VariantSet *set)
 {
     for (size_t i = 0; i < set->count; i++)
-        if (set->variants[i].renderer && !bench_settled(&set->rows[i].times, ENOUGH_RUNS)) return false;
+        if (set->variants[i].renderer && !bench_converged(&set->rows[i].times, ENOUGH_RUNS)) return false;
     return true;
 }
 
@@ -158,7 +158,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
         if (!round_run(set, true)) return false;
     start = clock_seconds();
     double spent = 0;
-    while (spent < bound && !all_settled(set)) {
+    while (spent < bound && !all_converged(set)) {
         if (!round_run(set, false)) return false;
         spent = clock_seconds() - start;
         progress_show(progress, fmin(spent / bound, 1));

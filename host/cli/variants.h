@@ -6,13 +6,13 @@
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 
-enum { SAMPLE_CHOICES_LARGEST = 16 };
+enum { SAMPLE_CHOICES_MAX = 16 };
 
 typedef struct {
     CommonOptions common;
     unsigned precisions, lanes, bvhs; // sets; lanes empty: the device's default
     uint32_t width, height;           // 0: default
-    uint32_t samples[SAMPLE_CHOICES_LARGEST];
+    uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0: one sample
     uint32_t bounce_count;
     double seconds; // 0: default
@@ -43,7 +43,7 @@ enum {
     "      --lanes LIST      of 1, 4, 8, 16 (default: the device's vector width)\n"                          \
     "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
     "      --size WxH        image size (default: as glint render)\n"                                        \
-    "      --seconds MAX     time limit of the measurement, settled or not (default: 5 per "                 \
+    "      --seconds MAX     time limit of the measurement, converged or not (default: 5 per "               \
     "row)\n" HELP_DEVICE HELP_LENIENT
 
 // Handles one of these options; *valid receives whether its value is valid, with a message if not. False if
@@ -65,7 +65,7 @@ typedef struct {
 // Reads the scenes. False with a message if one cannot be read; the set must still be closed.
 bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
 // Opens each variant, then measures them interleaved (A B C A B C …), so that drift affects all alike, until
-// times settle or options->seconds pass. `timing_builds`: also time the builds. False if the user
+// times converge or options->seconds pass. `timing_builds`: also time the builds. False if the user
 // interrupted.
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool timing_builds,
                          Progress *progress);

@@ -30,8 +30,8 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint verify [CASE...] [OPTIONS]\n\n"
-    "Runs the hard cases, or those named, on a device and holds each to its bound; exit status 3 if any "
-    "fails.\n\n"
+    "Runs the hard cases, or those named, on a device and checks each against its bound; exit status 3 if "
+    "any fails.\n\n"
     "      --precision P     fast, single, strict or double (default: all that the device has)\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
@@ -48,11 +48,11 @@ typedef struct {
     const Compute *compute;
     Json *json; // or NULL: lines
     char tier;
-    size_t held, failed;
+    size_t passed, failed;
     double start; // of the case
 } Report;
 
-static void result_tell(const VerifyResult *result, const Report *report)
+static void result_print(const VerifyResult *result, const Report *report)
 {
     printf("  %-3s %c  %-60s ", result->name, report->tier, result->title);
     if (result->bound > 0)
@@ -63,9 +63,12 @@ static void result_tell(const VerifyResult *result, const Report *report)
     const struct {
         size_t count;
         const char *what;
-    } faults[] = {{result->wrong, "wrong"},           {result->leaks, "leaks"},
-                  {result->unsound, "unsound"},       {result->off, "off the surface"},
-                  {result->turned, "normals turned"}, {result->differing, "differ"}};
+    } faults[] = {{result->wrong, "wrong"},
+                  {result->leaks, "leaks"},
+                  {result->unsound, "unsound"},
+                  {result->off_surface, "off the surface"},
+                  {result->wrong_normals, "normals turned"},
+                  {result->differing, "differ"}};
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
         if (faults[i].count > 0) printf("  %zu %s", faults[i].count, faults[i].what);
     putchar('\n');
@@ -82,11 +85,11 @@ static void result_add_json(Json *json, const VerifyResult *result, double secon
     json_integer(json, "wrong", (int64_t)result->wrong);
     json_integer(json, "leaks", (int64_t)result->leaks);
     json_integer(json, "unsound", (int64_t)result->unsound);
-    json_integer(json, "off", (int64_t)result->off);
-    json_integer(json, "turned", (int64_t)result->turned);
+    json_integer(json, "off", (int64_t)result->off_surface);
+    json_integer(json, "turned", (int64_t)result->wrong_normals);
     json_integer(json, "differing", (int64_t)result->differing);
-    json_number(json, "surface_part", result->surface_part);
-    json_number(json, "normal_part", result->normal_part);
+    json_number(json, "surface_part", result->worst_position_ratio);
+    json_number(json, "normal_part", result->worst_normal_ratio);
     json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
     json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
     if (result->bound > 0) json_text(json, "unit", result->unit);
@@ -100,13 +103,13 @@ static bool result_take(void *context, const VerifyResult *result)
     Report *report = context;
     if (!compute_ok(report->compute)) return false;
     if (verify_holds(result))
-        report->held++;
+        report->passed++;
     else
         report->failed++;
     if (report->json)
         result_add_json(report->json, result, clock_seconds() - report->start);
     else
-        result_tell(result, report);
+        result_print(result, report);
     report->start = clock_seconds();
     return true;
 }
@@ -121,7 +124,7 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     const VerifyTier tier = verify_tier(&settings.render);
     if (tier == TIER_D && verify_reference_bits() < 64)
         fprintf(stderr,
-                "glint: verify: the reference has %d bits here: tier D is judged by numbers of its own "
+                "glint: verify: the reference has %d bits here: tier D is checked against numbers of its own "
                 "precision\n",
                 verify_reference_bits());
     double start = clock_seconds();
@@ -143,14 +146,14 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
         json_integer(json, "lanes", kernels.lanes);
         hash_json(json, "trace_kernel", kernels.trace_hash);
         hash_json(json, "render_kernel", kernels.render_hash);
-        json_integer(json, "passed", (int64_t)report.held);
+        json_integer(json, "passed", (int64_t)report.passed);
         json_integer(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
         json_end(json);
     } else if (compute_ok(compute)) {
-        printf("  tier %c: %zu of %zu cases held, in %.1f s; kernels: trace %016" PRIx64
+        printf("  tier %c: %zu of %zu cases passed, in %.1f s; kernels: trace %016" PRIx64
                ", render %016" PRIx64 "\n",
-               report.tier, report.held, report.held + report.failed, seconds, kernels.trace_hash,
+               report.tier, report.passed, report.passed + report.failed, seconds, kernels.trace_hash,
                kernels.render_hash);
     }
     return report.failed;

@@ -16,15 +16,16 @@
 
 enum {
     BIN_COUNT = 16,
-    SMALL_RANGE = 32,
+    SMALL_RANGE = 32, // below it fewer bins, which cost less to fill and to sweep, split as well
     SMALL_BIN_COUNT = 8,
-    HALVING_DEPTH = BVH_DEPTH_LARGEST - 32,
-    THREAD_RANGE_SMALLEST = 8192
+    // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
+    // 2^28 primitives, and at most 7 cuts by kind follow.
+    HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
+    THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };
 
-// Costs of the binary tree relative to each other: one step down, one primitive tested. (What the wide nodes
-// made of it cost is bvh_widen's.)
-static const float binary_step_cost = 1.0f, binary_test_cost = 1.0f;
+// SAH costs of the binary tree: visiting a node, testing a primitive. (bvh_widen has those of wide nodes.)
+static const float traversal_cost = 1, intersection_cost = 1;
 
 typedef float Float4 __attribute__((vector_size(16)));
 typedef int32_t Int4 __attribute__((vector_size(16)));
@@ -85,11 +86,11 @@ typedef struct {
     BuildBox box; // low[3] and high[3] unused
     uint32_t index;
     uint8_t kind;
-} Reference;
+} PrimitiveReference;
 
 typedef struct {
-    Reference *references;
-    BvhNodeBuild *nodes;
+    PrimitiveReference *references;
+    BvhBinaryNode *nodes;
     atomic_size_t node_count;
     atomic_uint depth;
     atomic_int idle_threads;
@@ -101,7 +102,7 @@ typedef struct {
 
 static void range_build(Builder *builder, Range range, unsigned depth, BvhChild *child);
 
-static Float4 reference_center(const Reference *reference)
+static Float4 reference_center(const PrimitiveReference *reference)
 {
     return reference->box.low + reference->box.high; // twice the center: only ratios count
 }
@@ -119,7 +120,7 @@ typedef struct {
 } BinMap;
 
 // Along each axis.
-static inline Int4 bins_of(const BinMap *map, const Reference *reference)
+static inline Int4 bins_of(const BinMap *map, const PrimitiveReference *reference)
 {
     return __builtin_convertvector((reference_center(reference) - map->low) * map->scale, Int4);
 }
@@ -133,7 +134,7 @@ static Split split_find(const Builder *builder, Range range, const BinMap *map)
         for (int bin = 0; bin < map->bin_count; bin++)
             boxes[axis][bin] = empty_box;
     for (size_t i = range.begin; i < range.end; i++) {
-        const Reference *reference = &builder->references[i];
+        const PrimitiveReference *reference = &builder->references[i];
         Int4 bins = bins_of(map, reference);
         for (int axis = 0; axis < 3; axis++) {
             BuildBox *box = &boxes[axis][bins[axis]];
@@ -170,13 +171,13 @@ static Split split_find(const Builder *builder, Range range, const BinMap *map)
 
 static size_t range_partition(Builder *builder, Range range, const BinMap *map, const Split *split)
 {
-    Reference *references = builder->references;
+    PrimitiveReference *references = builder->references;
     size_t left = range.begin, right = range.end;
     while (left < right) {
         if (bins_of(map, &references[left])[split->axis] <= split->bin) {
             left++;
         } else {
-            Reference swapped = references[left];
+            PrimitiveReference swapped = references[left];
             references[left] = references[--right];
             references[right] = swapped;
         }
@@ -184,52 +185,83 @@ static size_t range_partition(Builder *builder, Range range, const BinMap *map, 
     return left;
 }
 
-// Where the range goes over to another kind of shape after being ordered by kind; `end` where there is but
-// one kind.
-static size_t range_kind_boundary(Builder *builder, Range range)
+static void range_sort_by_kind(Builder *builder, Range range)
 {
-    Reference *references = builder->references;
+    PrimitiveReference *references = builder->references;
     for (size_t i = range.begin + 1; i < range.end; i++) {
-        Reference moving = references[i];
+        PrimitiveReference moving = references[i];
         size_t place = i;
         for (; place > range.begin && references[place - 1].kind > moving.kind; place--)
             references[place] = references[place - 1];
         references[place] = moving;
     }
+}
+
+// The first primitive of another kind than the first; `end` where there is but one kind.
+static size_t range_kind_boundary(const Builder *builder, Range range)
+{
+    const PrimitiveReference *references = builder->references;
     size_t boundary = range.begin + 1;
     while (boundary < range.end && references[boundary].kind == references[range.begin].kind)
         boundary++;
     return boundary;
 }
 
-// Where to cut the range in two; `end` where it is to be a leaf.
-static size_t range_cut(Builder *builder, Range range, unsigned depth)
+typedef struct {
+    BuildBox boxes, centers; // around the primitives' boxes, and around their centers
+} RangeBounds;
+
+static RangeBounds range_bounds(const Builder *builder, Range range)
 {
-    size_t count = range.end - range.begin;
-    BuildBox bounds = empty_box, centers = empty_box;
+    RangeBounds bounds = {empty_box, empty_box};
     for (size_t i = range.begin; i < range.end; i++) {
-        const Reference *reference = &builder->references[i];
-        bounds = box_join(bounds, reference->box);
+        const PrimitiveReference *reference = &builder->references[i];
+        bounds.boxes = box_join(bounds.boxes, reference->box);
         Float4 center = reference_center(reference);
-        centers = box_join(centers, (BuildBox){center, center});
+        bounds.centers = box_join(bounds.centers, (BuildBox){center, center});
     }
+    return bounds;
+}
+
+static BinMap bins_make(BuildBox centers, size_t count)
+{
     Float4 extent = centers.high - centers.low;
     BinMap map = {.low = centers.low, .bin_count = count < SMALL_RANGE ? SMALL_BIN_COUNT : BIN_COUNT};
-    for (int axis = 0; axis < 3; axis++)
-        map.scale[axis] = extent[axis] > 0x1p-120f ? (float)map.bin_count * (1 - 1e-6f) / extent[axis] : 0;
-
-    bool halve = depth >= HALVING_DEPTH;
-    if (!halve && count > 1) {
-        Split split = split_find(builder, range, &map);
-        float area = box_half_area(bounds);
-        bool pays = split.found && split.cost * binary_test_cost + binary_step_cost * area <
-                                       (float)count * binary_test_cost * area;
-        if (pays || (split.found && count > BVH_LEAF_LARGEST)) {
-            size_t middle = range_partition(builder, range, &map, &split);
-            if (middle > range.begin && middle < range.end) return middle;
-        }
+    for (int axis = 0; axis < 3; axis++) {
+        // a smaller extent would overflow the scale; a little less than bin_count keeps the highest center in
+        // the last bin
+        bool is_splittable = extent[axis] > 0x1p-120f;
+        map.scale[axis] = is_splittable ? (float)map.bin_count * (1 - 1e-6f) / extent[axis] : 0;
     }
-    if (count > BVH_LEAF_LARGEST) return range.begin + count / 2;
+    return map;
+}
+
+// Partitions the range by the surface area heuristic where that pays or the range is too large for a leaf.
+// Returns the first index of the right side; `end` where it did not.
+static size_t range_partition_by_area(Builder *builder, Range range)
+{
+    size_t count = range.end - range.begin;
+    RangeBounds bounds = range_bounds(builder, range);
+    BinMap map = bins_make(bounds.centers, count);
+    Split split = split_find(builder, range, &map);
+    float area = box_half_area(bounds.boxes);
+    bool pays = split.found && split.cost * intersection_cost + traversal_cost * area <
+                                   (float)count * intersection_cost * area;
+    if (!pays && !(split.found && count > BVH_LEAF_MAX)) return range.end;
+    size_t middle = range_partition(builder, range, &map, &split);
+    return middle > range.begin ? middle : range.end;
+}
+
+// Partitions the range. Returns the first index of the right side; `end` where the range is to be a leaf.
+static size_t range_split(Builder *builder, Range range, unsigned depth)
+{
+    size_t count = range.end - range.begin;
+    if (depth < HALVING_DEPTH && count > 1) {
+        size_t middle = range_partition_by_area(builder, range);
+        if (middle < range.end) return middle;
+    }
+    if (count > BVH_LEAF_MAX) return range.begin + count / 2;
+    range_sort_by_kind(builder, range);
     return range_kind_boundary(builder, range);
 }
 
@@ -249,9 +281,9 @@ static void *range_task_run(void *context)
 }
 
 // Builds both sides of a node, in two threads where one is idle and the range is worth it.
-static void sides_build(Builder *builder, Range left, Range right, unsigned depth, BvhNodeBuild *node)
+static void sides_build(Builder *builder, Range left, Range right, unsigned depth, BvhBinaryNode *node)
 {
-    bool large = right.end - left.begin >= THREAD_RANGE_SMALLEST;
+    bool large = right.end - left.begin >= THREAD_RANGE_MIN;
     if (large && atomic_fetch_sub(&builder->idle_threads, 1) > 0) {
         RangeTask task = {builder, left, depth, &node->children[0]};
         pthread_t thread;
@@ -268,7 +300,7 @@ static void sides_build(Builder *builder, Range left, Range right, unsigned dept
 
 static void range_build(Builder *builder, Range range, unsigned depth, BvhChild *child)
 {
-    size_t middle = range_cut(builder, range, depth);
+    size_t middle = range_split(builder, range, depth);
     if (middle == range.end) {
         *child = (BvhChild){.first = (uint32_t)range.begin, .count = (uint32_t)(range.end - range.begin)};
         return;
@@ -313,7 +345,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
 {
     *bvh = (Bvh){.primitive_count = count};
     Builder builder = {
-        .references = aligned_alloc(64, (count * sizeof(Reference) + 127) / 64 * 64),
+        .references = aligned_alloc(64, (count * sizeof(PrimitiveReference) + 127) / 64 * 64),
         .nodes = memory_allocate(count + 1, sizeof *builder.nodes),
         .node_count = 1,
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
@@ -322,7 +354,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
     double largest = largest_coordinate(boxes, count);
     double scale = largest > 0 ? 1 / largest : 1;
     for (size_t i = 0; i < count; i++) {
-        Reference *reference = &builder.references[i];
+        PrimitiveReference *reference = &builder.references[i];
         reference->box.low = float4_of(vector_scale(boxes[i].min, scale));
         reference->box.high = float4_of(vector_scale(boxes[i].max, scale));
         reference->index = (uint32_t)i;
@@ -331,14 +363,14 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
     BvhChild root = {.first = 0};
     if (count > 0) {
         // the root is node 0; a single leaf is its only child
-        size_t middle = range_cut(&builder, (Range){0, count}, 0);
+        size_t middle = range_split(&builder, (Range){0, count}, 0);
         builder.depth = 1;
         if (middle == count)
-            builder.nodes[0] = (BvhNodeBuild){{{.first = 0, .count = (uint32_t)count}, root}};
+            builder.nodes[0] = (BvhBinaryNode){{{.first = 0, .count = (uint32_t)count}, root}};
         else
             sides_build(&builder, (Range){0, middle}, (Range){middle, count}, 1, &builder.nodes[0]);
     } else {
-        builder.nodes[0] = (BvhNodeBuild){{root, root}};
+        builder.nodes[0] = (BvhBinaryNode){{root, root}};
     }
     bvh->nodes = builder.nodes;
     bvh->node_count = builder.node_count;

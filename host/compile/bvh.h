@@ -15,28 +15,26 @@ typedef struct {
 
 typedef struct {
     BvhChild children[2];
-} BvhNodeBuild;
+} BvhBinaryNode;
 
 // An empty child adds nothing.
-static inline Bounds bvh_node_bounds(const BvhNodeBuild *node)
+static inline Bounds bvh_node_bounds(const BvhBinaryNode *node)
 {
     return bounds_join(node->children[0].box, node->children[1].box);
 }
 
 typedef struct {
-    BvhNodeBuild *nodes; // the root first; a tree of one leaf has a second child with an empty box
+    BvhBinaryNode *nodes; // the root first; a tree of one leaf has a second child with an empty box
     size_t node_count;
     uint32_t *order; // the primitives, leaf by leaf
     uint8_t *kinds;  // theirs, in this order
     size_t primitive_count;
-    unsigned depth; // inner nodes on the longest way down
+    unsigned depth; // inner nodes on the longest path
 } Bvh;
 
-// No tree is deeper, whatever the boxes: beyond BVH_DEPTH_LARGEST - 32 levels ranges are halved by count.
-// (BVH_DEPTH_LARGEST: kernels/types.h)
-enum { BVH_LEAF_LARGEST = 8 };
+enum { BVH_LEAF_MAX = 8 }; // primitives per leaf, at most
 
 // `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
-// of them.
+// of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep (kernels/types.h).
 void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count);
 void bvh_free(Bvh *bvh);

@@ -110,7 +110,7 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
                        const Bounds *empty, unsigned width, void *node)
 {
     double *planes = node;
-    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *what = first + width;
+    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *leaf_info = first + width;
     uint32_t next_node = wide->first_node;
     for (unsigned i = 0; i < width; i++) {
         const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
@@ -123,10 +123,10 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
         }
         if (child && child->count > 0) {
             first[i] = order[child->first];
-            what[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+            leaf_info[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
         } else if (child) {
             first[i] = next_node++;
-            what[i] = BVH_NODE;
+            leaf_info[i] = BVH_NODE;
         }
     }
 }
@@ -176,8 +176,7 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
     free(bounded.boxes);
     bounded.boxes = NULL;
-    nodes_write(compiled, &bvh, &bounded,
-                settings->lanes < BVH_WIDTH_LEAST ? BVH_WIDTH_LEAST : settings->lanes);
+    nodes_write(compiled, &bvh, &bounded, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         array_reorder(compiled, kind, &bvh, &bounded);
     memcpy(compiled->bounded_counts, bounded.kind_counts, sizeof compiled->bounded_counts);

@@ -8,20 +8,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Relative costs: testing a node's boxes against interval bounds at once, visiting one of them, testing one
-// primitive. Found by experiment: a test costs less than its arithmetic, which hides latency.
-static const double wide_node_cost = 1, wide_box_cost = 1, wide_test_cost = 0.4;
+// SAH costs: testing a node's boxes, visiting a child, testing a primitive. Tuned by measurement: a
+// primitive's test is cheap because its arithmetic overlaps memory latency.
+static const double node_cost = 1, visit_cost = 1, intersection_cost = 0.4;
 
-// What takes one place where it might take several costs something even where its area is nothing: this
+// What takes one slot where it might take several costs something even where its area is nothing: this
 // decides ties, and vanishes beside other costs, which are of the order of 1.
 static const float tie_cost = 0x1p-40f;
 
-// The least cost where a subtree may take 1 .. width places in the wide node above it; entry 0 is unused. In
-// one place it is a wide node of its own, or a leaf.
-typedef float Costs[BVH_WIDTH_LARGEST + 1];
+// Entry i: a subtree's least cost where it takes at most i slots of the wide node above it, minus
+// leaves_cost; entry 0 is unused. In one slot it is a wide node of its own, or a leaf. The leaves cost the
+// same in all slots: left out, they leave the float's digits, and ties, to what differs.
+typedef float Costs[BVH_WIDTH_MAX + 1];
 
 typedef struct {
-    Costs costs;           // beyond leaves_cost
+    Costs costs;
     float leaves_cost;     // of the binary tree's leaves
     uint32_t first, count; // its primitives; count 0: more, or of more kinds, than a leaf may hold
     bool is_leaf;          // rather than a wide node
@@ -46,7 +47,7 @@ static bool child_is_node(const BvhChild *child)
 
 static float leaf_cost(const Widening *widening, double half_area, uint32_t count)
 {
-    return (float)(half_area * widening->scale * (wide_box_cost + wide_test_cost * count));
+    return (float)(half_area * widening->scale * (visit_cost + intersection_cost * count));
 }
 
 static Subtree child_subtree(const Widening *widening, const BvhChild *child)
@@ -58,12 +59,12 @@ static Subtree child_subtree(const Widening *widening, const BvhChild *child)
     return leaf;
 }
 
-// How many of the places the first of two children best takes.
-static unsigned places_share(const float *first, const float *second, unsigned places)
+// How many of the slots the first of two children best takes.
+static unsigned slots_share(const float *first, const float *second, unsigned slots)
 {
     unsigned best = 1;
-    for (unsigned k = 2; k < places; k++)
-        if (first[k] + second[places - k] < first[best] + second[places - best]) best = k;
+    for (unsigned k = 2; k < slots; k++)
+        if (first[k] + second[slots - k] < first[best] + second[slots - best]) best = k;
     return best;
 }
 
@@ -72,7 +73,7 @@ static void subtree_count(const Widening *widening, const Subtree *first, const 
                           Subtree *subtree)
 {
     const uint8_t *kinds = widening->bvh->kinds;
-    bool joins = first->count > 0 && second->count > 0 && first->count + second->count <= BVH_LEAF_LARGEST &&
+    bool joins = first->count > 0 && second->count > 0 && first->count + second->count <= BVH_LEAF_MAX &&
                  kinds[first->first] == kinds[second->first];
     subtree->first = first->first < second->first ? first->first : second->first;
     subtree->count = joins ? first->count + second->count : 0;
@@ -83,48 +84,48 @@ static void costs_find(Widening *widening)
 {
     const Bvh *bvh = widening->bvh;
     for (size_t i = bvh->node_count; i-- > 0;) {
-        const BvhNodeBuild *node = &bvh->nodes[i];
+        const BvhBinaryNode *node = &bvh->nodes[i];
         Subtree first = child_subtree(widening, &node->children[0]);
         Subtree second = child_subtree(widening, &node->children[1]);
         Subtree subtree = {.leaves_cost = first.leaves_cost + second.leaves_cost};
         subtree_count(widening, &first, &second, &subtree);
-        for (unsigned places = 2; places <= widening->width; places++) {
-            unsigned share = places_share(first.costs, second.costs, places);
-            subtree.costs[places] = first.costs[share] + second.costs[places - share];
+        for (unsigned slots = 2; slots <= widening->width; slots++) {
+            unsigned share = slots_share(first.costs, second.costs, slots);
+            subtree.costs[slots] = first.costs[share] + second.costs[slots - share];
         }
         double half_area = bounds_half_area(bvh_node_bounds(node));
-        float as_node = subtree.costs[widening->width] +
-                        (float)(half_area * widening->scale * (wide_node_cost + wide_box_cost));
+        float as_node =
+            subtree.costs[widening->width] + (float)(half_area * widening->scale * (node_cost + visit_cost));
         float as_leaf = leaf_cost(widening, half_area, subtree.count) - subtree.leaves_cost;
         subtree.is_leaf = subtree.count > 0 && as_leaf < as_node;
         subtree.costs[1] = (subtree.is_leaf ? as_leaf : as_node) + tie_cost;
-        for (unsigned places = 2; places <= widening->width; places++)
-            subtree.costs[places] = fminf(subtree.costs[places], subtree.costs[1]);
+        for (unsigned slots = 2; slots <= widening->width; slots++)
+            subtree.costs[slots] = fminf(subtree.costs[slots], subtree.costs[1]);
         widening->subtrees[i] = subtree;
     }
 }
 
-static void child_gather(const Widening *widening, const BvhChild *child, unsigned places, BvhWide *wide,
+static void child_gather(const Widening *widening, const BvhChild *child, unsigned slots, BvhWide *wide,
                          BvhWideNode *node);
 
-static void children_gather(const Widening *widening, uint32_t index, unsigned places, BvhWide *wide,
+static void children_gather(const Widening *widening, uint32_t index, unsigned slots, BvhWide *wide,
                             BvhWideNode *node)
 {
     const BvhChild *children = widening->bvh->nodes[index].children;
     Subtree first = child_subtree(widening, &children[0]), second = child_subtree(widening, &children[1]);
-    unsigned share = places_share(first.costs, second.costs, places);
+    unsigned share = slots_share(first.costs, second.costs, slots);
     child_gather(widening, &children[0], share, wide, node);
-    child_gather(widening, &children[1], places - share, wide, node);
+    child_gather(widening, &children[1], slots - share, wide, node);
 }
 
-static void child_gather(const Widening *widening, const BvhChild *child, unsigned places, BvhWide *wide,
+static void child_gather(const Widening *widening, const BvhChild *child, unsigned slots, BvhWide *wide,
                          BvhWideNode *node)
 {
     if (child_is_empty(child)) return;
     if (child_is_node(child)) {
         const Subtree *subtree = &widening->subtrees[child->first];
-        if (subtree->costs[places] < subtree->costs[1]) {
-            children_gather(widening, child->first, places, wide, node);
+        if (subtree->costs[slots] < subtree->costs[1]) {
+            children_gather(widening, child->first, slots, wide, node);
             return;
         }
         if (subtree->is_leaf) {
@@ -138,7 +139,7 @@ static void child_gather(const Widening *widening, const BvhChild *child, unsign
 
 void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
 {
-    if (width < 2 || width > BVH_WIDTH_LARGEST) fault("a node of %u children", width);
+    if (width < 2 || width > BVH_WIDTH_MAX) fault("a node of %u children", width);
     double root_area = bounds_half_area(bvh_node_bounds(&bvh->nodes[0]));
     Widening widening = {
         .bvh = bvh,

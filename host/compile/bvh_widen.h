@@ -5,7 +5,7 @@
 #include "host/compile/flat_types.h"
 
 typedef struct {
-    const BvhChild *children[BVH_WIDTH_LARGEST]; // inner ones, with count 0, are wide nodes too
+    const BvhChild *children[BVH_WIDTH_MAX]; // inner ones, with count 0, are wide nodes too
     unsigned child_count;
     uint32_t first_node; // its inner children are this wide node and those behind it, in their order
 } BvhWideNode;
@@ -17,7 +17,7 @@ typedef struct {
     size_t leaf_count;
 } BvhWide;
 
-// Nodes of at most `width` children, 2 to BVH_WIDTH_LARGEST, and leaves of up to BVH_LEAF_LARGEST primitives,
+// Nodes of at most `width` children, 2 to BVH_WIDTH_MAX, and leaves of up to BVH_LEAF_MAX primitives,
 // so chosen that they cost the least that the binary tree allows: areas stand for how often rays come by
 // (Ylitie, Karras, Laine, Efficient incoherent ray traversal on GPUs through compressed wide BVHs, HPG 2017;
 // here the binary tree's leaves may have more than one primitive, and are not split). What is written to

@@ -14,8 +14,8 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
 {
     if (!lights_fit(compiled, scene, settings, messages) || !textures_load(compiled, scene, messages))
         return false;
-    const bool wide = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {settings->shift_to_eye ? scene->camera.position : (Vector3){0}, wide};
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
+    const Rounding rounding = {settings->shift_to_eye ? scene->camera.position : (Vector3){0}, is_double};
     objects_flatten(compiled, scene, &rounding);
     materials_flatten(compiled, scene, &rounding);
     lights_flatten(compiled, scene, &rounding);
@@ -24,7 +24,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     double start = clock_seconds();
     bvh_flatten(compiled, settings);
     compiled->bvh_seconds = clock_seconds() - start;
-    culling_fill(compiled, wide);
+    culling_fill(compiled, is_double);
     if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
     header_write(compiled, scene, settings);
     return true;

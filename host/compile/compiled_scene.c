@@ -18,11 +18,11 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
     // the widest; flat_nodes_make makes them as wide as the kernel's
-    [FLAT_NODES] = {BVH_WIDTH_LARGEST / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
-                    BVH_WIDTH_LARGEST / 4 * BVH_PLANES, BVH_WIDTH_LARGEST / 4 * 2},
+    [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
+                    BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
     [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
-    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, image),
+    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, texture),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
     [FLAT_TEXELS] = LAYOUT(Texel, color, color),
@@ -46,7 +46,7 @@ FlatArray flat_array_make(size_t kind, size_t count)
 FlatArray flat_nodes_make(size_t count, unsigned width)
 {
     const FlatLayout widest = layouts[FLAT_NODES];
-    const unsigned parts = BVH_WIDTH_LARGEST / width;
+    const unsigned parts = BVH_WIDTH_MAX / width;
     return array_make(
         (FlatLayout){widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts}, count);
 }
@@ -71,19 +71,19 @@ void compiled_scene_free(CompiledScene *compiled)
     *compiled = (CompiledScene){0};
 }
 
-size_t flat_array_size(const FlatArray *array, bool wide)
+size_t flat_array_size(const FlatArray *array, bool is_double)
 {
     const FlatLayout *layout = &array->layout;
-    size_t size =
-        wide ? layout->size : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+    size_t size = is_double ? layout->size
+                            : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
     return array->count * size;
 }
 
-void flat_array_write(const FlatArray *array, bool wide, void *target)
+void flat_array_write(const FlatArray *array, bool is_double, void *target)
 {
     const FlatLayout *layout = &array->layout;
-    if (wide) {
-        memcpy(target, array->items, flat_array_size(array, wide));
+    if (is_double) {
+        memcpy(target, array->items, flat_array_size(array, is_double));
         return;
     }
     char *out = target;

@@ -39,12 +39,13 @@ typedef struct {
 } CompiledTexture;
 
 typedef struct {
-    FlatArray arrays[FLAT_COUNT];        // in the order of the kernels' arguments
-    FeatureSet features;                 // that the kernels need
-    double unit;                         // scene units per unit of length in the arrays, a power of two
-    double flatten_seconds, bvh_seconds; // to build the BVH; all else
+    FlatArray arrays[FLAT_COUNT]; // in the order of the kernels' arguments
+    FeatureSet features;          // that the kernels need
+    double unit;                  // scene units per unit of length in the arrays, a power of two
+    double bvh_seconds;           // building the BVH
+    double flatten_seconds;       // everything else in scene_compile
     // What the stages leave for later ones and for the header.
-    CompiledTexture *textures;           // of each of the scene's images
+    CompiledTexture *textures;           // of each of the scene's textures
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;                   // of these; 0 where there are none
     uint32_t cull_sphere_count;          // of each common origin
@@ -70,5 +71,5 @@ void *flat_array_at(const FlatArray *array, size_t index);
 uint32_t *flat_id(const FlatArray *array, size_t index);
 
 // Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
-size_t flat_array_size(const FlatArray *array, bool wide);
-void flat_array_write(const FlatArray *array, bool wide, void *target);
+size_t flat_array_size(const FlatArray *array, bool is_double);
+void flat_array_write(const FlatArray *array, bool is_double, void *target);

@@ -4,15 +4,15 @@
 #include <math.h>
 #include <stdlib.h>
 
-// As near as this, in parts of how far the scene reaches, surfaces count as touching. The kernels look five
-// errors ahead at most (kernels/shading/surface.h), of 16 u of a shape's numbers and 4 u of a point's, each
-// the sum of three coordinates: 5 * (16 * 7 + 4 * 3) u = 620 u at float for a cylinder, whose numbers are
-// most.
+// Surfaces count as touching within this, relative to the scene's largest coordinate. It has to exceed 620 u,
+// about 2^-14.7 with the u of float: the kernels look for an opaque surface behind a transparent one up to 5
+// error bounds away (surface_find_opaque), each of at most 16 u per number of a shape, 7 of a cylinder, and 4
+// u per coordinate of the point. For double it is larger than needed.
 #define NEARNESS 0x1p-14
 
 // More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives
 // takes their place.
-#define PAIRS_LARGEST ((size_t)1 << 19)
+#define PAIRS_MAX ((size_t)1 << 19)
 
 // Where a primitive is: in its box, infinite where it is unbounded; what is flat also in its plane, normal .
 // p = offset.
@@ -20,17 +20,17 @@ typedef struct {
     Bounds box;
     Vector3 normal; // 0: not flat
     double offset;
-    double reach; // the largest magnitude of its numbers, relative to the origin, mostly the eye
-} Extent;
+    double largest_coordinate; // magnitude of its numbers, relative to the origin, mostly the eye
+} ContactRegion;
 
 typedef struct {
-    Extent *items;
+    ContactRegion *items;
     size_t count;
-} ExtentList;
+} ContactRegionList;
 
-static bool extent_is_bounded(const Extent *extent)
+static bool region_is_bounded(const ContactRegion *region)
 {
-    return isfinite(extent->box.min.x);
+    return isfinite(region->box.min.x);
 }
 
 static Bounds everywhere(void)
@@ -38,21 +38,21 @@ static Bounds everywhere(void)
     return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
 }
 
-static Extent extent_of(size_t kind, const void *primitive)
+static ContactRegion region_of(size_t kind, const void *primitive)
 {
     const ShapeOps *shape = shape_ops[kind];
-    Extent extent = {.box = everywhere()};
-    if (primitive_bounds(kind, primitive, &extent.box))
-        extent.reach = fmax(vector_largest(extent.box.min), vector_largest(extent.box.max));
+    ContactRegion region = {.box = everywhere()};
+    if (primitive_bounds(kind, primitive, &region.box))
+        region.largest_coordinate = fmax(vector_largest(region.box.min), vector_largest(region.box.max));
     else
-        extent.reach = shape->reach(primitive);
+        region.largest_coordinate = shape->largest_coordinate(primitive);
     if (shape->plane) {
         Vector3 point;
-        shape->plane(primitive, &point, &extent.normal);
-        extent.normal = vector_normalize(extent.normal);
-        extent.offset = vector_dot(extent.normal, point);
+        shape->plane(primitive, &point, &region.normal);
+        region.normal = vector_normalize(region.normal);
+        region.offset = vector_dot(region.normal, point);
     }
-    return extent;
+    return region;
 }
 
 typedef struct {
@@ -67,7 +67,7 @@ static Interval interval_scale(double low, double high, double factor)
 
 // The part of a box within `margin` of a plane: along each axis with n_x != 0, n_x x = offset - n_y y - n_z z
 // for all y and z of the box.
-static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
+static Bounds bounds_near_plane(Bounds box, const ContactRegion *flat, double margin)
 {
     const double normal[3] = {flat->normal.x, flat->normal.y, flat->normal.z};
     double low[3] = {box.min.x, box.min.y, box.min.z}, high[3] = {box.max.x, box.max.y, box.max.z};
@@ -87,9 +87,9 @@ static Bounds bounds_near_plane(Bounds box, const Extent *flat, double margin)
 
 // A box around where two may touch. The error of an unbounded primitive grows with the distance: two such may
 // touch anywhere.
-static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
+static Bounds regions_meet(const ContactRegion *a, const ContactRegion *b, double margin)
 {
-    if (!extent_is_bounded(a) && !extent_is_bounded(b)) return everywhere();
+    if (!region_is_bounded(a) && !region_is_bounded(b)) return everywhere();
     Bounds both = bounds_intersect(bounds_grow(a->box, margin), b->box);
     if (bounds_is_empty(&both)) return both;
     both = bounds_grow(both, margin);
@@ -98,42 +98,43 @@ static Bounds extents_meet(const Extent *a, const Extent *b, double margin)
     return both;
 }
 
-// The transparent primitives, or the opaque ones. Returns the largest reach.
-static double extents_collect(ExtentList *list, const CompiledScene *compiled, bool transparent)
+// The transparent primitives, or the opaque ones. Returns their largest coordinate.
+static double regions_collect(ContactRegionList *list, const CompiledScene *compiled, bool transparent)
 {
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     const FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
-    *list = (ExtentList){.items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count + 1, sizeof(Extent))};
+    *list = (ContactRegionList){
+        .items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count + 1, sizeof(ContactRegion))};
     double largest = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++) {
             const FlatMaterial *material = &materials[entries[*flat_id(array, i)].kind_index_material.z];
             if (transparent != (material->reflection_transmission_ior.y > 0)) continue;
-            list->items[list->count] = extent_of(kind, flat_array_at(array, i));
-            largest = fmax(largest, list->items[list->count++].reach);
+            list->items[list->count] = region_of(kind, flat_array_at(array, i));
+            largest = fmax(largest, list->items[list->count++].largest_coordinate);
         }
     }
     return largest;
 }
 
 // One in place of all bounded ones.
-static void extents_join_bounded(ExtentList *list)
+static void regions_join_bounded(ContactRegionList *list)
 {
     Bounds all = bounds_empty();
     size_t count = 0;
     for (size_t i = 0; i < list->count; i++) {
-        if (extent_is_bounded(&list->items[i]))
+        if (region_is_bounded(&list->items[i]))
             all = bounds_join(all, list->items[i].box);
         else
             list->items[count++] = list->items[i];
     }
-    if (!bounds_is_empty(&all)) list->items[count++] = (Extent){.box = all};
+    if (!bounds_is_empty(&all)) list->items[count++] = (ContactRegion){.box = all};
     list->count = count;
 }
 
 // Removes what is far from all of the others.
-static void extents_keep_near(ExtentList *list, const ExtentList *others, double margin)
+static void regions_keep_near(ContactRegionList *list, const ContactRegionList *others, double margin)
 {
     Bounds around = bounds_empty();
     for (size_t i = 0; i < others->count; i++)
@@ -147,26 +148,26 @@ static void extents_keep_near(ExtentList *list, const ExtentList *others, double
     list->count = count;
 }
 
-static Bounds lists_meet(ExtentList *transparent, ExtentList *opaque, double margin)
+static Bounds lists_meet(ContactRegionList *transparent, ContactRegionList *opaque, double margin)
 {
-    extents_keep_near(opaque, transparent, margin);
-    extents_keep_near(transparent, opaque, margin);
+    regions_keep_near(opaque, transparent, margin);
+    regions_keep_near(transparent, opaque, margin);
     if (transparent->count == 0) return bounds_empty();
-    if (opaque->count > PAIRS_LARGEST / transparent->count) extents_join_bounded(opaque);
-    if (opaque->count > PAIRS_LARGEST / transparent->count) return everywhere();
+    if (opaque->count > PAIRS_MAX / transparent->count) regions_join_bounded(opaque);
+    if (opaque->count > PAIRS_MAX / transparent->count) return everywhere();
     Bounds all = bounds_empty();
     for (size_t i = 0; i < transparent->count; i++)
         for (size_t k = 0; k < opaque->count; k++)
-            all = bounds_join(all, extents_meet(&transparent->items[i], &opaque->items[k], margin));
+            all = bounds_join(all, regions_meet(&transparent->items[i], &opaque->items[k], margin));
     return all;
 }
 
 Bounds contact_find(const CompiledScene *compiled)
 {
-    ExtentList transparent, opaque;
-    double reach = extents_collect(&transparent, compiled, true);
-    reach = fmax(reach, extents_collect(&opaque, compiled, false));
-    Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * reach);
+    ContactRegionList transparent, opaque;
+    double coordinate = regions_collect(&transparent, compiled, true);
+    coordinate = fmax(coordinate, regions_collect(&opaque, compiled, false));
+    Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * coordinate);
     free(transparent.items);
     free(opaque.items);
     return contact;

@@ -8,8 +8,8 @@ static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, doub
     Vector3 v = vector_subtract(sphere.center, common_origin);
     double squared = vector_dot(v, v),
            power = squared * (1 - CULL_SPHERE_SLACK * roundoff) - sphere.radius * sphere.radius;
-    if (!(fabs(power) <= CULL_SPHERE_LARGEST && squared <= CULL_SPHERE_LARGEST))
-        return (CullSphere){{0, 0, 0, -CULL_SPHERE_LARGEST}};
+    if (!(fabs(power) <= CULL_SPHERE_MAX && squared <= CULL_SPHERE_MAX))
+        return (CullSphere){{0, 0, 0, -CULL_SPHERE_MAX}};
     return (CullSphere){{v.x, v.y, v.z, power}};
 }
 
@@ -19,7 +19,7 @@ static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_
     uint32_t count = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         count += compiled->bounded_counts[kind];
-    if (count == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_LARGEST}};
+    if (count == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_MAX}};
     return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, roundoff);
 }
 
@@ -48,18 +48,18 @@ static void row_fill(const CompiledScene *compiled, Vector3 common_origin, doubl
 }
 
 // 16 MiB of floats; a scene that would need more does without.
-enum { CULL_SPHERES_LARGEST = 1 << 20 };
+enum { CULL_SPHERES_MAX = 1 << 20 };
 
-void culling_fill(CompiledScene *compiled, bool wide)
+void culling_fill(CompiledScene *compiled, bool is_double)
 {
-    double roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
+    double roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
     const FlatArray *lights = &compiled->arrays[FLAT_LIGHTS];
     size_t count = 1;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         Outside outside = outside_bvh(compiled, kind);
         count += outside.end - outside.first;
     }
-    if (count > CULL_SPHERES_LARGEST / (1 + lights->count)) {
+    if (count > CULL_SPHERES_MAX / (1 + lights->count)) {
         // a kernel's argument all the same
         compiled->arrays[FLAT_CULL_SPHERES] = flat_array_make(FLAT_CULL_SPHERES, 1);
         return;

@@ -20,9 +20,9 @@ static FeatureSet material_features(const Material *material)
 {
     FeatureSet set = 0;
     if (material->checker) set |= FEATURE_CHECKERS;
-    if (material->image) set |= FEATURE_IMAGES;
+    if (material->texture) set |= FEATURE_IMAGES;
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
-    // total reflection makes mirrors of glass
+    // which includes reflected rays: total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
     return set;
 }

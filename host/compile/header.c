@@ -10,11 +10,11 @@ static scalar4 scalar4_within_floats(Vector3 v)
 }
 
 // The center, and the largest distance from it to a point inside, summed over the axes.
-static scalar4 center_and_reach(const Bounds *bounds)
+static scalar4 center_and_half_extent(const Bounds *bounds)
 {
     Vector3 half_low = vector_scale(bounds->min, 0.5), half_high = vector_scale(bounds->max, 0.5);
-    Vector3 reach = vector_subtract(half_high, half_low);
-    return scalar4_of(vector_add(half_low, half_high), reach.x + reach.y + reach.z);
+    Vector3 half_extents = vector_subtract(half_high, half_low);
+    return scalar4_of(vector_add(half_low, half_high), half_extents.x + half_extents.y + half_extents.z);
 }
 
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
@@ -26,7 +26,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .forward = scalar4_of(basis.forward, 0),
         .right = scalar4_of(basis.right, 0),
         .up = scalar4_of(basis.up, 0),
-        .bounds = center_and_reach(&compiled->bvh_bounds),
+        .bounds = center_and_half_extent(&compiled->bvh_bounds),
         .bounds_low = scalar4_of(compiled->bvh_bounds.min, 0),
         .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),
         .contact_low = scalar4_within_floats(compiled->contact.min),

@@ -24,7 +24,7 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         if (light->kind != LIGHT_POINT)
             lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
         if (light->kind == LIGHT_SPOT) {
-            double outer = versine(light->angle), inner = versine(light->angle - light->penumbra);
+            double outer = versine(light->half_angle), inner = versine(light->half_angle - light->penumbra);
             lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
         }
     }

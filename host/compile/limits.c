@@ -50,8 +50,8 @@ static bool array_fits(const FlatArray *array, double largest)
 bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                  MessageList *messages)
 {
-    bool wide = settings->precision == PRECISION_DOUBLE;
-    double largest = wide ? DBL_MAX : FLT_MAX;
+    bool is_double = settings->precision == PRECISION_DOUBLE;
+    double largest = is_double ? DBL_MAX : FLT_MAX;
     CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     bool fits = vector_fits(scene->background, largest) && vector_fits(scene->ambient, largest) &&
                 vector_fits(basis.forward, largest) && vector_fits(basis.right, largest) &&
@@ -61,6 +61,6 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
     if (fits) return true;
     message_add(messages, MESSAGE_ERROR,
                 "a number of the scene does not fit precision %s: its magnitude is beyond %s",
-                precision_names[settings->precision], wide ? "1.8e308" : "3.4e38");
+                precision_names[settings->precision], is_double ? "1.8e308" : "3.4e38");
     return false;
 }

@@ -27,9 +27,9 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
         if (material->checker)
             materials[i].grid =
                 (scalar4){fmod(eye.x / size, 2), fmod(eye.y / size, 2), fmod(eye.z / size, 2), 1 / size};
-        if (material->image == 0) continue;
-        const CompiledTexture *texture = &compiled->textures[material->image - 1];
-        materials[i].image = (uint4){1 + texture->first_level, texture->level_count, 0, 0};
-        materials[i].reflection_transmission_ior.w = texture->width / material->image_size;
+        if (material->texture == 0) continue;
+        const CompiledTexture *texture = &compiled->textures[material->texture - 1];
+        materials[i].texture = (uint4){1 + texture->first_level, texture->level_count, 0, 0};
+        materials[i].reflection_transmission_ior.w = texture->width / material->texture_size;
     }
 }

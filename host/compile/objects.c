@@ -23,7 +23,7 @@ static void arrays_make(CompiledScene *compiled, const Scene *scene)
         bool smooth =
             mesh ? mesh->normals != NULL : object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth;
         if (smooth) normals_count += count;
-        if (mesh && mesh->uvs && scene->images.count > 0) uvs_count += count;
+        if (mesh && mesh->uvs && scene->textures.count > 0) uvs_count += count;
     }
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         compiled->arrays[FLAT_FIRST_SHAPE + kind] = flat_array_make(FLAT_FIRST_SHAPE + kind, counts[kind]);

@@ -57,13 +57,13 @@ Vector3 vector_on_grid(Vector3 point)
                      rint(point.z * cells) / cells};
 }
 
-size_t shape_forms(ShapeForm forms[SHAPE_FORMS_LARGEST])
+size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX])
 {
     size_t count = 0;
     for (ShapeKind kind = 0; kind < SHAPE_MESH; kind++) {
         const ShapeOps *shape = shape_ops[kind];
         for (unsigned form = 0; form < SHAPE_OPS_FORMS && shape->forms[form]; form++) {
-            if (count == SHAPE_FORMS_LARGEST) fault("more than %d forms of shapes", SHAPE_FORMS_LARGEST);
+            if (count == SHAPE_FORMS_MAX) fault("more than %d forms of shapes", SHAPE_FORMS_MAX);
             ShapeForm *entry = &forms[count++];
             *entry = (ShapeForm){kind, form, shape->forms[form], false};
             Bounds bounds;
@@ -77,7 +77,7 @@ size_t shape_forms(ShapeForm forms[SHAPE_FORMS_LARGEST])
 static RandomShape shape_make(const ShapeForm *form, Vector3 center, double size, Vector3 axis,
                               Random *random)
 {
-    RandomShape made = {.object.kind = form->kind, .center = center, .reach = size, .axis = axis};
+    RandomShape made = {.object.kind = form->kind, .center = center, .radius = size, .axis = axis};
     shape_ops[form->kind]->randomize(&made, form->form, random);
     return made;
 }

@@ -23,8 +23,8 @@ Vector3 vector_on_grid(Vector3 point);
 typedef struct {
     Object object;
     Vector3 center;
-    double reach; // radius around the center of what matters: all of a bounded object
-    Vector3 axis; // along which rays are special: an axis, a normal, an edge; not unit
+    double radius; // around the center, of what matters: all of a bounded object
+    Vector3 axis;  // along which rays are special: an axis, a normal, an edge; not unit
 } RandomShape;
 
 // A form of a shape, such as "open cylinder".
@@ -36,8 +36,8 @@ typedef struct {
 } ShapeForm;
 
 // Every form of every shape but the mesh, shape by shape. Returns how many.
-enum { SHAPE_FORMS_LARGEST = 64 };
-size_t shape_forms(ShapeForm forms[SHAPE_FORMS_LARGEST]);
+enum { SHAPE_FORMS_MAX = 64 };
+size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX]);
 
 RandomShape random_shape(const ShapeForm *form, Random *random); // 0.1 to 10 large, within 8 of the origin
 RandomShape random_shape_at(const ShapeForm *form, Vector3 center, double size, Random *random);

@@ -1,10 +1,10 @@
 #include "host/compile/rounding.h"
 
-// The volatile keeps the rounding: gcc 12 at -O2 loses a conversion to float and back where stores are
-// merged.
+// GCC 12 at -O2 drops a conversion to float and back where it merges stores (-ftree-slp-vectorize); volatile
+// keeps it.
 double rounded(const Rounding *rounding, double value)
 {
-    if (rounding->wide) return value;
+    if (rounding->is_double) return value;
     volatile float narrow = (float)value;
     return narrow;
 }

@@ -5,7 +5,7 @@
 
 typedef struct {
     Vector3 eye;
-    bool wide; // the kernel's precision is double: numbers stay
+    bool is_double; // the kernel's precision is double: numbers stay
 } Rounding;
 
 double rounded(const Rounding *rounding, double value);

@@ -16,7 +16,7 @@ enum { SHAPE_OPS_FORMS = 4 };
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
 typedef struct {
     int kind; // KIND_… of its primitives
-    // Offsets in Object, up to the first 0: of positions and of vectors between them; of lengths.
+    // Offsets in Object, up to the first 0: of positions and other vectors (axes, normals); of lengths.
     size_t vectors[7], lengths[3];
     // Restores what transforms of its vectors break; NULL: nothing.
     void (*restore)(Object *object);
@@ -25,10 +25,10 @@ typedef struct {
     // Adds its primitives (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
 
-    // What a random one can be, up to the first NULL, and one of a form, of about made->reach around
-    // made->center, with made->axis if it has an axis or normal. Sets the object's shape, and the reach and
-    // the axis where they are others.
+    // What a random one can be, up to the first NULL.
     const char *forms[SHAPE_OPS_FORMS];
+    // Sets made->object's shape to a random one of a form, of about made->radius around made->center, along
+    // made->axis if it has an axis or normal; and the radius and the axis where it has others.
     void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
     // As `bounds`; NULL: always unbounded.
@@ -38,7 +38,7 @@ typedef struct {
     // A point and the normal, not unit, of a flat primitive; NULL: not flat.
     void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
     // The largest magnitude of an unbounded primitive's numbers, as distances from the origin.
-    double (*reach)(const void *primitive);
+    double (*largest_coordinate)(const void *primitive);
 
     // Floating-point operations of a ray's test, counted by hand up to where a miss is certain, in the usual
     // forms: the discriminant of a quadratic around the shape's center or axis, slabs for the box, the first

@@ -35,9 +35,9 @@ void surface_grid(const Flattening *flattening, uint32_t material, Vector3 norma
 {
     const Material *look = &flattening->scene->materials.items[material];
     Vector3 unit = vector_normalize(normal);
-    if (look->image > 0) {
-        const CompiledTexture *texture = &flattening->compiled->textures[look->image - 1];
-        double width = look->image_size;
+    if (look->texture > 0) {
+        const CompiledTexture *texture = &flattening->compiled->textures[look->texture - 1];
+        double width = look->texture_size;
         Vector3 up = texture_up(unit);
         *u = texture_axis(flattening, vector_cross(up, unit), width);
         *v = texture_axis(flattening, up, width * texture->height / texture->width);

@@ -10,7 +10,7 @@
 
 // Of a side: beyond it a position in float, 24 bits, cannot resolve a texel. Of all textures: a kernel
 // counts texels in 32 bits.
-enum { SIDE_LARGEST = 1 << 16, TEXELS_LARGEST = 1 << 28 };
+enum { SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
 typedef struct {
     uint32_t width, height;
@@ -101,9 +101,8 @@ static bool level_fill(Level *level, const Image *image, bool decodes)
 // What is wrong with the image, or NULL.
 static const char *levels_add(LevelList *list, const Image *image, bool as_displayed)
 {
-    if (image->width > SIDE_LARGEST || image->height > SIDE_LARGEST)
-        return "a side of more than 65536 texels";
-    if ((size_t)image->width * image->height > TEXELS_LARGEST - list->texel_count)
+    if (image->width > SIDE_MAX || image->height > SIDE_MAX) return "a side of more than 65536 texels";
+    if ((size_t)image->width * image->height > TEXELS_MAX - list->texel_count)
         return "too many texels in all textures";
     Level level = level_open(image->width, image->height);
     array_push(list->levels, level);
@@ -114,17 +113,17 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
         array_push(list->levels, level);
         list->texel_count += (size_t)level.width * level.height;
     }
-    return list->texel_count > TEXELS_LARGEST ? "too many texels in all textures" : NULL;
+    return list->texel_count > TEXELS_MAX ? "too many texels in all textures" : NULL;
 }
 
-static bool image_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
-                      const SceneImage *scene_image, MessageList *messages)
+static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
+                        const SceneTexture *scene_texture, MessageList *messages)
 {
     const uint32_t first_level = (uint32_t)list->levels.count;
     const Source source = scene_source(scene);
     Image image;
     MessageList problems = {0};
-    bool done = image_read(&image, scene_image->path, &problems);
+    bool done = image_read(&image, scene_texture->path, &problems);
     if (done) {
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
         *texture = (CompiledTexture){image.width, image.height, first_level,
@@ -132,11 +131,11 @@ static bool image_add(LevelList *list, CompiledTexture *texture, const Scene *sc
         image_free(&image);
         done = !problem;
         if (problem)
-            message_add_at(messages, MESSAGE_ERROR, &source, scene_image->offset, "cannot use '%s': %s",
-                           scene_image->path, problem);
+            message_add_at(messages, MESSAGE_ERROR, &source, scene_texture->offset, "cannot use '%s': %s",
+                           scene_texture->path, problem);
     }
     for (size_t i = 0; i < problems.count; i++)
-        message_add_at(messages, problems.items[i].severity, &source, scene_image->offset, "%s",
+        message_add_at(messages, problems.items[i].severity, &source, scene_texture->offset, "%s",
                        problems.items[i].text);
     message_list_free(&problems);
     return done;
@@ -162,10 +161,10 @@ static void levels_flatten(CompiledScene *compiled, const LevelList *list)
 bool textures_load(CompiledScene *compiled, const Scene *scene, MessageList *messages)
 {
     LevelList list = {0};
-    compiled->textures = memory_allocate_zeroed(scene->images.count + 1, sizeof *compiled->textures);
+    compiled->textures = memory_allocate_zeroed(scene->textures.count + 1, sizeof *compiled->textures);
     bool done = true;
-    for (size_t i = 0; i < scene->images.count && done; i++)
-        done = image_add(&list, &compiled->textures[i], scene, &scene->images.items[i], messages);
+    for (size_t i = 0; i < scene->textures.count && done; i++)
+        done = texture_add(&list, &compiled->textures[i], scene, &scene->textures.items[i], messages);
     if (done) levels_flatten(compiled, &list);
     levels_free(&list);
     return done;

@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Every position and every vector between two, but for those of meshes.
+// Every position and every other vector (axes, normals, directions), but for those of meshes. Scaling a
+// normal or a direction changes nothing: they need not be unit.
 static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
 {
     change(&scene->camera.position, factor);
@@ -42,7 +43,7 @@ void scene_scale(Scene *scene, double factor)
             vector_grow(&scene->meshes.items[i].vertices[k], factor);
     for (size_t i = 0; i < scene->materials.count; i++) {
         scene->materials.items[i].checker_size *= factor;
-        scene->materials.items[i].image_size *= factor;
+        scene->materials.items[i].texture_size *= factor;
     }
 }
 

@@ -11,7 +11,7 @@ struct ImageWriter {
     const struct Encoder *encoder;
     void *state;
     uint32_t rows_written;
-    bool settled, failed;
+    bool finished, failed;
 };
 
 // A function that fails adds a message and returns false; only `free` is called after that.

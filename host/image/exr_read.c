@@ -112,10 +112,10 @@ static void channel_place(exr_coding_channel_info_t *channel, float *place, uint
 }
 
 static void channels_place(const ExrReader *reader, Image *image, exr_decode_pipeline_t *pipeline,
-                           float *aside, uint32_t x, uint32_t y)
+                           float *scratch, uint32_t x, uint32_t y)
 {
     for (int i = 0; i < pipeline->channel_count; i++)
-        channel_place(&pipeline->channels[i], aside, 1, (uint32_t)pipeline->chunk.width);
+        channel_place(&pipeline->channels[i], scratch, 1, (uint32_t)pipeline->chunk.width);
     float *place = image->values + ((size_t)y * image->width + x) * image->channels;
     for (uint32_t i = 0; i < image->channels; i++) {
         exr_coding_channel_info_t *channel = &pipeline->channels[reader->chosen[i]];
@@ -135,12 +135,12 @@ static exr_result_t exr_chunk(const ExrReader *reader, Image *image, const exr_c
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
     exr_result_t code = exr_decoding_initialize(reader->context, 0, chunk, &pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
-    float *aside = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *aside);
-    channels_place(reader, image, &pipeline, aside, x, y);
+    float *scratch = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *scratch);
+    channels_place(reader, image, &pipeline, scratch, x, y);
     code = exr_decoding_choose_default_routines(reader->context, 0, &pipeline);
     if (code == EXR_ERR_SUCCESS) code = exr_decoding_run(reader->context, 0, &pipeline);
     exr_decoding_destroy(reader->context, &pipeline);
-    free(aside);
+    free(scratch);
     return code;
 }
 

@@ -71,20 +71,20 @@ static void writer_free(ImageWriter *writer)
     free(writer);
 }
 
-bool image_writer_settle(ImageWriter *writer, MessageList *messages)
+bool image_writer_finish(ImageWriter *writer, MessageList *messages)
 {
-    if (writer->failed || writer->settled) return !writer->failed;
+    if (writer->failed || writer->finished) return !writer->failed;
     if (writer->rows_written < writer->header.height)
         fault("an image with missing rows: %s", writer->output.target);
-    writer->settled = (!writer->encoder->end || writer->encoder->end(writer, messages)) &&
-                      output_settle(&writer->output, messages);
-    writer->failed = !writer->settled;
-    return writer->settled;
+    writer->finished = (!writer->encoder->end || writer->encoder->end(writer, messages)) &&
+                       output_finish(&writer->output, messages);
+    writer->failed = !writer->finished;
+    return writer->finished;
 }
 
 bool image_writer_commit(ImageWriter *writer, MessageList *messages)
 {
-    bool done = image_writer_settle(writer, messages) && output_commit(&writer->output, messages);
+    bool done = image_writer_finish(writer, messages) && output_commit(&writer->output, messages);
     writer_free(writer);
     return done;
 }

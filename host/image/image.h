@@ -36,8 +36,8 @@ ImageWriter *image_writer_open(const char *path, const ImageHeader *header, Mess
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
 // Completes the file so that only the rename is left: of several files none is put in place before all are
 // complete. False with an error message on failure; the writer must still be committed or abandoned.
-bool image_writer_settle(ImageWriter *writer, MessageList *messages);
-// Completes the file unless settled and renames it to its target. On failure returns false with an error
+bool image_writer_finish(ImageWriter *writer, MessageList *messages);
+// Completes the file unless finished and renames it to its target. On failure returns false with an error
 // message and leaves the target unchanged. Frees the writer in either case. Missing rows are a bug.
 bool image_writer_commit(ImageWriter *writer, MessageList *messages);
 void image_writer_abandon(ImageWriter *writer); // removes the file and frees the writer; NULL is accepted

@@ -94,16 +94,16 @@ static bool npy_shape_read(const char *dictionary, uint64_t shape[3])
 
 static float npy_value(const uint8_t *bytes, NpyType type)
 {
-    float single;
-    double twice;
+    float float32;
+    double float64;
     uint32_t integer;
     switch (type) {
     case NPY_FLOAT:
-        memcpy(&single, bytes, sizeof single);
-        return single;
+        memcpy(&float32, bytes, sizeof float32);
+        return float32;
     case NPY_DOUBLE:
-        memcpy(&twice, bytes, sizeof twice);
-        return (float)twice;
+        memcpy(&float64, bytes, sizeof float64);
+        return (float)float64;
     case NPY_UINT32:
         memcpy(&integer, bytes, sizeof integer);
         return (float)integer;

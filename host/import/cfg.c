@@ -34,7 +34,7 @@ static const Key keys[] = {
     {"specular", offsetof(BlockValues, specular), false, &range_not_negative},
 };
 
-enum { KEY_COUNT = sizeof keys / sizeof *keys, BLOCK_KEY_LIMIT = 8 };
+enum { KEY_COUNT = sizeof keys / sizeof *keys, BLOCK_KEYS_MAX = 8 };
 
 typedef struct {
     Report report;
@@ -45,7 +45,7 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    const char *keys[BLOCK_KEY_LIMIT]; // all required; ended by NULL
+    const char *keys[BLOCK_KEYS_MAX]; // all required; ended by NULL
     void (*finish)(CfgReader *reader, const BlockValues *values);
 } Block;
 
@@ -118,7 +118,7 @@ static const Block blocks[] = {
 static const Key *key_find(const Block *block, Word word)
 {
     bool belongs = false;
-    for (size_t i = 0; i < BLOCK_KEY_LIMIT && block->keys[i]; i++)
+    for (size_t i = 0; i < BLOCK_KEYS_MAX && block->keys[i]; i++)
         belongs |= word_is(word, block->keys[i]);
     for (size_t i = 0; belongs && i < KEY_COUNT; i++) {
         if (word_is(word, keys[i].name)) return &keys[i];
@@ -187,7 +187,7 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
     }
     line_word(line);
     all_read &= line_end(line);
-    for (size_t i = 0; i < BLOCK_KEY_LIMIT && block->keys[i]; i++) {
+    for (size_t i = 0; i < BLOCK_KEYS_MAX && block->keys[i]; i++) {
         Word name = {.text = block->keys[i], .length = strlen(block->keys[i])};
         if (!seen[key_find(block, name) - keys]) {
             report_error(&reader->report, start, "%s lacks '%s'", block->name, block->keys[i]);

@@ -1,7 +1,6 @@
 // Scene files; the name's ending chooses the reader.
 #pragma once
 
-#include "host/import/load.h"
 #include "host/import/report.h"
 #include "host/scene/scene.h"
 

@@ -53,8 +53,8 @@ NumberStatus number_read(const char *text, size_t length, double *value)
     static locale_t c_locale;
     if (!c_locale) c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     double read = strtod_l(copy, NULL, c_locale);
-    if (fabs(read) > NUMBER_LARGEST) return NUMBER_TOO_LARGE;
-    *value = fabs(read) < NUMBER_SMALLEST ? 0 : read;
+    if (fabs(read) > NUMBER_MAX) return NUMBER_TOO_LARGE;
+    *value = fabs(read) < NUMBER_MIN ? 0 : read;
     return NUMBER_READ;
 }
 
@@ -76,7 +76,7 @@ bool number_read_field(Report *report, size_t offset, const char *name, const ch
             report_error(report, offset, "'%s' must be a number, not nothing", name);
         return false;
     case NUMBER_TOO_LARGE:
-        report_error(report, offset, "'%s' is too large: numbers reach to %g", name, NUMBER_LARGEST);
+        report_error(report, offset, "'%s' is too large: numbers reach to %g", name, NUMBER_MAX);
         return false;
     case NUMBER_READ:
         break;

@@ -6,8 +6,8 @@
 
 // Larger magnitudes are rejected and smaller ones read as 0, so that no product of a few numbers overflows or
 // underflows a double.
-#define NUMBER_LARGEST  1e30
-#define NUMBER_SMALLEST 1e-30
+#define NUMBER_MAX 1e30
+#define NUMBER_MIN 1e-30
 
 typedef enum { NUMBER_READ, NUMBER_MALFORMED, NUMBER_TOO_LARGE } NumberStatus;
 

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MESSAGES_LARGEST = 20 }; // of each severity
+enum { MESSAGES_MAX = 20 }; // of each severity
 
 Report report_open(const Source *source, MessageList *messages)
 {
@@ -23,7 +23,7 @@ static void report_add(Report *report, MessageSeverity severity, size_t offset, 
 
 void report_error(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->error_count++ >= MESSAGES_LARGEST) return;
+    if (report->error_count++ >= MESSAGES_MAX) return;
     va_list arguments;
     va_start(arguments, format);
     report_add(report, MESSAGE_ERROR, offset, format, arguments);
@@ -32,7 +32,7 @@ void report_error(Report *report, size_t offset, const char *format, ...)
 
 void report_warning(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->warning_count++ >= MESSAGES_LARGEST) return;
+    if (report->warning_count++ >= MESSAGES_MAX) return;
     va_list arguments;
     va_start(arguments, format);
     report_add(report, MESSAGE_WARNING, offset, format, arguments);
@@ -41,7 +41,7 @@ void report_warning(Report *report, size_t offset, const char *format, ...)
 
 bool report_is_full(const Report *report)
 {
-    return report->error_count >= MESSAGES_LARGEST;
+    return report->error_count >= MESSAGES_MAX;
 }
 
 static bool message_is_before(const Message *a, const Message *b)
@@ -83,8 +83,8 @@ bool report_close(Report *report)
     list->count = kept;
     if (report_is_full(report))
         message_add(list, MESSAGE_ERROR, "%s: many errors: reading stopped", report->source->file);
-    if (report->warning_count > MESSAGES_LARGEST)
+    if (report->warning_count > MESSAGES_MAX)
         message_add(list, MESSAGE_WARNING, "%s: %zu more warnings", report->source->file,
-                    report->warning_count - MESSAGES_LARGEST);
+                    report->warning_count - MESSAGES_MAX);
     return report->error_count == 0;
 }

@@ -179,11 +179,11 @@ static bool path_compare(const Comparison *comparison, size_t pixel)
 }
 
 // The gap between the numbers of a precision around a positive value.
-static double unit_in_last_place(double value, bool wide)
+static double unit_in_last_place(double value, bool is_double)
 {
     int exponent;
     frexp(value, &exponent);
-    return ldexp(1, exponent - (wide ? DBL_MANT_DIG : FLT_MANT_DIG));
+    return ldexp(1, exponent - (is_double ? DBL_MANT_DIG : FLT_MANT_DIG));
 }
 
 // The angle between two vectors of about unit length, also where it is small or near pi.
@@ -201,7 +201,7 @@ static void surface_compare(const Comparison *comparison, size_t pixel)
     const size_t place = errors->surface_pixels++;
     const double expected = comparison->reference->t[pixel], found = comparison->variant->t[pixel];
     const double difference = value_error(expected, found), relative = difference / fabs(expected);
-    const double ulps = difference / unit_in_last_place(expected, comparison->variant->wide);
+    const double ulps = difference / unit_in_last_place(expected, comparison->variant->is_double);
     const double angle =
         vector_angle(comparison->reference->normal + 3 * pixel, comparison->variant->normal + 3 * pixel);
     comparison->t_relative[place] = (float)relative;

@@ -44,12 +44,12 @@ typedef struct {
 
 typedef struct {
     double largest, percentile_999;
-} Extent;
+} ErrorExtremes;
 
 // Where an error of a kind is largest. Of the kinds that are counted: among the wrong ones away from edges,
 // or else those at edges, the one with the largest difference of color.
 typedef struct {
-    bool found; // false: there is no error of the kind, or it cannot be had
+    bool found; // false: there is no error of the kind, or it is unavailable
     bool away;  // of counted kinds: away from the reference's edges
     uint32_t x, y;
     uint32_t light; // shadow: the first that is wrong there
@@ -70,7 +70,7 @@ typedef struct {
     ErrorSummary shading;
     // where the object is the reference's, and is one
     size_t surface_pixels;
-    Extent t_relative, t_ulps, normal;
+    ErrorExtremes t_relative, t_ulps, normal;
     ErrorSummary image;                       // of every pixel
     ImageMetrics display;                     // as 8 bits and eyes see it: srgb_psnr, off_by_…, flip_…
     AccuracyWorst worst[ACCURACY_KIND_COUNT]; // none of FLIP
@@ -86,21 +86,26 @@ void accuracy_count_unsound(const Film *film, size_t *nonfinite, size_t *negativ
 typedef enum {
     ACCURACY_MEASURED,
     ACCURACY_REFERENCE,   // the reference: times but no errors
-    ACCURACY_UNAVAILABLE, // row->failure tells why
+    ACCURACY_UNAVAILABLE, // row->failure says why
     ACCURACY_STATUS_COUNT
 } AccuracyStatus;
 extern const char *const accuracy_status_names[ACCURACY_STATUS_COUNT];
 
-enum { CROSSED_NONFINITE = 1, CROSSED_NEGATIVE = 2, CROSSED_OBJECT = 4, CROSSED_SHADOW = 8 };
+enum {
+    DISQUALIFIED_NONFINITE = 1,
+    DISQUALIFIED_NEGATIVE = 2,
+    DISQUALIFIED_OBJECT = 4,
+    DISQUALIFIED_SHADOW = 8
+};
 
 typedef struct {
     const BenchRow *row; // precision, lanes, bvh; times, rays, the kernel's hash
     uint32_t samples;
     AccuracyStatus status;
     AccuracyErrors errors;
-    float *image;         // linear, 3 per pixel; NULL where unavailable
-    unsigned crossed_out; // set of CROSSED_…: why its speed does not count
-    unsigned pareto;      // set of 1 << AccuracyKind: no other is as good in less time
+    float *image;          // linear, 3 per pixel; NULL where unavailable
+    unsigned disqualified; // set of DISQUALIFIED_…: why its speed does not count
+    unsigned pareto;       // set of 1 << AccuracyKind: no other is as good in less time
 } AccuracyVariant;
 
 // An error that a user allows, and the fastest that keeps within it.
@@ -110,7 +115,7 @@ extern const double accuracy_budgets[BUDGET_COUNT];
 typedef struct {
     AccuracyKind measure; // shading, or image where there are colors only
     size_t variant;       // SIZE_MAX: none
-} AccuracyPick;
+} AccuracyRecommendation;
 
 typedef struct {
     const char *path;
@@ -127,14 +132,14 @@ typedef struct {
     AccuracyEdges edges;
     AccuracyVariant *variants;
     size_t variant_count;
-    AccuracyPick picks[BUDGET_COUNT];
+    AccuracyRecommendation recommendations[BUDGET_COUNT];
 } AccuracyScene;
 
 void accuracy_scene_free(AccuracyScene *scene); // with its images; and zeroes
 
 // The plotted figure of a kind, or why there is none.
 Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);
-// From its errors, what crosses a variant out.
+// From its errors, what disqualifies a variant.
 unsigned accuracy_faults(const AccuracyErrors *errors);
-// From errors and times: sets each variant's crossed_out and pareto, and the picks.
+// From errors and times: sets each variant's disqualified and pareto, and the recommendations.
 void accuracy_judge(AccuracyScene *scene);

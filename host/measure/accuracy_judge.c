@@ -56,14 +56,16 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind)
 
 unsigned accuracy_faults(const AccuracyErrors *errors)
 {
-    return (errors->nonfinite > 0 ? CROSSED_NONFINITE : 0u) | (errors->negative > 0 ? CROSSED_NEGATIVE : 0u) |
-           (errors->object.away > 0 ? CROSSED_OBJECT : 0u) | (errors->shadow.away > 0 ? CROSSED_SHADOW : 0u);
+    return (errors->nonfinite > 0 ? DISQUALIFIED_NONFINITE : 0u) |
+           (errors->negative > 0 ? DISQUALIFIED_NEGATIVE : 0u) |
+           (errors->object.away > 0 ? DISQUALIFIED_OBJECT : 0u) |
+           (errors->shadow.away > 0 ? DISQUALIFIED_SHADOW : 0u);
 }
 
 static bool competes(const AccuracyVariant *variant)
 {
     return variant->status == ACCURACY_REFERENCE ||
-           (variant->status == ACCURACY_MEASURED && variant->crossed_out == 0);
+           (variant->status == ACCURACY_MEASURED && variant->disqualified == 0);
 }
 
 static double frame_median(const AccuracyVariant *variant)
@@ -82,9 +84,9 @@ static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, Accura
     return error_a.value < error_b.value || time_a < time_b;
 }
 
-static bool on_front(const AccuracyScene *scene, const AccuracyVariant *variant, AccuracyKind kind)
+static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant *variant, AccuracyKind kind)
 {
-    if (variant->status != ACCURACY_MEASURED || variant->crossed_out) return false;
+    if (variant->status != ACCURACY_MEASURED || variant->disqualified) return false;
     if (accuracy_figure(variant, kind).why_not) return false;
     for (size_t i = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *other = &scene->variants[i];
@@ -93,9 +95,10 @@ static bool on_front(const AccuracyScene *scene, const AccuracyVariant *variant,
     return true;
 }
 
-static AccuracyPick pick_find(const AccuracyScene *scene, double budget, AccuracyKind measure)
+static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, double budget,
+                                                  AccuracyKind measure)
 {
-    AccuracyPick pick = {measure, SIZE_MAX};
+    AccuracyRecommendation pick = {measure, SIZE_MAX};
     for (size_t i = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *variant = &scene->variants[i];
         if (!competes(variant)) continue;
@@ -113,15 +116,15 @@ void accuracy_judge(AccuracyScene *scene)
 {
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];
-        variant->crossed_out = variant->status == ACCURACY_MEASURED ? accuracy_faults(&variant->errors) : 0;
+        variant->disqualified = variant->status == ACCURACY_MEASURED ? accuracy_faults(&variant->errors) : 0;
     }
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];
         variant->pareto = 0;
         for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
-            if (on_front(scene, variant, (AccuracyKind)kind)) variant->pareto |= 1u << kind;
+            if (is_pareto_optimal(scene, variant, (AccuracyKind)kind)) variant->pareto |= 1u << kind;
     }
     AccuracyKind measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
     for (size_t i = 0; i < BUDGET_COUNT; i++)
-        scene->picks[i] = pick_find(scene, accuracy_budgets[i], measure);
+        scene->recommendations[i] = recommendation_find(scene, accuracy_budgets[i], measure);
 }

@@ -1,4 +1,4 @@
-// An earlier report of glint bench, to hold a new one against.
+// An earlier report of glint bench, to compare a new one with.
 #pragma once
 
 #include "host/base/message.h"

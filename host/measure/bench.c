@@ -6,7 +6,7 @@
 const char *const bench_ray_names[BENCH_RAY_KINDS] = {"camera", "camera_hits", "reflected", "refracted",
                                                       "shadow"};
 
-static const double settled_spread = 0.02, largest_drift = 0.01;
+static const double converged_spread = 0.02, largest_drift = 0.01;
 // Over a shorter time the wait before a launch would pass for a drift.
 static const double drift_seconds = 1;
 
@@ -52,12 +52,12 @@ Summary bench_kernel(const BenchTimes *times)
     return series_summarize(bench_doubt(times) ? &times->host : &times->event);
 }
 
-bool bench_settled(const BenchTimes *times, size_t enough)
+bool bench_converged(const BenchTimes *times, size_t enough)
 {
     if (times->frame.count < enough) return false;
     Summary kernel = bench_kernel(times), frame = series_summarize(&times->frame);
-    return kernel.quartile_range <= settled_spread * kernel.median &&
-           frame.quartile_range <= settled_spread * frame.median;
+    return kernel.quartile_range <= converged_spread * kernel.median &&
+           frame.quartile_range <= converged_spread * frame.median;
 }
 
 void bench_row_free(BenchRow *row)
@@ -79,7 +79,7 @@ Figure bench_peak_fraction(const BenchRow *row, const Peak *peak)
     if (row->traverses_bvh) return (Figure){.why_not = "unknown with a BVH"};
     uint64_t rays = row->rays[BENCH_CAMERA] + row->rays[BENCH_REFLECTED] + row->rays[BENCH_REFRACTED];
     double rate = row->flops_per_ray * (double)rays / bench_kernel(&row->times).median;
-    return (Figure){.value = rate / peak->flops_per_second[row->wide]};
+    return (Figure){.value = rate / peak->flops_per_second[row->is_double]};
 }
 
 double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak)

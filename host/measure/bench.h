@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// A number, or why it cannot be had.
+// A number, or why it is unavailable.
 typedef struct {
     double value;
     const char *why_not; // NULL: there is a value
@@ -32,10 +32,10 @@ void bench_times_free(BenchTimes *times);
 const char *bench_doubt(const BenchTimes *times);
 // Of the runs' launches, by events or by the host's clock as bench_doubt says.
 Summary bench_kernel(const BenchTimes *times);
-// Whether more runs would tell little: there are `enough`, and half of them lie close around the median.
-bool bench_settled(const BenchTimes *times, size_t enough);
+// Whether the times have converged: at least `enough` runs, and a small interquartile range.
+bool bench_converged(const BenchTimes *times, size_t enough);
 
-// What tells a row from the others.
+// Identifies a row.
 typedef struct {
     const char *scene, *precision, *bvh;
     uint32_t lanes, width, height;
@@ -51,8 +51,8 @@ typedef struct {
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
     uint64_t rays[BENCH_RAY_KINDS];
-    bool wide, traverses_bvh; // computes in double; rays traversed a BVH
-    double flops_per_ray;     // as work.h counts
+    bool is_double, traverses_bvh; // computes in double; rays traversed a BVH
+    double flops_per_ray;          // as work.h counts
     double image_bytes;
 } BenchRow;
 
@@ -60,8 +60,8 @@ void bench_row_free(BenchRow *row);
 
 // Rays of every kind for each second of the launches.
 double bench_rays_per_second(const BenchRow *row);
-// Of the device's arithmetic: what the rays that look for their closest hit need at least (work.h) against
-// what it could do in that time. Shadow rays, which may stop at the first object, and colors come on top.
+// Lower bound on the flops of the launches over the device's peak: only those of rays that look for their
+// closest hit count (work.h), not shadow rays, which may stop at the first object, and not colors.
 Figure bench_peak_fraction(const BenchRow *row, const Peak *peak);
 // Of the device's bandwidth: writing the image, the least that must go through memory.
 double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak);

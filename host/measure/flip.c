@@ -9,9 +9,9 @@
 
 // The paper's constants: exponents of the color and feature differences (sections 4.1.3 and 4.2.1), the point
 // where large color differences are compressed (4.1.3), and the width of the feature detectors (4.2).
-static const double color_exponent = 0.7, feature_exponent = 0.5;
-static const double compressed_from = 0.4, compressed_to = 0.95;
-static const double feature_width_degrees = 0.082;
+static const double color_exponent = 0.7, feature_exponent = 0.5; // q_c, q_f
+static const double compressed_from = 0.4, compressed_to = 0.95;  // p_c, p_t
+static const double feature_width_degrees = 0.082;                // w
 
 // Sensitivity of the eye to contrast, as sums of Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees
 // (table 1): luminance, red-green, blue-yellow.
@@ -82,47 +82,47 @@ static double color_distance(Triple p, Triple q)
     return pow(fabs(p.x - q.x) + hypot(p.y - q.y, p.z - q.z), color_exponent);
 }
 
-// One number a pixel.
+// One number per pixel.
 typedef struct {
     uint32_t width, height;
     float *values;
-} Plane;
+} Channel;
 
-static Plane plane_open(uint32_t width, uint32_t height)
+static Channel channel_open(uint32_t width, uint32_t height)
 {
-    return (Plane){width, height, memory_allocate((size_t)width * height, sizeof(float))};
+    return (Channel){width, height, memory_allocate((size_t)width * height, sizeof(float))};
 }
 
-static void plane_close(Plane *plane)
+static void channel_close(Channel *channel)
 {
-    free(plane->values);
+    free(channel->values);
 }
 
-static float *plane_row(const Plane *plane, uint32_t y)
+static float *channel_row(const Channel *channel, uint32_t y)
 {
-    return plane->values + (size_t)y * plane->width;
+    return channel->values + (size_t)y * channel->width;
 }
 
 // Weights of the neighbors -radius..radius, the same across and down.
-enum { RADIUS_LARGEST = 15 };
+enum { RADIUS_MAX = 15 };
 typedef struct {
     int radius;
-    float weights[2 * RADIUS_LARGEST + 1];
+    float weights[2 * RADIUS_MAX + 1];
 } Filter;
 
 // Outside the image its border goes on.
-static void filter_across(const Filter *filter, const Plane *in, Plane *out)
+static void filter_across(const Filter *filter, const Channel *in, Channel *out)
 {
     size_t width = in->width, radius = (size_t)filter->radius;
     float *padded = memory_allocate(width + 2 * radius, sizeof *padded);
     for (uint32_t y = 0; y < in->height; y++) {
-        const float *row = plane_row(in, y);
+        const float *row = channel_row(in, y);
         memcpy(padded + radius, row, width * sizeof *row);
         for (size_t i = 0; i < radius; i++) {
             padded[i] = row[0];
             padded[radius + width + i] = row[width - 1];
         }
-        float *result = plane_row(out, y);
+        float *result = channel_row(out, y);
         memset(result, 0, width * sizeof *result);
         for (size_t tap = 0; tap <= 2 * radius; tap++)
             for (size_t x = 0; x < width; x++)
@@ -131,27 +131,27 @@ static void filter_across(const Filter *filter, const Plane *in, Plane *out)
     free(padded);
 }
 
-static void filter_down(const Filter *filter, const Plane *in, Plane *out)
+static void filter_down(const Filter *filter, const Channel *in, Channel *out)
 {
     for (uint32_t y = 0; y < in->height; y++) {
-        float *result = plane_row(out, y);
+        float *result = channel_row(out, y);
         memset(result, 0, in->width * sizeof *result);
         for (int tap = -filter->radius; tap <= filter->radius; tap++) {
             int64_t at = (int64_t)y + tap;
             int64_t clamped = at < 0 ? 0 : at >= in->height ? in->height - 1 : at;
-            const float *row = plane_row(in, (uint32_t)clamped);
+            const float *row = channel_row(in, (uint32_t)clamped);
             for (uint32_t x = 0; x < in->width; x++)
                 result[x] += filter->weights[tap + filter->radius] * row[x];
         }
     }
 }
 
-static Plane plane_filter(const Plane *in, const Filter *across, const Filter *down)
+static Channel channel_filter(const Channel *in, const Filter *across, const Filter *down)
 {
-    Plane between = plane_open(in->width, in->height), out = plane_open(in->width, in->height);
+    Channel between = channel_open(in->width, in->height), out = channel_open(in->width, in->height);
     filter_across(across, in, &between);
     filter_down(down, &between, &out);
-    plane_close(&between);
+    channel_close(&between);
     return out;
 }
 
@@ -159,8 +159,8 @@ static Plane plane_filter(const Plane *in, const Filter *across, const Filter *d
 // the negative ones.
 static Filter filter_make(double (*shape)(double x, double deviation), double deviation, int radius)
 {
-    if (radius > RADIUS_LARGEST) fault("a filter of FLIP is too wide: %d", radius);
-    double weights[2 * RADIUS_LARGEST + 1] = {0}, positive = 0, negative = 0;
+    if (radius > RADIUS_MAX) fault("a filter of FLIP is too wide: %d", radius);
+    double weights[2 * RADIUS_MAX + 1] = {0}, positive = 0, negative = 0;
     for (int x = -radius; x <= radius; x++) {
         double weight = shape(x, deviation);
         weights[x + radius] = weight;
@@ -177,12 +177,12 @@ static double gaussian(double x, double deviation)
     return exp(-x * x / (2 * deviation * deviation));
 }
 
-static double gaussian_slope(double x, double deviation)
+static double gaussian_derivative(double x, double deviation)
 {
     return -x * gaussian(x, deviation);
 }
 
-static double gaussian_bend(double x, double deviation)
+static double gaussian_second_derivative(double x, double deviation)
 {
     return (x * x / (deviation * deviation) - 1) * gaussian(x, deviation);
 }
@@ -195,10 +195,10 @@ static double sensitivity_deviation(double b)
 
 // What the eye resolves of one of YCxCz (section 4.1.2). Each Gaussian is a product of one across and one
 // down; the weights of a sum of them go by their volumes.
-static void plane_blur(Plane *plane, int component)
+static void channel_blur(Channel *channel, int component)
 {
     int radius = (int)ceil(3 * sensitivity_deviation(widest_sensitivity));
-    Plane parts[2] = {0};
+    Channel parts[2] = {0};
     double volumes[2] = {0};
     for (int i = 0; i < 2; i++) {
         double a = sensitivity[component].a[i], b = sensitivity[component].b[i];
@@ -208,45 +208,46 @@ static void plane_blur(Plane *plane, int component)
             length += gaussian(x, deviation);
         volumes[i] = a * sqrt(pi / b) * length * length;
         Filter filter = filter_make(gaussian, deviation, radius);
-        parts[i] = plane_filter(plane, &filter, &filter);
+        parts[i] = channel_filter(channel, &filter, &filter);
     }
     double volume = volumes[0] + volumes[1];
-    for (size_t i = 0; i < (size_t)plane->width * plane->height; i++) {
+    for (size_t i = 0; i < (size_t)channel->width * channel->height; i++) {
         double sum = volumes[0] * (double)parts[0].values[i];
         if (volumes[1] > 0) sum += volumes[1] * (double)parts[1].values[i];
-        plane->values[i] = (float)(sum / volume);
+        channel->values[i] = (float)(sum / volume);
     }
-    plane_close(&parts[0]);
-    plane_close(&parts[1]);
+    channel_close(&parts[0]);
+    channel_close(&parts[1]);
 }
 
-// How strong an edge (`shape` the slope of a Gaussian) or a point (its bend) is at each pixel of the
-// luminance (section 4.2).
-static Plane feature_strength(const Plane *gray, double (*shape)(double x, double deviation))
+// How strong an edge (`shape` the derivative of a Gaussian) or a point (its second derivative) is at each
+// pixel of the luminance (section 4.2).
+static Channel feature_strength(const Channel *gray, double (*shape)(double x, double deviation))
 {
     double deviation = 0.5 * feature_width_degrees * FLIP_PIXELS_PER_DEGREE;
     int radius = (int)ceil(3 * deviation);
     Filter detector = filter_make(shape, deviation, radius),
            smooth = filter_make(gaussian, deviation, radius);
-    Plane across = plane_filter(gray, &detector, &smooth), down = plane_filter(gray, &smooth, &detector);
+    Channel across = channel_filter(gray, &detector, &smooth),
+            down = channel_filter(gray, &smooth, &detector);
     for (size_t i = 0; i < (size_t)gray->width * gray->height; i++)
         across.values[i] = hypotf(across.values[i], down.values[i]);
-    plane_close(&down);
+    channel_close(&down);
     return across;
 }
 
 // An image as the eye has it.
 typedef struct {
-    Plane ycc[3]; // blurred
-    Plane edges, points;
+    Channel ycc[3]; // blurred
+    Channel edges, points;
 } Seen;
 
 static Seen seen_open(const float *image, uint32_t width, uint32_t height)
 {
     Seen seen;
-    Plane gray = plane_open(width, height);
+    Channel gray = channel_open(width, height);
     for (int i = 0; i < 3; i++)
-        seen.ycc[i] = plane_open(width, height);
+        seen.ycc[i] = channel_open(width, height);
     for (size_t i = 0; i < (size_t)width * height; i++) {
         const float *pixel = image + 3 * i;
         Triple ycc = ycc_from_rgb((Triple){srgb_decode((double)pixel[0]), srgb_decode((double)pixel[1]),
@@ -256,20 +257,20 @@ static Seen seen_open(const float *image, uint32_t width, uint32_t height)
         seen.ycc[2].values[i] = (float)ycc.z;
         gray.values[i] = (float)((ycc.x + 16) / 116);
     }
-    seen.edges = feature_strength(&gray, gaussian_slope);
-    seen.points = feature_strength(&gray, gaussian_bend);
-    plane_close(&gray);
+    seen.edges = feature_strength(&gray, gaussian_derivative);
+    seen.points = feature_strength(&gray, gaussian_second_derivative);
+    channel_close(&gray);
     for (int i = 0; i < 3; i++)
-        plane_blur(&seen.ycc[i], i);
+        channel_blur(&seen.ycc[i], i);
     return seen;
 }
 
 static void seen_close(Seen *seen)
 {
     for (int i = 0; i < 3; i++)
-        plane_close(&seen->ycc[i]);
-    plane_close(&seen->edges);
-    plane_close(&seen->points);
+        channel_close(&seen->ycc[i]);
+    channel_close(&seen->edges);
+    channel_close(&seen->points);
 }
 
 static double clipped(double value)

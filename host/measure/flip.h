@@ -8,6 +8,6 @@
 // Of a screen 0.7 m wide with 3840 pixels, seen from 0.7 m: the paper's example.
 #define FLIP_PIXELS_PER_DEGREE 67
 
-// Both images: 3 sRGB display values a pixel, each within 0..1. Fills `map` with a value within 0..1 for
+// Both images: 3 sRGB display values per pixel, each within 0..1. Fills `map` with a value within 0..1 for
 // each pixel: 0 where no difference is seen.
 void flip_map(const float *reference, const float *test, uint32_t width, uint32_t height, float *map);

@@ -10,6 +10,6 @@ typedef struct {
     bool by_events;             // whose clock: the device's, else the host's
 } Peak;
 
-// Takes up to about 0.3 s each, after the build of the kernels. `wide`: also of double, which the device must
-// have.
-void peak_measure(Peak *peak, Compute *compute, bool wide);
+// Takes up to about 0.3 s each, after the build of the kernels. `with_double`: also of double, which the
+// device must have.
+void peak_measure(Peak *peak, Compute *compute, bool with_double);

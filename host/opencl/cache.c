@@ -153,15 +153,15 @@ static void files_list(CacheFiles *files, DIR *folder)
     }
 }
 
-void cache_trim(const char *folder, uint64_t bytes_largest)
+void cache_trim(const char *folder, uint64_t bytes_max)
 {
     DIR *open_folder = opendir(folder);
     if (!open_folder) return;
     CacheFiles files = {0};
     files_list(&files, open_folder);
-    if (files.size > bytes_largest) qsort(files.items, files.count, sizeof *files.items, file_compare);
+    if (files.size > bytes_max) qsort(files.items, files.count, sizeof *files.items, file_compare);
     for (size_t i = 0; i < files.count; i++) {
-        if (files.size > bytes_largest) {
+        if (files.size > bytes_max) {
             unlinkat(dirfd(open_folder), files.items[i].name, 0);
             files.size -= files.items[i].size;
         }
@@ -192,6 +192,6 @@ void cache_store(const char *key, const Text *binary)
     }
     message_list_free(&ignored);
     *strrchr(path, '/') = '\0';
-    cache_trim(path, CACHE_BYTES_LARGEST);
+    cache_trim(path, CACHE_BYTES_MAX);
     free(path);
 }

@@ -11,12 +11,12 @@
 // Fills `binary`, which must be empty. False without an entry; a damaged one, one of another user and one
 // that is not a regular file are ignored.
 bool cache_load(const char *key, Text *binary);
-// Replaces the key's entry, and trims the cache to CACHE_BYTES_LARGEST.
+// Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX.
 void cache_store(const char *key, const Text *binary);
 
-enum { CACHE_BYTES_LARGEST = 128 << 20 }; // several hundred programs
-// Removes the least recently used entries until at most `bytes_largest` are left.
-void cache_trim(const char *folder, uint64_t bytes_largest);
+enum { CACHE_BYTES_MAX = 128 << 20 }; // several hundred programs
+// Removes the least recently used entries until at most `bytes_max` are left.
+void cache_trim(const char *folder, uint64_t bytes_max);
 
 // The path of the key's entry, which the caller frees; NULL: no cache.
 char *cache_entry_path(const char *key);

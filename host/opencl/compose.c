@@ -1,4 +1,4 @@
-// The composed kernel text and its hash.
+// Expands the includes of a kernel file into one text.
 #include "host/opencl/compose.h"
 
 #include "host/base/memory.h"

@@ -58,13 +58,10 @@ typedef struct {
     bool from_cache;
 } Program;
 
-// Composes the text (each quoted include expanded once, with #line), then loads the program from the cache in
-// $XDG_CACHE_HOME/glint (or $HOME/.cache/glint; neither set: no cache) or builds it. The key: text, options,
-// launch, device name, driver, platform version and the cache's own format version. Entries carry a checksum
-// and their whole key; a damaged one is rebuilt. Entries are written beside their target and renamed, which
-// is safe with many processes. A cache that cannot be written is not an error. `no_cache` bypasses PoCL's own
-// cache, too. False: failed; where the text does not compile, the detail has the build log and the file in
-// which the composed text was saved.
+// Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
+// (host/opencl/cache.h) or builds it. The key: text, options, launch, device name, driver, platform version
+// and the cache's own format version. `no_cache` bypasses PoCL's own cache, too. False: failed; where the
+// text does not compile, the detail has the build log and the file in which the composed text was saved.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
 // Writes the program to the cache, unless it came from there. Call after its first launch has ended: PoCL
 // compiles a kernel at its first launch, a binary holds what was launched by then, and a program loaded from

@@ -84,13 +84,13 @@ static void device_describe(Device *device)
     device_number(id, CL_DEVICE_PROFILING_TIMER_RESOLUTION, &timer_nanoseconds);
     device->timer_resolution_seconds = 1e-9 * (double)timer_nanoseconds;
 
-    cl_device_fp_config single = 0, wide = 0;
-    device_number(id, CL_DEVICE_SINGLE_FP_CONFIG, &single);
-    device_number(id, CL_DEVICE_DOUBLE_FP_CONFIG, &wide);
-    device->denormals = (single & CL_FP_DENORM) != 0;
-    device->fma_in_hardware = (single & CL_FP_FMA) != 0;
-    device->correctly_rounded = (single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
-    device->fp64 = wide != 0 || extensions_have(device->extensions, "cl_khr_fp64");
+    cl_device_fp_config fp32 = 0, fp64 = 0;
+    device_number(id, CL_DEVICE_SINGLE_FP_CONFIG, &fp32);
+    device_number(id, CL_DEVICE_DOUBLE_FP_CONFIG, &fp64);
+    device->denormals = (fp32 & CL_FP_DENORM) != 0;
+    device->fma_in_hardware = (fp32 & CL_FP_FMA) != 0;
+    device->correctly_rounded = (fp32 & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+    device->fp64 = fp64 != 0 || extensions_have(device->extensions, "cl_khr_fp64");
 
     device_number(id, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, &device->native_float_width);
     if (device->native_float_width == 0) device->native_float_width = 1;
@@ -109,7 +109,7 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
     device_describe(&device);
     for (size_t i = 0; i < list->count; i++) {
         const Device *other = &list->items[i];
-        if (other->platform == platform && strcmp(other->name, device.name) == 0) device.twin++;
+        if (other->platform == platform && strcmp(other->name, device.name) == 0) device.same_name_index++;
     }
     array_push(*list, device);
 }
@@ -195,10 +195,10 @@ bool device_usable(const Device *device, const char **why)
     return missing == NULL;
 }
 
-unsigned device_lanes(const Device *device, bool wide)
+unsigned device_lanes(const Device *device, bool is_double)
 {
     if (!(device->type & CL_DEVICE_TYPE_CPU)) return 1;
-    unsigned width = wide ? device->native_double_width : device->native_float_width;
+    unsigned width = is_double ? device->native_double_width : device->native_float_width;
     return width >= 16 ? 16 : width >= 8 ? 8 : width >= 4 ? 4 : 1;
 }
 

@@ -11,8 +11,8 @@
 typedef struct {
     cl_platform_id platform;
     cl_device_id id;
-    unsigned index; // as `glint devices` numbers it, from 0 over all platforms
-    unsigned twin;  // 0 for the first device of this platform and name, 1 for the next …
+    unsigned index;           // as `glint devices` numbers it, from 0 over all platforms
+    unsigned same_name_index; // 0 for the first device of this platform and name, 1 for the next …
     cl_device_type type;
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
@@ -34,7 +34,8 @@ typedef struct {
     cl_int failed_status;
 } DeviceList;
 
-// Queries all platforms. Without any the list is empty, which is no failure.
+// Queries all platforms. Without any the list is empty, which is no failure. Sets PoCL's environment variable
+// POCL_WORK_GROUP_SPECIALIZATION unless it is set.
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
 
@@ -53,8 +54,8 @@ const char *device_selector(const char *option);
 bool device_usable(const Device *device, const char **why);
 
 // The default number of rays per work-item: on a CPU the native vector width of float, or of double where
-// `wide`, rounded down to 1, 4, 8 or 16; elsewhere 1.
-unsigned device_lanes(const Device *device, bool wide);
+// `is_double`, rounded down to 1, 4, 8 or 16; elsewhere 1.
+unsigned device_lanes(const Device *device, bool is_double);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
 

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 
 enum {
-    BAND_BYTES_LARGEST = 4 << 20, // of one film
-    GROUPS_OF_UNIT_LEAST = 4
+    BAND_BYTES_MAX = 4 << 20, // color and shadow, the one layer that grows with the lights
+    GROUPS_OF_UNIT_MIN = 4
 };
 
 typedef struct {
@@ -25,7 +25,7 @@ static TileShape tile_shape(uint32_t lanes)
 static TileShape item_shape(uint32_t lanes)
 {
     TileShape shape = tile_shape(lanes);
-    if (lanes > 1) shape.width *= ITEM_TILES_LARGEST;
+    if (lanes > 1) shape.width *= ITEM_TILES_MAX;
     return shape;
 }
 
@@ -42,7 +42,7 @@ static size_t group_side(const Renderer *renderer)
 // The device buffers a band is rendered into.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, ray_counts, losses, layers[LAYER_COUNT];
+    cl_mem offsets, ray_counts, compensation, layers[LAYER_COUNT];
 } BandBuffers;
 
 // The film of these rows, without its layers.
@@ -52,7 +52,7 @@ static Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t 
                   .height = row_count,
                   .light_count = (uint32_t)renderer->light_count,
                   .first_row = first_row,
-                  .wide = renderer->report.wide,
+                  .is_double = renderer->report.is_double,
                   .real_size = renderer_scalar_size(renderer)};
 }
 
@@ -78,9 +78,9 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
         if (layer_in(filled, layer))
             buffers->layers[layer] = film_buffer(renderer, empty ? 0 : film_layer_size(&film, layer));
     }
-    buffers->losses = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
+    buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
-    void *offsets = sample_pattern(sample_count, renderer->report.wide);
+    void *offsets = sample_pattern(sample_count, renderer->report.is_double);
     buffers->offsets =
         buffer_create(renderer->compute, 2 * sample_count * film.real_size, offsets, CL_MEM_READ_ONLY);
     free(offsets);
@@ -90,7 +90,7 @@ static void buffers_close(BandBuffers *buffers)
 {
     buffer_release(buffers->offsets);
     buffer_release(buffers->ray_counts);
-    buffer_release(buffers->losses);
+    buffer_release(buffers->compensation);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         buffer_release(buffers->layers[layer]);
     *buffers = (BandBuffers){0};
@@ -141,7 +141,7 @@ static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRo
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &buffers->offsets);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->losses);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->compensation);
     band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
@@ -207,11 +207,11 @@ static uint32_t rows_step(const Renderer *renderer)
 }
 
 // Enough rows for several groups per compute unit: with fewer, the last group to end would idle the others.
-static uint32_t rows_least(const Renderer *renderer)
+static uint32_t rows_min(const Renderer *renderer)
 {
     uint32_t group_width = item_shape(renderer->report.lanes).width * (uint32_t)group_side(renderer);
     uint32_t of_row = (renderer->settings.region_width + group_width - 1) / group_width;
-    uint32_t wanted = GROUPS_OF_UNIT_LEAST * renderer->compute->device->compute_units;
+    uint32_t wanted = GROUPS_OF_UNIT_MIN * renderer->compute->device->compute_units;
     return (wanted + of_row - 1) / of_row * rows_step(renderer);
 }
 
@@ -221,20 +221,20 @@ static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t m
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
     uint64_t rows = pace_band_samples(pace) / row_samples;
-    uint32_t least = rows_least(renderer);
+    uint32_t least = rows_min(renderer);
     if (rows < least) rows = least;
     rows -= rows % rows_step(renderer);
     return rows < most ? (uint32_t)rows : most;
 }
 
-static uint32_t rows_largest(const Renderer *renderer, unsigned aovs)
+static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows;
     const Film row = film_of_rows(renderer, 0, 1);
     size_t row_bytes = film_layer_size(&row, LAYER_COLOR);
     if (aovs & AOV_SHADOW) row_bytes += film_layer_size(&row, LAYER_SHADOW);
-    size_t rows = BAND_BYTES_LARGEST / row_bytes;
+    size_t rows = BAND_BYTES_MAX / row_bytes;
     size_t step = rows_step(renderer);
     rows = rows < step ? step : rows - rows % step;
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
@@ -245,7 +245,7 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
     BandBuffers buffers = {0};
-    buffers_open(&buffers, renderer, aovs, rows_largest(renderer, aovs));
+    buffers_open(&buffers, renderer, aovs, rows_max(renderer, aovs));
     Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
     bool go_on = compute_ok(compute);
     BandRows rows = {0};
@@ -284,7 +284,7 @@ bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
     const RenderSettings *settings = &renderer->settings;
     *film =
         film_allocate(settings->region_width, settings->region_height, (uint32_t)renderer->light_count, aovs);
-    film->wide = renderer->report.wide;
+    film->is_double = renderer->report.is_double;
     bool whole = renderer_render(renderer, aovs, film_take_band, film);
     if (!whole) film_free(film);
     return whole;

@@ -32,17 +32,20 @@ extern const LayerType layer_types[LAYER_COUNT];
 // Every pixel of an image's region or of a band of its rows, row by row from the top left. Layers are NULL
 // where they were not requested.
 //
+// Reals are doubles, except in a band that was computed in float: there they are floats, and are read through
+// layers[] and real_size alone, never by name.
+//
 // Of a miss t is infinite, normal and position are 0, object is UINT32_MAX. Positions are relative to the
 // eye. A path is a signature of what the ray met (kernels/types.h).
 typedef struct {
     uint32_t width, height, light_count;
     uint32_t first_row; // of a band in its region
-    bool wide;          // computed in double
+    bool is_double;     // computed in double
     size_t real_size;   // sizeof(double); sizeof(float) in a band that was not
     union {
         void *layers[LAYER_COUNT];
         struct {
-            LAYER_LIST(FILM_LAYER) // by name where reals are doubles
+            LAYER_LIST(FILM_LAYER)
         };
     };
 } Film;

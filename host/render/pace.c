@@ -8,16 +8,16 @@
 
 enum {
     FIRST_LAUNCH_SAMPLES = 1 << 17, // before any time is known
-    LAUNCH_SAMPLES_LARGEST = 1024,  // per pixel
-    BAND_GROWTH_LARGEST = 4,
-    LAUNCH_GROWTH_LARGEST = 16, // within a band
+    LAUNCH_SAMPLES_MAX = 1024,      // per pixel
+    BAND_GROWTH_MAX = 4,
+    LAUNCH_GROWTH_MAX = 16, // within a band
 };
 
 uint64_t pace_band_samples(const Pace *pace)
 {
     if (pace->band_samples <= 0 || pace->band_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
     double rate = pace->band_samples / pace->band_seconds;
-    return (uint64_t)fmin(pace->target_seconds * rate, BAND_GROWTH_LARGEST * pace->band_samples);
+    return (uint64_t)fmin(pace->target_seconds * rate, BAND_GROWTH_MAX * pace->band_samples);
 }
 
 void pace_begin_band(Pace *pace)
@@ -31,12 +31,12 @@ static double samples_wanted(const Pace *pace)
     if (pace->launch_samples <= 0 || pace->launch_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
     if (pace->begins_band) return 0; // one per pixel
     double of_target = pace->target_seconds * pace->launch_samples / pace->launch_seconds;
-    return fmin(of_target, LAUNCH_GROWTH_LARGEST * pace->launch_samples);
+    return fmin(of_target, LAUNCH_GROWTH_MAX * pace->launch_samples);
 }
 
 uint32_t pace_launch_samples(const Pace *pace, uint64_t pixels, uint32_t left)
 {
-    double largest = left < LAUNCH_SAMPLES_LARGEST ? left : LAUNCH_SAMPLES_LARGEST;
+    double largest = left < LAUNCH_SAMPLES_MAX ? left : LAUNCH_SAMPLES_MAX;
     return (uint32_t)fmax(1, fmin(samples_wanted(pace) / (double)pixels, largest));
 }
 

@@ -5,7 +5,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// Samples are counted over all pixels of a launch or band. Initially zero but for the target.
+// Samples are counted over all pixels of a launch or band. Initially zero but for the target. For each band:
+// pace_band_samples, which reads the sums of the band before, then pace_begin_band, which clears them, then
+// pace_launch_samples and pace_note_launch for each launch.
 typedef struct {
     double target_seconds;                 // of a launch
     double launch_samples, launch_seconds; // of the last launch

@@ -22,14 +22,14 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
         message_add(messages, MESSAGE_ERROR, "lanes must be 1, 4, 8 or 16, not %u", lanes);
         return false;
     }
-    if (settings->bounce_count > BOUNCES_LARGEST) {
-        message_add(messages, MESSAGE_ERROR, "bounces must be at most %d, not %u", BOUNCES_LARGEST,
+    if (settings->bounce_count > BOUNCES_MAX) {
+        message_add(messages, MESSAGE_ERROR, "bounces must be at most %d, not %u", BOUNCES_MAX,
                     settings->bounce_count);
         return false;
     }
-    if (settings->perturb_scale > PERTURB_SCALE_LARGEST) {
+    if (settings->perturb_scale > PERTURB_SCALE_MAX) {
         message_add(messages, MESSAGE_ERROR, "errors can be at most %d times as large, not %u",
-                    PERTURB_SCALE_LARGEST, settings->perturb_scale);
+                    PERTURB_SCALE_MAX, settings->perturb_scale);
         return false;
     }
     if (settings->precision == PRECISION_DOUBLE && !device->fp64) {
@@ -41,12 +41,12 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
 }
 
 // False with a message where the arrays exceed the memory that the device reports.
-static bool device_has_room(const CompiledScene *compiled, const Device *device, bool wide,
+static bool device_has_room(const CompiledScene *compiled, const Device *device, bool is_double,
                             MessageList *messages)
 {
     size_t sum = 0, largest = 0;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        size_t size = flat_array_size(&compiled->arrays[kind], wide);
+        size_t size = flat_array_size(&compiled->arrays[kind], is_double);
         sum += size;
         if (size > largest) largest = size;
     }
@@ -63,28 +63,28 @@ static bool device_has_room(const CompiledScene *compiled, const Device *device,
 // Frees each host array after its upload, so that the scene is never in memory twice.
 static void upload(Renderer *renderer, CompiledScene *compiled)
 {
-    bool wide = renderer->report.wide;
+    bool is_double = renderer->report.is_double;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        size_t size = flat_array_size(&compiled->arrays[kind], wide);
+        size_t size = flat_array_size(&compiled->arrays[kind], is_double);
         void *bytes = buffer_bytes_allocate(size);
-        flat_array_write(&compiled->arrays[kind], wide, bytes);
+        flat_array_write(&compiled->arrays[kind], is_double, bytes);
         free(compiled->arrays[kind].items);
         compiled->arrays[kind].items = NULL;
         renderer->arrays[kind] = buffer_take(renderer->compute, size, bytes);
     }
 }
 
-// The definitions that distinguish the variants of the kernel text.
-static void prelude_write(Renderer *renderer)
+// The definitions and compiler options that distinguish the variants of the kernels.
+static void variant_set(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
     uint32_t seed = renderer->settings.perturb_seed, scale = renderer->settings.perturb_scale;
     const Device *device = renderer->compute->device;
-    // errors are repaired, as on a device that makes them
+    // injected errors make the device count as not correctly rounded, so that strict repairs them
     bool correct = device->correctly_rounded && seed == 0;
     // OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
     // vectors, unlike llvmpipe and Oclgrind
-    bool has_fma = renderer->report.wide || device->fma_in_hardware || device->native_float_width > 1;
+    bool has_fma = renderer->report.is_double || device->fma_in_hardware || device->native_float_width > 1;
     Text *text = &renderer->prelude;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
@@ -108,21 +108,21 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
                         MessageList *messages)
 {
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
-    const bool wide = settings->precision == PRECISION_DOUBLE;
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
     const CompileSettings compile_settings = {
         .width = settings->width,
         .height = settings->height,
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
         .precision = settings->precision,
-        .lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, wide),
+        .lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, is_double),
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
     };
     CompiledScene compiled;
     if (!scene_compile(&compiled, scene, &compile_settings, messages)) return NULL;
-    if (!device_has_room(&compiled, compute->device, wide, messages)) {
+    if (!device_has_room(&compiled, compute->device, is_double, messages)) {
         compiled_scene_free(&compiled);
         return NULL;
     }
@@ -134,7 +134,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     renderer->report = (RenderReport){
         .features = compiled.features,
         .lanes = compile_settings.lanes,
-        .wide = wide,
+        .is_double = is_double,
         .flatten_seconds = compiled.flatten_seconds,
         .bvh_seconds = compiled.bvh_seconds,
         .build_from_cache = true,
@@ -147,7 +147,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
         renderer_close(renderer);
         return NULL;
     }
-    prelude_write(renderer);
+    variant_set(renderer);
     return renderer;
 }
 
@@ -173,7 +173,7 @@ void renderer_close(Renderer *renderer)
 
 size_t renderer_scalar_size(const Renderer *renderer)
 {
-    return renderer->report.wide ? sizeof(double) : sizeof(float);
+    return renderer->report.is_double ? sizeof(double) : sizeof(float);
 }
 
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
@@ -187,7 +187,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
         .no_cache = renderer->settings.no_cache,
     };
     program_build(renderer->compute, &slot->request, &slot->program);
-    // reports name the kernel that computes the result itself
+    // AOV kernels do not change the hash that identifies an image
     if (kind != KERNEL_AOV && kind != KERNEL_PATH) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;

@@ -20,7 +20,7 @@ typedef struct {
     BvhChoice bvh;
     bool counting;             // count rays by kind in a slower build; only for renders without AOVs
     uint32_t perturb_seed;     // not 0: inject the rounding error OpenCL permits (kernels/numerics/perturb.h)
-    uint32_t perturb_scale;    // multiplies that error, up to PERTURB_SCALE_LARGEST; 0: 1
+    uint32_t perturb_scale;    // multiplies that error, up to PERTURB_SCALE_MAX; 0: 1
     FeatureSet extra_features; // built in beyond the scene's own, for tests
     bool shift_to_eye;         // the eye is the origin, for images; false for explicit rays
     bool no_cache;
@@ -29,8 +29,9 @@ typedef struct {
     uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
 } RenderSettings;
 
-// Beyond this an error could reach the next power of two but one.
-enum { PERTURB_SCALE_LARGEST = 1000 };
+// 8192 ulp, the largest error (kernels/numerics/perturb.h), times this is below 2^23 ulp: an injected error
+// stays below one binade.
+enum { PERTURB_SCALE_MAX = 1000 };
 
 typedef struct Renderer Renderer;
 
@@ -64,7 +65,7 @@ typedef struct {
 typedef struct {
     FeatureSet features;
     uint32_t lanes;
-    bool wide; // structs in double
+    bool is_double; // structs in double
     uint64_t kernel_hash;
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was

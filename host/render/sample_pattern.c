@@ -9,7 +9,7 @@
 // effectiveness of quasirandom sequences, 2018), shifted so that the mean is the pixel's center and the
 // number of samples does not shift the image. Samples that the shift moves out of the pixel are clamped to
 // its edge.
-void *sample_pattern(uint32_t count, bool wide)
+void *sample_pattern(uint32_t count, bool is_double)
 {
     const double steps[2] = {0.7548776662466927, 0.5698402909980532};
     double *offsets = memory_allocate(2 * (size_t)count, sizeof *offsets);
@@ -25,7 +25,7 @@ void *sample_pattern(uint32_t count, bool wide)
             *offset = fmin(fmax(*offset - mean, -1), 1);
         }
     }
-    if (wide) return offsets;
+    if (is_double) return offsets;
     float *narrow = memory_allocate(2 * (size_t)count, sizeof *narrow);
     for (size_t i = 0; i < 2 * (size_t)count; i++)
         narrow[i] = (float)offsets[i];

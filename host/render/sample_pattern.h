@@ -4,6 +4,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// x and y of each of `count` samples, from -1 to 1 across the pixel, in double where `wide`, else in float. A
-// single sample is at the center. Caller frees.
-void *sample_pattern(uint32_t count, bool wide);
+// x and y of each of `count` samples, from -1 to 1 across the pixel, in double where `is_double`, else in
+// float. A single sample is at the center. Caller frees.
+void *sample_pattern(uint32_t count, bool is_double);

@@ -7,38 +7,38 @@
 
 enum { TRACE_GROUP = 64, TRACE_RAYS_OF_LAUNCH = 1 << 18 };
 
-static void scalar_set(void *scalars, size_t index, bool wide, double value)
+static void scalar_set(void *scalars, size_t index, bool is_double, double value)
 {
-    if (wide)
+    if (is_double)
         ((double *)scalars)[index] = value;
     else
         ((float *)scalars)[index] = (float)value;
 }
 
-static double scalar_at(const void *scalars, size_t index, bool wide)
+static double scalar_at(const void *scalars, size_t index, bool is_double)
 {
-    return wide ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
+    return is_double ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
 }
 
-static void vector_at(const void *scalars, size_t index, bool wide, double vector[3])
+static void vector_at(const void *scalars, size_t index, bool is_double, double vector[3])
 {
     for (size_t axis = 0; axis < 3; axis++)
-        vector[axis] = scalar_at(scalars, index + axis, wide);
+        vector[axis] = scalar_at(scalars, index + axis, is_double);
 }
 
 // The scalars of one hit, from `index` on.
-static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t object, double unit)
+static TraceHit hit_at(const void *scalars, size_t index, bool is_double, uint32_t object, double unit)
 {
     TraceHit hit = {.object = object,
-                    .t = scalar_at(scalars, index + RESULT_T, wide),
-                    .transmission = scalar_at(scalars, index + RESULT_TRANSMISSION, wide),
-                    .light = scalar_at(scalars, index + RESULT_LIGHT, wide)};
-    vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
-    vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
-    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, wide, hit.reflected_origin);
-    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, wide, hit.reflected_direction);
-    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, wide, hit.refracted_origin);
-    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, wide, hit.refracted_direction);
+                    .t = scalar_at(scalars, index + RESULT_T, is_double),
+                    .transmission = scalar_at(scalars, index + RESULT_TRANSMISSION, is_double),
+                    .light = scalar_at(scalars, index + RESULT_LIGHT, is_double)};
+    vector_at(scalars, index + RESULT_NORMAL, is_double, hit.normal);
+    vector_at(scalars, index + RESULT_POSITION, is_double, hit.position);
+    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, hit.reflected_origin);
+    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, hit.reflected_direction);
+    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, hit.refracted_origin);
+    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, hit.refracted_direction);
     hit.t *= unit;
     for (size_t axis = 0; axis < 3; axis++) {
         hit.position[axis] *= unit;
@@ -48,44 +48,61 @@ static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t ob
     return hit;
 }
 
-static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count, TraceHit *hits)
+// The rays' scalars as the kernel reads them; caller frees.
+static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t count)
 {
-    bool wide = renderer->report.wide;
-    double unit = renderer->unit, farthest = wide ? DBL_MAX : (double)FLT_MAX;
-    size_t scalar = renderer_scalar_size(renderer);
-    void *values = memory_allocate((size_t)count * RAY_SCALARS, scalar);
+    bool is_double = renderer->report.is_double;
+    double unit = renderer->unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
+    void *scalars = memory_allocate((size_t)count * RAY_SCALARS, renderer_scalar_size(renderer));
     for (uint32_t i = 0; i < count; i++) {
         const double *origin = rays[i].origin, *direction = rays[i].direction;
         const double ray[RAY_SCALARS] = {
             origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
             direction[1],     direction[2],     rays[i].tmin / unit, fmin(rays[i].tmax / unit, farthest)};
         for (size_t k = 0; k < RAY_SCALARS; k++)
-            scalar_set(values, i * RAY_SCALARS + k, wide, ray[k]);
+            scalar_set(scalars, i * RAY_SCALARS + k, is_double, ray[k]);
     }
-    Compute *compute = renderer->compute;
-    cl_mem ray_buffer =
-        buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, values, CL_MEM_READ_ONLY);
-    free(values);
-    size_t result_size = (size_t)count * RESULT_SCALARS * scalar,
-           object_size = (size_t)count * sizeof(uint32_t);
-    cl_mem results = buffer_create(compute, result_size, NULL, CL_MEM_WRITE_ONLY);
-    cl_mem objects = buffer_create(compute, object_size, NULL, CL_MEM_WRITE_ONLY);
+    return scalars;
+}
 
+static void trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_mem results, cl_mem objects)
+{
+    Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
-    kernel_argument(compute, kernel, FLAT_COUNT, sizeof(cl_mem), &ray_buffer);
+    kernel_argument(compute, kernel, FLAT_COUNT, sizeof rays, &rays);
     kernel_argument(compute, kernel, FLAT_COUNT + 1, sizeof count, &count);
-    kernel_argument(compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &results);
-    kernel_argument(compute, kernel, FLAT_COUNT + 3, sizeof(cl_mem), &objects);
+    kernel_argument(compute, kernel, FLAT_COUNT + 2, sizeof results, &results);
+    kernel_argument(compute, kernel, FLAT_COUNT + 3, sizeof objects, &objects);
     size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = TRACE_GROUP;
     renderer_launch(renderer, KERNEL_TRACE, 1, &items, &group);
+}
 
+static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_mem objects, TraceHit *hits)
+{
+    Compute *compute = renderer->compute;
+    size_t result_size = (size_t)count * RESULT_SCALARS * renderer_scalar_size(renderer);
     const void *result = renderer_map(renderer, results, result_size);
-    const uint32_t *object = renderer_map(renderer, objects, object_size);
+    const uint32_t *object = renderer_map(renderer, objects, (size_t)count * sizeof *object);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
-        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, wide, object[i], unit);
+        hits[i] =
+            hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i], renderer->unit);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     compute_try(compute, clFinish(compute->queue));
+}
+
+static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count, TraceHit *hits)
+{
+    Compute *compute = renderer->compute;
+    size_t scalar = renderer_scalar_size(renderer);
+    void *scalars = rays_pack(renderer, rays, count);
+    cl_mem ray_buffer =
+        buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, scalars, CL_MEM_READ_ONLY);
+    free(scalars);
+    cl_mem results = buffer_create(compute, (size_t)count * RESULT_SCALARS * scalar, NULL, CL_MEM_WRITE_ONLY);
+    cl_mem objects = buffer_create(compute, (size_t)count * sizeof(uint32_t), NULL, CL_MEM_WRITE_ONLY);
+    trace_launch(renderer, count, ray_buffer, results, objects);
+    hits_unpack(renderer, count, results, objects, hits);
     buffer_release(ray_buffer);
     buffer_release(results);
     buffer_release(objects);

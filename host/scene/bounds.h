@@ -17,9 +17,9 @@ static inline bool bounds_is_empty(const Bounds *bounds)
     return bounds->min.x > bounds->max.x;
 }
 
-static inline Bounds bounds_around(Vector3 center, Vector3 reach)
+static inline Bounds bounds_around(Vector3 center, Vector3 half_extents)
 {
-    return (Bounds){vector_subtract(center, reach), vector_add(center, reach)};
+    return (Bounds){vector_subtract(center, half_extents), vector_add(center, half_extents)};
 }
 
 static inline Bounds bounds_join(Bounds a, Bounds b)
@@ -46,10 +46,10 @@ static inline Bounds bounds_of_triangle(Vector3 a, Vector3 b, Vector3 c)
     return (Bounds){vector_min(vector_min(a, b), c), vector_max(vector_max(a, b), c)};
 }
 
-// How far a circle of radius 1 across the unit vector n reaches along each axis: as far as that axis'
+// Half extents of a circle of radius 1 across the unit vector n. Along each axis: as far as that axis'
 // projection into the circle's plane is long, sqrt(1 - n_x^2), here as the length of n's other components,
 // which does not cancel.
-static inline Vector3 circle_reach(Vector3 n)
+static inline Vector3 circle_half_extents(Vector3 n)
 {
     return (Vector3){hypot(n.y, n.z), hypot(n.x, n.z), hypot(n.x, n.y)};
 }
@@ -57,7 +57,7 @@ static inline Vector3 circle_reach(Vector3 n)
 // `normal` need not be unit.
 static inline Bounds bounds_of_disc(Vector3 center, Vector3 normal, double radius)
 {
-    return bounds_around(center, vector_scale(circle_reach(vector_normalize(normal)), radius));
+    return bounds_around(center, vector_scale(circle_half_extents(vector_normalize(normal)), radius));
 }
 
 static inline double bounds_half_area(Bounds bounds)

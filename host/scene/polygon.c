@@ -55,7 +55,7 @@ int plane_orientation(const double a[2], const double b[2], const double c[2])
     return orientation_exact(a, b, c);
 }
 
-// What is left of the polygon: a ring of corners, laid into the plane so that it turns left.
+// What is left of the polygon: a ring of corners, projected to a coordinate plane so that it turns left.
 typedef struct {
     double (*points)[2];
     uint32_t *next, *previous;
@@ -78,7 +78,7 @@ static Vector3 polygon_normal(const Vector3 *corners, size_t count)
 }
 
 // Drops the coordinate in which the normal is largest; swaps the others where the polygon would turn right.
-static void points_lay(double (*points)[2], const Vector3 *corners, size_t count, Vector3 normal)
+static void project_to_plane(double (*points)[2], const Vector3 *corners, size_t count, Vector3 normal)
 {
     double x = fabs(normal.x), y = fabs(normal.y), z = fabs(normal.z);
     for (size_t i = 0; i < count; i++) {
@@ -227,7 +227,7 @@ static void ring_open(Ring *ring, const Vector3 *corners, size_t count, Vector3 
         .is_ear = memory_allocate(count, sizeof *ring->is_ear),
         .count = count,
     };
-    points_lay(ring->points, corners, count, normal);
+    project_to_plane(ring->points, corners, count, normal);
     for (size_t i = 0; i < count; i++) {
         ring->next[i] = (uint32_t)((i + 1) % count);
         ring->previous[i] = (uint32_t)((i + count - 1) % count);

@@ -19,7 +19,7 @@ Material material_default(void)
                       .shininess = 32,
                       .ior = 1.5,
                       .checker_size = 1,
-                      .image_size = 1};
+                      .texture_size = 1};
 }
 
 uint32_t scene_add_material(Scene *scene, const Material *material, const char *name)
@@ -59,9 +59,9 @@ void scene_free(Scene *scene)
     for (size_t i = 0; i < scene->meshes.count; i++)
         mesh_free(&scene->meshes.items[i]);
     free(scene->meshes.items);
-    for (size_t i = 0; i < scene->images.count; i++)
-        free(scene->images.items[i].path);
-    free(scene->images.items);
+    for (size_t i = 0; i < scene->textures.count; i++)
+        free(scene->textures.items[i].path);
+    free(scene->textures.items);
     free(scene->file);
     text_free(&scene->text);
     *scene = (Scene){0};
@@ -84,8 +84,8 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
     struct stat status;
     if (stat(path, &status) != 0) return false;
     bool is_read = is_same_file(scene_path, &status);
-    for (size_t i = 0; i < scene->images.count && !is_read; i++)
-        is_read = is_same_file(scene->images.items[i].path, &status);
+    for (size_t i = 0; i < scene->textures.count && !is_read; i++)
+        is_read = is_same_file(scene->textures.items[i].path, &status);
     for (size_t i = 0; i < scene->meshes.count && !is_read; i++)
         is_read = is_same_file(scene->meshes.items[i].path, &status);
     return is_read;

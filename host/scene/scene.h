@@ -24,32 +24,34 @@ typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
 
 typedef struct {
     LightKind kind;
-    Color color;            // times intensity
-    Vector3 position;       // point, spot
-    Vector3 direction;      // directional: the way the light travels; spot: look_at - position; not unit
-    double angle, penumbra; // spot, degrees: no light beyond the half-angle; full within angle - penumbra
+    Color color;       // times intensity
+    Vector3 position;  // point, spot
+    Vector3 direction; // directional: the way the light travels; spot: look_at - position; not unit
+    // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
+    double half_angle, penumbra;
 } Light;
 
 typedef struct {
     Color color;
-    double ambient;   // ka
-    Color diffuse;    // kd, per channel
-    double specular;  // ks; the highlight has the light's color
-    double shininess; // Phong's power, >= 0
-    double reflection, transmission, ior;
+    double ambient;                  // ka
+    Color diffuse;                   // kd, per channel
+    double specular;                 // ks; the highlight has the light's color
+    double shininess;                // Phong's power, >= 0
+    double reflection, transmission; // weights of the reflected and the refracted ray
+    double ior;
     bool full_shadow; // casts a full shadow even if transparent
     bool checker;
     Color checker_colors[2]; // in place of color
     double checker_size;     // side of a square, > 0, in scene units
-    uint32_t image;          // in place of color: 1 + index into the scene's images; 0: none
-    double image_size;       // width of a texture on a plane or disc, > 0, in scene units
+    uint32_t texture;        // in place of color: 1 + index into the scene's textures; 0: none
+    double texture_size;     // width of a texture on a plane or disc, > 0, in scene units
 } Material;
 
-// An image file for textures; scene_compile reads it.
+// A texture's image file; scene_compile reads it.
 typedef struct {
     char *path;
     size_t offset; // of its name in the scene's text
-} SceneImage;
+} SceneTexture;
 
 // Every shape, by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
 // then the mesh.
@@ -79,7 +81,7 @@ typedef struct {
         struct {
             Vector3 center;
             double radius;
-            bool only_inside; // rays from outside pass the near side unseen
+            bool only_inside; // hit from inside only: rays that enter pass through
         } sphere;
         struct {
             Vector3 point, normal;
@@ -115,8 +117,8 @@ typedef struct {
             Vector3 center, axis;
             double major, minor;
         } torus;
-        // the points as far from the focus as from the plane as far behind the apex; finite: up to a height
-        // along the axis
+        // the points equidistant from the focus and the directrix plane; finite: up to a height along the
+        // axis
         struct {
             Vector3 apex, axis;
             double focal_length, height;
@@ -168,10 +170,10 @@ typedef struct {
         size_t count, capacity;
     } meshes;
     struct {
-        SceneImage *items;
+        SceneTexture *items;
         size_t count, capacity;
-    } images;
-    char *file; // of a scene that has images, and
+    } textures;
+    char *file; // of a scene that has textures, and
     Text text;  // what was read from it: for messages about them, see scene_source
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0

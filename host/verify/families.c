@@ -24,19 +24,19 @@ static double part_of_one(uint64_t state)
     return (double)(state >> 11) * 0x1p-53;
 }
 
-double random_at(unsigned seed, uint64_t index, unsigned place)
+double random_at(unsigned seed, uint64_t index, unsigned dimension)
 {
-    return part_of_one(mixed((((uint64_t)seed << 40) + index * 32 + place + 1) * 0x9e3779b97f4a7c15u));
+    return part_of_one(mixed((((uint64_t)seed << 40) + index * 32 + dimension + 1) * 0x9e3779b97f4a7c15u));
 }
 
-double random_symmetric(unsigned seed, uint64_t index, unsigned place)
+double random_symmetric(unsigned seed, uint64_t index, unsigned dimension)
 {
-    return 2 * random_at(seed, index, place) - 1;
+    return 2 * random_at(seed, index, dimension) - 1;
 }
 
-static unsigned random_choice(unsigned seed, uint64_t index, unsigned place, unsigned count)
+static unsigned random_choice(unsigned seed, uint64_t index, unsigned dimension, unsigned count)
 {
-    return (unsigned)(random_at(seed, index, place) * count);
+    return (unsigned)(random_at(seed, index, dimension) * count);
 }
 
 static Vector3 unit(Vector3 a)
@@ -45,11 +45,11 @@ static Vector3 unit(Vector3 a)
     return (Vector3){a.x / length, a.y / length, a.z / length};
 }
 
-Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_place)
+Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension)
 {
-    return unit((Vector3){random_symmetric(seed, index, first_place),
-                          random_symmetric(seed, index, first_place + 1),
-                          random_symmetric(seed, index, first_place + 2)});
+    return unit((Vector3){random_symmetric(seed, index, first_dimension),
+                          random_symmetric(seed, index, first_dimension + 1),
+                          random_symmetric(seed, index, first_dimension + 2)});
 }
 
 // a x + b y + c z + d
@@ -83,6 +83,8 @@ static void on_circle(double turn, double *cosine, double *sine)
     *sine = sines[quarter];
 }
 
+// Seeds are the cases' numbers, plus 10 for C, 20 for T and 30 for M.
+
 TraceRay family_disc_rim(uint64_t i)
 {
     static const double distances[] = {5, 500, 5e4};
@@ -98,6 +100,7 @@ TraceRay family_disc_rim(uint64_t i)
     return ray_toward(combine(distances[i % 3], away, 0, nowhere, 0, nowhere, center), target);
 }
 
+// Toward a place on an edge, a corner and a place in a face of the room, in turn.
 TraceRay family_in_room(uint64_t i)
 {
     unsigned axis = random_choice(5, i, 0, 3);
@@ -109,16 +112,17 @@ TraceRay family_in_room(uint64_t i)
     return ray_toward((Vector3){0.1, 0.2, 0.3}, (Vector3){target[0], target[1], target[2]});
 }
 
+// In turn from inside toward a rim, and from outside a little inward of it, so that no ray misses.
 TraceRay family_cylinder_rim(uint64_t i)
 {
     const Vector3 base = {5, 5, 5}, axis = {1.0 / 3, 2.0 / 3, 2.0 / 3};
     const Vector3 e = {2.0 / 3, 1.0 / 3, -2.0 / 3}, f = {2.0 / 3, -2.0 / 3, 1.0 / 3};
     bool outside = i % 2 == 1;
-    double pull = outside ? 1e-5 : 0;
-    double height = random_at(14, i, 0) < 0.5 ? pull : 2 - pull;
+    double inset = outside ? 1e-5 : 0;
+    double height = random_at(14, i, 0) < 0.5 ? inset : 2 - inset;
     double c, s;
     on_circle(random_at(14, i, 1), &c, &s);
-    double radius = 1 - pull;
+    double radius = 1 - inset;
     Vector3 target = combine(radius * c, e, radius * s, f, height, axis, base);
     Vector3 inner = combine(1, axis, 0, nowhere, 0, nowhere, base);
     if (!outside) return ray_toward(inner, target);
@@ -146,7 +150,8 @@ TraceRay family_beside_sliver(uint64_t i)
     Vector3 e = unit(ab), f = vector_cross(n, e);
     double c, s;
     on_circle(random_at(34, i, 0), &c, &s);
-    Vector3 direction = unit(combine(c, e, s, f, 0.009076, n, nowhere));
+    const double grazing = 0.009076; // the tangent of 0.52 degrees
+    Vector3 direction = unit(combine(c, e, s, f, grazing, n, nowhere));
     Vector3 target = combine(random_at(34, i, 1), ab, 0.3 * random_symmetric(34, i, 2), ac, 0, nowhere, a);
     return ray_along(combine(-100, direction, 0, nowhere, 0, nowhere, target), direction);
 }
@@ -247,6 +252,8 @@ void scene_icosphere(Scene *scene)
         scene_add_triangle(scene, icosphere_triangle(i).corners);
 }
 
+// From 100 points near the center, less than 0.3 away, so within the mesh, toward places on edges (two of
+// five), vertices (two) and in faces (one).
 TraceRay family_from_within(uint64_t i)
 {
     unsigned point = random_choice(31, i, 0, 100);

@@ -1,6 +1,5 @@
-// Rays and meshes at random, the same on every machine, and the same as tests/oracle/families.py has them:
-// made by
-// + - * / and square roots only.
+// Pseudorandom rays and meshes. All but scene_far_sphere are computed by + - * / and sqrt alone, which IEEE
+// 754 rounds correctly, so that their bits are the same on every machine.
 #pragma once
 
 #include "host/render/trace.h"
@@ -10,10 +9,11 @@
 
 typedef TraceRay (*RayFamily)(uint64_t index);
 
-// From 0 to 1: the value at a place of an item of a series, by its number.
-double random_at(unsigned seed, uint64_t index, unsigned place);
-double random_symmetric(unsigned seed, uint64_t index, unsigned place); // from -1 to 1
-Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_place);
+// Counter-based random numbers: dimension `dimension`, 0 to 31, of sample `index` of sequence `seed`. From 0
+// to 1; from -1 to 1; and a unit vector of three dimensions.
+double random_at(unsigned seed, uint64_t index, unsigned dimension);
+double random_symmetric(unsigned seed, uint64_t index, unsigned dimension);
+Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension);
 
 TraceRay family_disc_rim(uint64_t index);         // P3
 TraceRay family_in_room(uint64_t index);          // P5

@@ -1,13 +1,13 @@
 // Images and rays through glass.
 #include "host/base/memory.h"
+#include "host/verify/checks.h"
 #include "host/verify/families.h"
-#include "host/verify/judge.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-// The signature of a way that passes each object of a list and ends at the last, by the rule in
-// kernels/types.h.
+// The signature of the light transport path that passes through each object of a list and ends at the last,
+// by the rule in kernels/types.h.
 static uint32_t passed_path(const uint32_t *objects, size_t count)
 {
     const uint32_t events = 8, refracted = 2;
@@ -17,8 +17,8 @@ static uint32_t passed_path(const uint32_t *objects, size_t count)
     return path;
 }
 
-// A red sphere in a coat of glass thinner than most epsilons: all that is seen through the glass is the ball,
-// at any scale.
+// A red sphere in a coat of glass thinner than most epsilons: all that is seen through the glass is the inner
+// sphere, at any scale.
 void verify_nested_spheres(VerifyRun *run)
 {
     static const double ratios[] = {1 + 4e-5, 1 + 0x1p-16}, scales[] = {1, 1000, 0.001};
@@ -42,7 +42,7 @@ void verify_nested_spheres(VerifyRun *run)
             if (image.object[i] != 1) {
                 // at the rim the coat may be missed, but the sphere behind it may not be seen without it
                 ReferenceHit exact = verify_pixel_hit(&coat, &image, i);
-                bool certain = exact.found && exact.margin > 1e-5 * coat.radius;
+                bool certain = exact.found && exact.margin > 1e-5 * coat.feature_radius;
                 run->result->wrong += image.object[i] != UINT32_MAX || certain;
                 continue;
             }
@@ -88,7 +88,7 @@ static double edge_distance(const Film *empty, size_t pixel)
 }
 
 // Rays into a closed body of index 1: they come out of it again, and keep their direction.
-static void judge_straight_rays(VerifyRun *run, const char *object, unsigned seed)
+static void check_straight_rays(VerifyRun *run, const char *object, unsigned seed)
 {
     enum { COUNT = 20000 };
     TraceRay *rays = memory_allocate(COUNT, sizeof *rays), *inner = memory_allocate(COUNT, sizeof *inner);
@@ -160,7 +160,7 @@ void verify_matched_glass(VerifyRun *run)
         }
         run->result->wrong += through == 0;
         film_free(&image);
-        judge_straight_rays(run, matched[k], 71 + k);
+        check_straight_rays(run, matched[k], 71 + k);
     }
     film_free(&empty);
 }

@@ -1,5 +1,5 @@
 // Images of Phong's highlights, from dull to a thousandth of a radian wide.
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

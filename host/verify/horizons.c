@@ -1,5 +1,5 @@
 // Images of ground up to its horizon.
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include <math.h>
 #include <stdlib.h>
 

@@ -150,7 +150,7 @@ static bool shadow_edge_beside(const Film *image, size_t pixel, size_t light)
 
 // The scene with its axes exchanged. An object may differ where the other one is met within a few roundings
 // of the ray, a shadow at its edge; where neither does, colors are the same within 1e-5.
-static void judge_turned(VerifyRun *run, Renderer *opened, const Film *image, const Film *turned)
+static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, const Film *turned)
 {
     for (size_t i = 0; i < film_pixel_count(image); i++) {
         bool same = image->object[i] == turned->object[i];
@@ -211,7 +211,7 @@ void verify_mirrored_scenes(VerifyRun *run)
     for (unsigned turns = 1; turns < 3; turns++) {
         scene_turn_axes(&turned);
         Film other = verify_render(run, &turned, false, 256, 192);
-        judge_turned(run, opened, &image, &other);
+        check_turned(run, opened, &image, &other);
         film_free(&other);
     }
     renderer_close(opened);

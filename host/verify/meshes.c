@@ -2,8 +2,8 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
+#include "host/verify/checks.h"
 #include "host/verify/families.h"
-#include "host/verify/judge.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,10 +128,10 @@ void verify_facing_triangle(VerifyRun *run)
     }
 }
 
-static Vector3 random_point(unsigned seed, uint64_t index, unsigned place)
+static Vector3 random_point(unsigned seed, uint64_t index, unsigned dimension)
 {
-    return (Vector3){random_symmetric(seed, index, place), random_symmetric(seed, index, place + 1),
-                     random_symmetric(seed, index, place + 2)};
+    return (Vector3){random_symmetric(seed, index, dimension), random_symmetric(seed, index, dimension + 1),
+                     random_symmetric(seed, index, dimension + 2)};
 }
 
 static void add_random_triangles(Scene *scene, unsigned count, double size)
@@ -200,7 +200,7 @@ enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 20, CROWD_RAYS = 1 << 16, CROWD_B
 // Triangles, and some of every bounded form of every shape.
 static Scene crowd_make(void)
 {
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     Scene scene = scene_empty();
     add_random_triangles(&scene, CROWD_TRIANGLES, 0.05);

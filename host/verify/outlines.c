@@ -2,7 +2,7 @@
 // was traced.
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 static const Vector3 origin;
 
 // Of rays from the center outward no pixel that is farther out is brighter.
-static void judge_radial_brightness(VerifyRun *run, const Film *image)
+static void check_radial_brightness(VerifyRun *run, const Film *image)
 {
     const uint32_t side = image->width;
     for (unsigned k = 0; k < 16; k++) {
@@ -31,17 +31,17 @@ static void judge_radial_brightness(VerifyRun *run, const Film *image)
 }
 
 // Each pixel; and Lambert's cosine for light from the eye's side, of which the 99.9th percentile counts.
-static void judge_fringe(VerifyRun *run, const Film *image, const VerifyTarget *sphere)
+static void check_fringe(VerifyRun *run, const Film *image, const VerifyTarget *sphere)
 {
     float *errors = memory_allocate(film_pixel_count(image), sizeof *errors);
     size_t count = 0;
     for (size_t i = 0; i < film_pixel_count(image); i++) {
-        ReferenceHit exact = verify_judge_pixel(run, sphere, image, i);
+        ReferenceHit exact = verify_check_pixel(run, sphere, image, i);
         if (!exact.found || !verify_pixel_found(image, i)) continue;
         double shade = fmax((double)exact.normal.z, 0);
         errors[count++] = (float)fabs(image->color[3 * i] - shade);
     }
-    bool near = sphere->distance <= 1e3;
+    bool near = sphere->distance <= 1e3; // farther away t's 8 ulp exceed the bound of B
     if (count > 0 && (near || run->tier > TIER_B))
         verify_note(run, percentile_999(errors, count), run->tier == TIER_B ? 2e-3 : 1e-5, "of 1");
     free(errors);
@@ -57,19 +57,19 @@ void verify_far_fringe(VerifyRun *run)
         const Vector3 eye = {0, 0, distance};
         scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
         Film image = verify_render(run, &scene, false, 512, 512);
-        judge_radial_brightness(run, &image);
+        check_radial_brightness(run, &image);
         VerifyTarget sphere = verify_target(run, &scene.objects.items[0], eye);
-        if (run->tier != TIER_A) judge_fringe(run, &image, &sphere);
+        if (run->tier != TIER_A) check_fringe(run, &image, &sphere);
         film_free(&image);
     }
     scene_free(&scene);
 }
 
-static void judge_pixels(VerifyRun *run, const Film *image, const Scene *scene)
+static void check_pixels(VerifyRun *run, const Film *image, const Scene *scene)
 {
     VerifyTarget target = verify_target(run, &scene->objects.items[0], scene->camera.position);
     for (size_t i = 0; i < film_pixel_count(image) && run->tier != TIER_A; i++)
-        verify_judge_pixel(run, &target, image, i);
+        verify_check_pixel(run, &target, image, i);
 }
 
 // Every column has a stretch of pixels without a gap.
@@ -80,7 +80,7 @@ void verify_wire(VerifyRun *run)
     const Vector3 eye = {0, 0, -10};
     scene.camera = verify_camera(eye, origin, 0.293);
     Film image = verify_render(run, &scene, false, 1024, 64);
-    judge_pixels(run, &image, &scene);
+    check_pixels(run, &image, &scene);
     for (uint32_t column = 0; column < image.width; column++) {
         size_t stretches = 0;
         for (uint32_t row = 0; row < image.height; row++) {
@@ -94,8 +94,8 @@ void verify_wire(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Seen along the axis, the light behind the eye, the tip is as bright as the side around it; from beside it
-// there are no more than numbers to ask for.
+// Seen along the axis, the light behind the eye, the tip is as bright as the side around it. From the side
+// only finite values are required.
 void verify_apex(VerifyRun *run)
 {
     static const struct {
@@ -118,7 +118,7 @@ void verify_apex(VerifyRun *run)
             if (!verify_pixel_found(&image, i)) continue;
             const double u = verify_roundoff(run);
             double length = vector_length(verify_vector(image.normal + 3 * i));
-            // a root and a quotient more
+            // + 6 u: a root off by 3 ulp; + 4 u: a quotient off by 2
             verify_note(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
         }
         film_free(&image);
@@ -143,7 +143,7 @@ void verify_far_torus(VerifyRun *run)
         scene.camera = verify_camera(eye, origin, 0);
         scene.camera.half_tangent = 1.3 / distances[k];
         Film image = verify_render(run, &scene, false, 160, 160);
-        judge_pixels(run, &image, &scene);
+        check_pixels(run, &image, &scene);
         film_free(&image);
     }
     scene_free(&scene);
@@ -167,7 +167,7 @@ void verify_tangent_circle(VerifyRun *run)
         if (!verify_is_hit(&hits[i])) continue;
         Quad3 point = {-5 + (Quad)hits[i].t, 0, rays[i].origin[2]};
         ReferenceSurface surface = reference_surface(&scene.objects.items[0], point);
-        run->result->off += reference_surface_distance(&surface) > 16 * verify_roundoff(run);
+        run->result->off_surface += reference_surface_distance(&surface) > 16 * verify_roundoff(run);
     }
     scene_free(&scene);
 }
@@ -233,7 +233,7 @@ void verify_thin_ring(VerifyRun *run)
     for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
         scene.camera = verify_camera(eye, origin, views[k].fov);
         Film image = verify_render(run, &scene, false, views[k].side, views[k].side);
-        judge_pixels(run, &image, &scene);
+        check_pixels(run, &image, &scene);
         if (k == 1) run->result->leaks += count_parts(&image) != 1;
         film_free(&image);
     }

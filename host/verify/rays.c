@@ -3,7 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,70 +26,70 @@ Scene verify_rays_scene(const VerifyRays *set)
 
 static double nudged(const VerifyRun *run, double value, double toward)
 {
-    return verify_is_wide(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
+    return verify_is_double(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
 }
 
 // The ray and those beside it. A component of 0 has only subnormal numbers beside it, and stays.
-static void judged_add(VerifyJudgedRays *judged, const VerifyRun *run, const VerifyRays *set,
-                       const VerifyRay *given)
+static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const VerifyRays *set,
+                         const VerifyRay *given)
 {
-    VerifyJudgedRay item = {{.tmin = given->start, .tmax = INFINITY}, *given};
+    VerifyTestRay item = {{.tmin = given->tmin, .tmax = INFINITY}, *given};
     memcpy(item.ray.origin, given->origin, sizeof item.ray.origin);
     memcpy(item.ray.direction, given->direction, sizeof item.ray.direction);
     verify_round_ray(run, &item.ray);
-    if (!item.required.must) item.required.must = set->must;
+    if (!item.required.decided_tiers) item.required.decided_tiers = set->decided_tiers;
     if (!item.required.limits) item.required.limits = set->limits;
-    array_push(*judged, item);
-    item.required.must = NULL;
+    array_push(*tests, item);
+    item.required.decided_tiers = NULL;
     double *const moved[] = {&item.ray.origin[0], &item.ray.direction[0]};
     for (size_t k = 0; k < 2; k++) {
         double x = *moved[k];
         if (x == 0) continue;
         *moved[k] = nudged(run, x, copysign(INFINITY, x));
-        array_push(*judged, item);
+        array_push(*tests, item);
         *moved[k] = nudged(run, x, 0);
-        array_push(*judged, item);
+        array_push(*tests, item);
         *moved[k] = x;
     }
 }
 
-VerifyJudgedRays verify_rays_judged(const VerifyRun *run, const VerifyRays *set)
+VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set)
 {
-    VerifyJudgedRays judged = {0};
+    VerifyTestRays tests = {0};
     for (size_t i = 0; set->rays && i < set->ray_count; i++)
-        judged_add(&judged, run, set, &set->rays[i]);
-    for (size_t i = 0; set->family && i < set->judged_count; i++) {
-        VerifyJudgedRay item = {set->family(i), {.must = set->must, .limits = set->limits}};
+        test_ray_add(&tests, run, set, &set->rays[i]);
+    for (size_t i = 0; set->family && i < set->checked_count; i++) {
+        VerifyTestRay item = {set->family(i), {.decided_tiers = set->decided_tiers, .limits = set->limits}};
         verify_round_ray(run, &item.ray);
-        array_push(judged, item);
+        array_push(tests, item);
     }
-    return judged;
+    return tests;
 }
 
-static void judge_surface(VerifyRun *run, const Object *objects, const TraceRay *ray, const TraceHit *hit)
+static void check_surface(VerifyRun *run, const Object *objects, const TraceRay *ray, const TraceHit *hit)
 {
     // in these scenes an object's id is its place in the list
-    if (verify_is_hit(hit)) verify_judge_surface(run, &objects[hit->object], ray, hit);
+    if (verify_is_hit(hit)) verify_check_surface(run, &objects[hit->object], ray, hit);
 }
 
 // Rays by numbers: hits do not depend on the rays' order.
 static void run_numbers(VerifyRun *run, const VerifyRays *set, const Scene *scene)
 {
-    VerifyJudgedRays judged = verify_rays_judged(run, set);
+    VerifyTestRays tests = verify_test_rays(run, set);
     Object *objects = verify_objects(run, scene);
-    const size_t count = judged.count;
+    const size_t count = tests.count;
     TraceRay *rays = memory_allocate(2 * count, sizeof *rays), *turned = rays + count;
     TraceHit *hits = memory_allocate(2 * count, sizeof *hits);
     for (size_t i = 0; i < count; i++)
-        rays[i] = turned[count - 1 - i] = judged.items[i].ray;
+        rays[i] = turned[count - 1 - i] = tests.items[i].ray;
     verify_trace(run, scene, false, rays, count, hits);
     verify_trace(run, scene, true, turned, count, hits + count);
     for (size_t i = 0; i < count; i++) {
-        verify_judge_ray(run, objects, scene->objects.count, &judged.items[i], &hits[i]);
-        judge_surface(run, objects, &rays[i], &hits[i]);
+        verify_check_ray(run, objects, scene->objects.count, &tests.items[i], &hits[i]);
+        check_surface(run, objects, &rays[i], &hits[i]);
         run->result->differing += !verify_same_bits(&hits[i], &hits[2 * count - 1 - i]);
     }
-    free(judged.items);
+    free(tests.items);
     free(objects);
     free(rays);
     free(hits);
@@ -97,7 +97,7 @@ static void run_numbers(VerifyRun *run, const VerifyRays *set, const Scene *scen
 
 static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene)
 {
-    VerifyJudgedRays judged = verify_rays_judged(run, set);
+    VerifyTestRays tests = verify_test_rays(run, set);
     Object *objects = verify_objects(run, scene);
     TraceRay *rays = memory_allocate(BATCH, sizeof *rays);
     TraceHit *hits = memory_allocate(BATCH, sizeof *hits);
@@ -111,13 +111,13 @@ static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene
         verify_trace_opened(run, opened, rays, count, hits);
         for (size_t i = 0; i < count; i++) {
             run->result->leaks += set->closed && !verify_is_hit(&hits[i]);
-            if (first + i < judged.count)
-                verify_judge_ray(run, objects, scene->objects.count, &judged.items[first + i], &hits[i]);
-            judge_surface(run, objects, &rays[i], &hits[i]);
+            if (first + i < tests.count)
+                verify_check_ray(run, objects, scene->objects.count, &tests.items[first + i], &hits[i]);
+            check_surface(run, objects, &rays[i], &hits[i]);
         }
     }
     renderer_close(opened);
-    free(judged.items);
+    free(tests.items);
     free(objects);
     free(rays);
     free(hits);

@@ -8,7 +8,7 @@
 // What t may be off at each tier, where that is not as the tier has it.
 typedef struct {
     double ulps[TIER_COUNT];   // 0: as the tier has it
-    double within[TIER_COUNT]; // in units of t; goes before ulps
+    double within[TIER_COUNT]; // in units of t; takes precedence over ulps
 } VerifyLimits;
 
 #define EXACTLY (-1.0) // ulps: none
@@ -16,10 +16,10 @@ typedef struct {
 // A ray of decimal numbers, each to be rounded once to the precision. It stands for up to five: itself, then
 // with the x of its origin and that of its direction one unit in the last place farther from 0 and nearer.
 typedef struct {
-    double origin[3], direction[3], start;
-    const char *must;           // as of the set, if not NULL
+    double origin[3], direction[3], tmin;
+    const char *decided_tiers;  // as of the set, if not NULL
     const VerifyLimits *limits; // as of the set, if not NULL
-    double touch;               // not 0: t of a tangent, which counts as a hit
+    double tangent_t;           // not 0: t of a tangent, which counts as a hit
 } VerifyRay;
 
 typedef struct {
@@ -29,30 +29,31 @@ typedef struct {
     const VerifyRay *rays; // NULL: a family's first ray_count
     RayFamily family;
     size_t ray_count;
-    size_t judged_count; // of a family: how many have exact answers; all have points and normals
-    bool closed;         // every ray of the family hits something
-    const char *must; // the tiers, as in "BCD", at which hit or miss is not open, however near the boundary;
-                      // of rays by numbers not for those beside them
+    size_t checked_count; // of a family: how many have exact answers; all have points and normals
+    bool closed;          // every ray of the family hits something
+    // The tiers, as in "BCD", at which hit or miss is not open, however near the boundary; of rays by numbers
+    // not for those beside them.
+    const char *decided_tiers;
     const VerifyLimits *limits; // or NULL
 } VerifyRays;
 
 extern const VerifyRays verify_rays[];
 extern const size_t verify_rays_count;
 
-// A ray as it is traced, and what is required of its hit: of one beside a given ray no `must`.
+// A ray as it is traced, and what is required of its hit: of one beside a given ray no decided tiers.
 typedef struct {
     TraceRay ray;
     VerifyRay required;
-} VerifyJudgedRay;
+} VerifyTestRay;
 
 typedef struct {
-    VerifyJudgedRay *items;
+    VerifyTestRay *items;
     size_t count, capacity;
-} VerifyJudgedRays;
+} VerifyTestRays;
 
 // The scene of a set; the caller frees it with scene_free.
 Scene verify_rays_scene(const VerifyRays *set);
 // The rays of a set that have exact answers, at the precision at work; the caller frees the items.
-VerifyJudgedRays verify_rays_judged(const VerifyRun *run, const VerifyRays *set);
-// Traces a set of rays and judges their hits.
+VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set);
+// Traces a set of rays and checks their hits.
 void verify_rays_run(VerifyRun *run, const VerifyRays *set);

@@ -9,12 +9,10 @@ ReferenceRay reference_ray(Vector3 origin, Vector3 direction)
     return (ReferenceRay){quad3(origin), quad3(direction), 0, (Quad)FLT_MAX};
 }
 
-// The detour through memory keeps GCC 12 from dropping roundings where it merges stores
-// (-ftree-slp-vectorize).
 static void round_number(double *number)
 {
-    volatile float narrow = (float)*number;
-    *number = (double)narrow;
+    volatile float single = (float)*number; // volatile: see host/compile/rounding.c
+    *number = (double)single;
 }
 
 static void round_numbers(double *numbers, size_t count)
@@ -55,17 +53,20 @@ Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shin
     return powl(alignment > 0 ? (long double)alignment : 0, shininess);
 }
 
-static void narrow(ReferenceHit *hit, Quad margin)
+static void margin_reduce(ReferenceHit *hit, Quad margin)
 {
     hit->margin = quad_minimum(hit->margin, quad_absolute(margin));
 }
 
 // Takes the crossing at `t` if it is the nearest so far. `normal` points outward; it need not be unit.
-static void offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad bend)
+//
+// A hit begins to count where the ray's start lies on the surface: the margin is twice the start's height
+// over the tangent plane of the hit.
+static void offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius)
 {
     if (hit->found && t >= hit->t) return;
     Quad inverse = 1 / quad3_length(normal), approach = -quad3_dot(normal, ray->direction) * inverse;
-    narrow(hit, 2 * (t - ray->tmin) * approach);
+    margin_reduce(hit, 2 * (t - ray->tmin) * approach);
     if (!(t > ray->tmin && t < ray->tmax)) return;
     hit->found = true;
     hit->object = 0;
@@ -74,19 +75,20 @@ static void offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 norm
     hit->shading_normal = hit->normal;
     hit->entering = approach >= 0;
     hit->cosine = quad_absolute(approach) / quad3_length(ray->direction);
-    hit->bend = bend;
+    hit->curvature_radius = curvature_radius;
 }
 
-static void surface_measure(ReferenceSurface *surface, Vector3 center, double size, double radius)
+static void surface_measure(ReferenceSurface *surface, Vector3 center, double bounding_radius,
+                            double feature_radius)
 {
     surface->center = center;
-    surface->size = size;
-    surface->radius = radius;
+    surface->bounding_radius = bounding_radius;
+    surface->feature_radius = feature_radius;
 }
 
-static void surface_add(ReferenceSurface *surface, Quad distance, Quad3 normal, Quad bend)
+static void surface_add(ReferenceSurface *surface, Quad distance, Quad3 normal, Quad curvature_radius)
 {
-    surface->sheets[surface->count++] = (ReferenceSheet){quad_absolute(distance), normal, bend};
+    surface->sheets[surface->count++] = (ReferenceSheet){quad_absolute(distance), normal, curvature_radius};
 }
 
 // How far a number is outside an interval.
@@ -134,7 +136,7 @@ static void hit_sphere(const Object *object, const ReferenceRay *ray, ReferenceH
     Quad a = quad3_dot(ray->direction, ray->direction);
     Quad b = quad3_dot(from_center, ray->direction);
     Quad c = quad3_dot(from_center, from_center) - radius * radius;
-    narrow(hit, (b * b / a - c) / radius);
+    margin_reduce(hit, (b * b / a - c) / radius); // (r^2 - l^2) / r, l the line's distance from the center
     Quad roots[2];
     int count = quadratic_roots(a, b, c, roots);
     for (int i = 0; i < count; i++) {
@@ -170,8 +172,10 @@ static Quad plane_cosine(const ReferenceRay *ray, Quad3 normal)
 static void hit_plane(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad3 point = quad3(object->as.plane.point), normal = quad3(object->as.plane.normal);
-    narrow(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(point, ray->origin)));
-    narrow(hit, 2 * quad3_dot(quad3_unit(normal), quad3_subtract(point, ray->origin)));
+    // The ray has to turn by this angle to be parallel, which moves it so much at the distance of `point`.
+    margin_reduce(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(point, ray->origin)));
+    // Twice the height of the ray's start: on the plane itself the hit ends.
+    margin_reduce(hit, 2 * quad3_dot(quad3_unit(normal), quad3_subtract(point, ray->origin)));
     Quad t;
     if (plane_crossing(ray, point, normal, &t)) offer(hit, ray, t, normal, UNBOUNDED);
 }
@@ -184,7 +188,8 @@ static void surface_plane(const Object *object, Quad3 point, ReferenceSurface *s
     surface_add(surface, height, normal, UNBOUNDED);
 }
 
-// The nearest place of the rim is as far from the ray's line as from the line that touches the rim there.
+// Twice the distance from the rim, within the plane, is about (d^2 / r^2 - 1) r. Between the ray's line and
+// the rim's nearest tangent it is shorter by approach / spread.
 static void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad t;
@@ -193,7 +198,7 @@ static void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const Reference
     Quad excess = quad3_dot(from_center, from_center) / (radius * radius) - 1;
     Quad3 across = quad3_cross(ray->direction, quad3_unit(quad3_cross(normal, from_center)));
     Quad approach = quad3_dot(ray->direction, quad3_unit(normal)), spread = quad3_length(across);
-    narrow(hit, excess * radius * (spread > 0 ? approach / spread : 1));
+    margin_reduce(hit, excess * radius * (spread > 0 ? approach / spread : 1));
     if (excess <= 0) offer(hit, ray, t, normal, UNBOUNDED);
 }
 
@@ -201,7 +206,7 @@ static void hit_disc(const Object *object, const ReferenceRay *ray, ReferenceHit
 {
     Quad3 center = quad3(object->as.disc.center), normal = quad3(object->as.disc.normal);
     // Seen edge on, a disc is there or not by the sign of the height of the eye over it.
-    narrow(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(center, ray->origin)));
+    margin_reduce(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(center, ray->origin)));
     hit_disc_at(center, normal, object->as.disc.radius, ray, hit);
 }
 
@@ -240,7 +245,7 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
             Vector3 z_and_x = {corners[edge & 1].x, corners[0].y, corners[edge >> 1].z};
             Vector3 x_and_y = {corners[edge & 1].x, corners[edge >> 1].y, corners[0].z};
             Vector3 on_edge = axis == 0 ? y_and_z : axis == 1 ? z_and_x : x_and_y;
-            narrow(hit, 2 * line_distance(ray, quad3(on_edge), along));
+            margin_reduce(hit, 2 * line_distance(ray, quad3(on_edge), along));
         }
     }
 }
@@ -314,14 +319,14 @@ static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceH
     // With e the distance of the ray from the axis, seen along it, and s the radius of the body there,
     // the discriminant is proportional to s^2 - e^2.
     Quad steepness = quad_root(q.x * q.x + q.y * q.y);
-    Quad3 reach = {radius * q.x - growth * p.x, radius * q.y - growth * p.y, 0};
-    Quad silhouette = quad3_length(reach);
-    if (steepness > 0 && silhouette > 0) narrow(hit, (b * b - a * c) / (silhouette * steepness));
+    Quad3 outline = {radius * q.x - growth * p.x, radius * q.y - growth * p.y, 0};
+    Quad silhouette = quad3_length(outline);
+    if (steepness > 0 && silhouette > 0) margin_reduce(hit, (b * b - a * c) / (silhouette * steepness));
     if (body->slope != 0) {
         Quad apex = -body->base / body->slope;
         if (!body->finite || (apex >= 0 && apex <= body->height)) {
             Quad3 apex_point = quad3_add(body->from, quad3_scale(body->axis, apex));
-            narrow(hit, 2 * point_line_distance(apex_point, ray->origin, ray->direction));
+            margin_reduce(hit, 2 * point_line_distance(apex_point, ray->origin, ray->direction));
         }
     }
 
@@ -335,8 +340,8 @@ static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceH
                                  quad3_scale(body->axis, gradient.z));
         if (body->finite) {
             Quad cosine = plane_cosine(ray, normal);
-            narrow(hit, 2 * z * cosine);
-            narrow(hit, 2 * (body->height - z) * cosine);
+            margin_reduce(hit, 2 * z * cosine);
+            margin_reduce(hit, 2 * (body->height - z) * cosine);
             if (z < 0 || z > body->height) continue;
         }
         if (body->only_inside && quad3_dot(normal, ray->direction) < 0) continue;
@@ -416,7 +421,7 @@ static void hit_triangle(const Object *object, const ReferenceRay *ray, Referenc
     const Vector3 *vertices = object->as.triangle.vertices;
     double clearance = sphere_clearance(ray, vertices[0], triangle_longest_side(vertices));
     if (clearance > 0) {
-        narrow(hit, clearance);
+        margin_reduce(hit, clearance);
         return;
     }
     Quad3 corners[3];
@@ -426,7 +431,8 @@ static void hit_triangle(const Object *object, const ReferenceRay *ray, Referenc
     Quad3 back = quad3_scale(ray->direction, -1), from = quad3_subtract(ray->origin, corners[0]);
     Quad3 normal = quad3_cross(first, second);
     for (int i = 0; i < 3; i++)
-        narrow(hit, 2 * line_distance(ray, corners[i], quad3_subtract(corners[(i + 1) % 3], corners[i])));
+        margin_reduce(hit,
+                      2 * line_distance(ray, corners[i], quad3_subtract(corners[(i + 1) % 3], corners[i])));
     Quad whole = determinant(first, second, back);
     if (whole == 0) return;
     Quad u = determinant(from, second, back) / whole;
@@ -456,7 +462,7 @@ static void surface_triangle(const Object *object, Quad3 point, ReferenceSurface
     normal = quad3_scale(normal, 1 / area);
     double longest = triangle_longest_side(vertices);
     surface_measure(surface, vertices[0], longest, longest);
-    surface->condition = longest * longest / (double)area;
+    surface->normal_condition = longest * longest / (double)area;
     surface_add(surface, quad3_dot(quad3_subtract(point, a), normal), normal, UNBOUNDED);
 }
 
@@ -535,7 +541,7 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
 {
     Quad major = object->as.torus.major, minor = object->as.torus.minor;
     if (torus_is_clear(object, ray)) {
-        narrow(hit, minor / 4);
+        margin_reduce(hit, minor / 4);
         return;
     }
     Quad3 axis = quad3_unit(quad3(object->as.torus.axis)), across = quad3_perpendicular(axis);
@@ -554,8 +560,8 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
                              2 * sum[0] * sum[1] - 2 * four * (p.x * q.x + p.y * q.y),
                              sum[1] * sum[1] + 2 * sum[0] - four * (q.x * q.x + q.y * q.y), 2 * sum[1], 1};
     const Quad cubic[4] = {quartic[1], 2 * quartic[2], 3 * quartic[3], 4};
-    Quad reach = 4 * (major + minor), turns[3], zeros[4];
-    int count = polynomial_zeros(quartic, 4, -reach, reach, zeros);
+    Quad half_span = 4 * (major + minor), turns[3], zeros[4];
+    int count = polynomial_zeros(quartic, 4, -half_span, half_span, zeros);
     for (int i = 0; i < count; i++) {
         if (polynomial_value(sum, 2, zeros[i]) < 0) continue;
         Quad3 at = quad3_add(p, quad3_scale(q, zeros[i]));
@@ -565,12 +571,12 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
         offer(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
     }
     // the hit is there because of the turns up to the next behind it
-    int turn_count = polynomial_zeros(cubic, 3, -reach, reach, turns);
+    int turn_count = polynomial_zeros(cubic, 3, -half_span, half_span, turns);
     bool behind = false;
     for (int i = 0; i < turn_count && !behind; i++) {
         Quad3 at = quad3_add(p, quad3_scale(q, turns[i]));
         Quad off = quad_root(at.x * at.x + at.y * at.y) - major;
-        narrow(hit, 2 * (diagonal(off, at.z) - minor));
+        margin_reduce(hit, 2 * (diagonal(off, at.z) - minor));
         behind = hit->found && closest + turns[i] > hit->t * length;
     }
 }
@@ -601,8 +607,8 @@ static void hit_paraboloid(const Object *object, const ReferenceRay *ray, Refere
     Quad discriminant = b * b - a * c;
     Quad3 gradient = quad3_add(quad3_scale(quad3_cross(ray->direction, q), 4 * focal_length),
                                quad3_scale(q, 2 * quad3_dot(from, q)));
-    if (quad3_dot(gradient, gradient) > 0) narrow(hit, 2 * discriminant / quad3_length(gradient));
-    if (discriminant > 0 && a > 0) narrow(hit, quad_root(discriminant / a));
+    if (quad3_dot(gradient, gradient) > 0) margin_reduce(hit, 2 * discriminant / quad3_length(gradient));
+    if (discriminant > 0 && a > 0) margin_reduce(hit, quad_root(discriminant / a));
 
     Quad roots[2];
     int count = quadratic_roots(a, b, c, roots);
@@ -612,7 +618,7 @@ static void hit_paraboloid(const Object *object, const ReferenceRay *ray, Refere
         Quad3 across = quad3_subtract(p, quad3_scale(axis, z));
         Quad3 normal = quad3_subtract(across, quad3_scale(axis, 2 * focal_length));
         if (object->as.paraboloid.finite) {
-            narrow(hit, 2 * (height - z) * plane_cosine(ray, normal));
+            margin_reduce(hit, 2 * (height - z) * plane_cosine(ray, normal));
             if (z > height) continue;
         }
         offer(hit, ray, roots[i], normal, quad3_length(normal));
@@ -631,14 +637,14 @@ static void surface_paraboloid(const Object *object, Quad3 point, ReferenceSurfa
     Quad z = quad3_dot(from, axis);
     Quad3 across = quad3_subtract(from, quad3_scale(axis, z));
     Quad3 normal = quad3_subtract(across, quad3_scale(axis, 2 * focal_length));
-    Quad off = quad3_length(across), bend = quad3_length(normal);
+    Quad off = quad3_length(across), curvature_radius = quad3_length(normal);
     bool finite = object->as.paraboloid.finite;
     Quad rim = finite ? 2 * quad_root(focal_length * height) : 2 * focal_length;
     Quad3 middle = quad3_add(apex, quad3_scale(axis, finite ? height / 2 : 0));
     surface_measure(surface, quad3_rounded(middle), (double)diagonal(rim, height / 2), (double)rim);
-    Quad beyond = finite && z > height ? (z - height) * bend / off : 0;
-    surface_add(surface, diagonal((off * off - 4 * focal_length * z) / (2 * bend), beyond),
-                quad3_scale(normal, 1 / bend), bend);
+    Quad beyond = finite && z > height ? (z - height) * curvature_radius / off : 0;
+    surface_add(surface, diagonal((off * off - 4 * focal_length * z) / (2 * curvature_radius), beyond),
+                quad3_scale(normal, 1 / curvature_radius), curvature_radius);
     if (finite && object->as.paraboloid.caps)
         surface_add(surface, diagonal(z - height, outside(off, 0, rim)), axis, UNBOUNDED);
 }
@@ -707,7 +713,7 @@ ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray)
 
 ReferenceSurface reference_surface(const Object *object, Quad3 point)
 {
-    ReferenceSurface surface = {.condition = 1};
+    ReferenceSurface surface = {.normal_condition = 1};
     shapes[object->kind].surface(object, point, &surface);
     return surface;
 }

@@ -19,11 +19,11 @@ typedef struct {
     bool found;
     uint32_t object; // UINT32_MAX: a miss
     Quad t;
-    Quad3 normal;         // of the geometry, unit, facing the ray
-    Quad3 shading_normal; // on the same side; differs on smooth triangles
-    bool entering;        // the ray runs against the outward normal: of a triangle, that of its winding
-    Quad cosine;          // of the angle between normal and ray, 0 .. 1
-    Quad bend; // how far one moves along the surface to turn the normal by about a radian; LDBL_MAX if flat
+    Quad3 normal;          // of the geometry, unit, facing the ray
+    Quad3 shading_normal;  // on the same side; differs on smooth triangles
+    bool entering;         // the ray runs against the outward normal: of a triangle, that of its winding
+    Quad cosine;           // of the angle between normal and ray, 0 .. 1
+    Quad curvature_radius; // LDBL_MAX if flat
     // About twice the distance, in scene units, between the ray's line and the nearest curve at which the
     // answer changes (silhouette, rim, edge, apex), or between two surfaces that compete. Never larger than
     // it is at the boundary that matters; other boundaries may make it smaller. For a sphere it is r |1 -
@@ -49,16 +49,21 @@ Quad3 reference_point(const ReferenceRay *ray, Quad t);
 // A part of a surface as seen from a point: the nearest place of it.
 typedef struct {
     Quad distance;
-    Quad3 normal; // unit, outward or inward
-    Quad bend;    // as of a hit
+    Quad3 normal;          // unit, outward or inward
+    Quad curvature_radius; // LDBL_MAX if flat
 } ReferenceSheet;
 
 // The parts that an object's surface consists of, and the measures that tolerances refer to.
 typedef struct {
     Vector3 center;
-    double size;      // radius around the center, 0 if unbounded; of an infinite cylinder its radius
-    double radius;    // of what a ray may just miss: of a torus its tube's, 0 of a plane
-    double condition; // of the normal: how many roundings it turns by when the object's numbers are rounded
+    // Around the center, 0 if unbounded; of an infinite cylinder its radius. For the bounds of t and of
+    // points.
+    double bounding_radius;
+    // The smallest radius that decides hit or miss: of a torus its tube's, 0 of a plane. For the band in
+    // which these are open.
+    double feature_radius;
+    // How many roundings the normal turns by when the object's numbers are rounded. For the bound of normals.
+    double normal_condition;
     int count;
     ReferenceSheet sheets[6];
 } ReferenceSurface;

@@ -46,7 +46,7 @@ VerifyCheck verify_scaled_scenes;    // R6
 VerifyCheck verify_mirrored_scenes;  // R7
 VerifyCheck verify_degenerate_views; // R8
 
-static inline bool verify_is_wide(const VerifyRun *run)
+static inline bool verify_is_double(const VerifyRun *run)
 {
     return run->tier == TIER_D;
 }

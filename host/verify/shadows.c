@@ -1,6 +1,6 @@
 // Images of shadows: none where nothing stands in the light, and none missing.
 #include "host/base/array.h"
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -81,7 +81,7 @@ void verify_thin_plate(VerifyRun *run)
 
 // Counts a pixel that does not show the nearest of plane 0 and sphere 1. The sphere's rim, and where the two
 // are equally far, are open.
-static void judge_nearest(VerifyRun *run, uint32_t object, const ReferenceHit *plane,
+static void check_nearest(VerifyRun *run, uint32_t object, const ReferenceHit *plane,
                           const ReferenceHit *sphere)
 {
     const double open = 1e-5;
@@ -118,7 +118,7 @@ void verify_contact_shadow(VerifyRun *run)
             bool dark = image.shadow[i];
             ReferenceHit plane = verify_pixel_hit(&targets[0], &image, i);
             ReferenceHit sphere = verify_pixel_hit(&targets[1], &image, i);
-            judge_nearest(run, image.object[i], &plane, &sphere);
+            check_nearest(run, image.object[i], &plane, &sphere);
             if (image.object[i] == 0 && plane.found) {
                 Vector3 p = quad3_rounded(quad3_subtract(quad3_scale(direction, plane.t), ground));
                 double radius = hypot(p.x, p.z);

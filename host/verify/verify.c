@@ -11,12 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CHECKS_LARGEST = 3 };
+enum { CHECKS_MAX = 3 };
 
 // Each has the tables of its name, and its own checks.
 static const struct {
     const char *name, *title;
-    VerifyCheck *checks[CHECKS_LARGEST];
+    VerifyCheck *checks[CHECKS_MAX];
 } cases[] = {
     {"S1", "sphere, from 100 to a million radii away", {0}},
     {"S2", "sphere seen from up to 10,000 radii away", {verify_far_fringe}},
@@ -65,14 +65,14 @@ static const struct {
 
 bool verify_holds(const VerifyResult *result)
 {
-    return result->wrong + result->leaks + result->unsound + result->off + result->turned +
+    return result->wrong + result->leaks + result->unsound + result->off_surface + result->wrong_normals +
                result->differing ==
            0;
 }
 
 double verify_roundoff(const VerifyRun *run)
 {
-    return verify_is_wide(run) ? 0x1p-53 : 0x1p-24;
+    return verify_is_double(run) ? 0x1p-53 : 0x1p-24;
 }
 
 double verify_ulp(const VerifyRun *run, double value)
@@ -84,9 +84,9 @@ double verify_ulp(const VerifyRun *run, double value)
 
 double verify_rounded(const VerifyRun *run, double value)
 {
-    if (verify_is_wide(run)) return value;
-    volatile float narrow = (float)value; // keeps the rounding, as in host/compile/flatten.c
-    return narrow;
+    if (verify_is_double(run)) return value;
+    volatile float single = (float)value; // volatile: see host/compile/rounding.c
+    return single;
 }
 
 void verify_round_ray(const VerifyRun *run, TraceRay *ray)
@@ -96,7 +96,7 @@ void verify_round_ray(const VerifyRun *run, TraceRay *ray)
         ray->direction[axis] = verify_rounded(run, ray->direction[axis]);
     }
     ray->tmin = verify_rounded(run, ray->tmin);
-    ray->tmax = fmin(ray->tmax, verify_is_wide(run) ? DBL_MAX : (double)FLT_MAX);
+    ray->tmax = fmin(ray->tmax, verify_is_double(run) ? DBL_MAX : (double)FLT_MAX);
 }
 
 static bool is_finite(const double vector[3])
@@ -345,7 +345,7 @@ VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const
                          .kernels = &kernels};
         for (size_t k = 0; k < verify_rays_count; k++)
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
-        for (size_t k = 0; k < CHECKS_LARGEST && cases[i].checks[k]; k++)
+        for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
         if (!sink(context, &result)) break;
     }

@@ -33,14 +33,14 @@ typedef struct {
     size_t wrong;     // hits that should be misses, misses that should be hits, the wrong object, t or place
     size_t leaks;     // misses of what is closed
     size_t unsound;   // no numbers, hits behind the ray's start, normals that are not unit
-    size_t off;       // hits whose point is farther from the surface than it may be
-    size_t turned;    // normals that are not the surface's
-    size_t differing; // answers whose bits depend on what they must not depend on
-    double worst, bound; // the error that is the largest part of its bound; 0, 0: none
-    const char *unit;    // of both
-    // The largest of those two errors, as a part of its bound.
-    double surface_part, normal_part;
-    uint64_t hash; // of every answer's bits, in order
+    size_t off_surface;   // hits whose point is farther from the surface than it may be
+    size_t wrong_normals; // normals that are not the surface's
+    size_t differing;     // answers whose bits depend on what they must not depend on
+    double worst, bound;  // the error that is the largest part of its bound; 0, 0: none
+    const char *unit;     // of both
+    double worst_position_ratio,
+        worst_normal_ratio; // the largest errors of points and normals over their bounds
+    uint64_t hash;          // of every answer's bits, in order
 } VerifyResult;
 
 bool verify_holds(const VerifyResult *result);

@@ -39,7 +39,7 @@ static void compare(VerifyRun *run, const Film *a, const Film *b)
 }
 
 // Where `up` says nothing the world axis least aligned with the view stands in for it.
-static void judge_views_without_up(VerifyRun *run)
+static void check_views_without_up(VerifyRun *run)
 {
     static const struct {
         Vector3 eye, look_at, axis;
@@ -65,7 +65,7 @@ static void judge_views_without_up(VerifyRun *run)
 }
 
 // Straight down on the tiles: each pixel has the color of the tile that it sees.
-static void judge_tiles(VerifyRun *run)
+static void check_tiles(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, eye = {0.3, 5, 0.4}, below = {0.3, 0, 0.4}, up = {0, 1, 0};
     Film image = view(run, here, eye, below, up, 60);
@@ -85,7 +85,7 @@ static void judge_tiles(VerifyRun *run)
 }
 
 // From nearly no field of view to nearly all there is, far from the origin, and a single pixel.
-static void judge_extremes(VerifyRun *run)
+static void check_extremes(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, far = {1e7, -1e7, 2e7}, up = {0, 1, 0}, eye = {2, 4, 6};
     static const double fovs[] = {1e-3, 179.9};
@@ -111,7 +111,7 @@ static void judge_extremes(VerifyRun *run)
 
 void verify_degenerate_views(VerifyRun *run)
 {
-    judge_views_without_up(run);
-    judge_tiles(run);
-    judge_extremes(run);
+    check_views_without_up(run);
+    check_tiles(run);
+    check_extremes(run);
 }

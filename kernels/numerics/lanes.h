@@ -22,7 +22,7 @@ typedef long scalar_integer;
 #define UNIT_ROUNDOFF    0x1p-53
 #define INFINITY_BITS    0x7ff0000000000000L
 #define LARGEST          DBL_MAX
-#define INTEGER_LARGEST  0x7fffffffffffffffL
+#define INTEGER_MAX      0x7fffffffffffffffL
 #define scalar_from_bits as_double
 #define SMALLEST_RATIO   0x1p-1000
 #else
@@ -34,7 +34,7 @@ typedef int scalar_integer;
 #define UNIT_ROUNDOFF    0x1p-24f
 #define INFINITY_BITS    0x7f800000
 #define LARGEST          FLT_MAX
-#define INTEGER_LARGEST  0x7fffffff
+#define INTEGER_MAX      0x7fffffff
 #define scalar_from_bits as_float
 #define SMALLEST_RATIO   0x1p-120f
 #endif
@@ -303,8 +303,8 @@ static inline scalar lanes_largest(mask members, real a)
     // as integers the bits of negative reals order in reverse
     const uint sign = 8 * sizeof(scalar) - 1;
     integer bits = bits_from_real(lanes_select(members, -a, (real)(LARGEST)));
-    scalar_integer least = lanes_smallest(bits ^ ((bits >> sign) & (integer)(INTEGER_LARGEST)));
-    return -scalar_from_bits(least ^ ((least >> sign) & INTEGER_LARGEST));
+    scalar_integer least = lanes_smallest(bits ^ ((bits >> sign) & (integer)(INTEGER_MAX)));
+    return -scalar_from_bits(least ^ ((least >> sign) & INTEGER_MAX));
 }
 
 // Prefetches memory that will soon be read, by cache line. PoCL's own prefetch does nothing.

@@ -129,7 +129,7 @@ static inline Color3 object_color(const Scene *scene, uint4 entry, const Materia
         mask odd = checker_odd(scene, entry.x, entry.y, &hit->point, ray, material->grid);
         color = vector_select(odd, vector_of(material->other_color), color);
     }
-    if (HAS_IMAGES && material->image.x > 0) {
+    if (HAS_IMAGES && material->texture.x > 0) {
         TextureCoordinates coordinates =
             entry.x == KIND_TRIANGLES ? hit->coordinates
                                       : texture_coordinates(scene, entry.x, entry.y, material, &hit->point);

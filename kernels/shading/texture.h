@@ -60,7 +60,7 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ki
     if (HAS_SPHERES && kind == KIND_SPHERES) {
         Sphere sphere = scene->spheres[index];
         return sphere_texture_coordinates(&sphere, point->normal,
-                                          scene->texture_levels[material->image.x - 1].place);
+                                          scene->texture_levels[material->texture.x - 1].place);
     }
     GridCoordinates grid = grid_coordinates(scene, kind, index, point->position);
     return (TextureCoordinates){grid.u, grid.v, (real)(material->reflection_transmission_ior.w)};
@@ -114,10 +114,10 @@ static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, sca
 
 // `footprint`: the pixel's width in texels of the full texture. Colors are linear in it between the levels
 // for 2^n and 2^(n + 1) texels.
-static inline scalar4 texture_filtered(const Scene *scene, uint4 image, scalar u, scalar v, scalar footprint,
-                                       bool repeats_upward)
+static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar u, scalar v,
+                                       scalar footprint, bool repeats_upward)
 {
-    uint level = image.x - 1, last = level + image.y - 1;
+    uint level = texture.x - 1, last = level + texture.y - 1;
     scalar part = 0;
     if (footprint > 1) {
         int exponent;
@@ -147,7 +147,7 @@ static inline Vector texture_color(const Scene *scene, uint kind, const Material
         if (lanes.each[lane] == 0) continue;
         bool is_sphere = kind == KIND_SPHERES;
         scalar up = is_sphere ? v.each[lane] : repeated(v.each[lane]);
-        scalar4 color = texture_filtered(scene, material->image, repeated(u.each[lane]), up,
+        scalar4 color = texture_filtered(scene, material->texture, repeated(u.each[lane]), up,
                                          footprint.each[lane], !is_sphere);
         red.each[lane] = color.x;
         green.each[lane] = color.y;

@@ -34,7 +34,7 @@ typedef struct {
 
 // The lane minima that bounds are made of: of |1 / direction|, its negative, near and the negative limit; and
 // of the origins and their negatives along the direction.
-enum { BOUNDS_LEAST, BOUNDS_MOST = 3, BOUNDS_NEAR = 6, BOUNDS_LIMIT };
+enum { BOUNDS_MIN, BOUNDS_MAX = 3, BOUNDS_NEAR = 6, BOUNDS_LIMIT };
 enum { BOUNDS_START, BOUNDS_END = 3, BOUNDS_UNUSED = 6 };
 typedef struct {
     LaneMinima rays, origins;
@@ -44,15 +44,15 @@ static inline void axis_bounds_gather(BoundsMinima *minima, uint axis, mask memb
                                       real inverse, real slack, bool negative)
 {
     const real none = (real)(LARGEST), side = (real)(negative ? -1 : 1);
-    minima->rays.all[BOUNDS_LEAST + axis] = lanes_select(members, fabs(inverse), none);
-    minima->rays.all[BOUNDS_MOST + axis] = lanes_select(members, -fabs(inverse), none);
+    minima->rays.all[BOUNDS_MIN + axis] = lanes_select(members, fabs(inverse), none);
+    minima->rays.all[BOUNDS_MAX + axis] = lanes_select(members, -fabs(inverse), none);
     minima->origins.all[BOUNDS_START + axis] = lanes_select(members, real_fma(origin, -side, -slack), none);
     minima->origins.all[BOUNDS_END + axis] = lanes_select(members, real_fma(origin, side, -slack), none);
 }
 
 static inline AxisBounds axis_bounds(const BoundsMinima *minima, uint axis, bool negative, scalar everywhere)
 {
-    scalar least = minima->rays.each[BOUNDS_LEAST + axis], most = -minima->rays.each[BOUNDS_MOST + axis];
+    scalar least = minima->rays.each[BOUNDS_MIN + axis], most = -minima->rays.each[BOUNDS_MAX + axis];
     scalar start = minima->origins.each[BOUNDS_START + axis], end = minima->origins.each[BOUNDS_END + axis];
     const scalar side = negative ? -1 : 1;
     return (AxisBounds){side * least, side * most, start * least - everywhere, everywhere - end * most};
@@ -218,15 +218,15 @@ static inline void visit_node(TraversalStack *stack, const Scene *scene, global 
 // Traverses the BVH with a group; visits what any of its active lanes intersects.
 static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
 {
-    StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, (ushort)group->active, group->bounds.near};
+    StackEntry entries[STACK_MAX], next = {0, BVH_NODE, (ushort)group->active, group->bounds.near};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         uint lanes = next.lanes & group->active;
         if (next.near <= group->largest_limit && lanes != 0) {
-            if (next.what == BVH_NODE) {
+            if (next.leaf_info == BVH_NODE) {
                 visit_node(&stack, scene, &scene->nodes[next.first], group, lanes);
             } else {
-                intersect_leaf(traversal, scene, ray, next.what, next.first);
+                intersect_leaf(traversal, scene, ray, next.leaf_info, next.first);
                 group->active = lanes_bits(traversal->active);
                 if (group->active == 0) return;
                 group->limit = traversal_limit(traversal);

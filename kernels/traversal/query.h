@@ -18,22 +18,22 @@ typedef struct {
     integer optical_depth; // for OCCLUSION, of the objects hit so far
 } Traversal;
 
-// Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_LARGEST is that of opaque objects.
+// Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_MAX is that of opaque objects.
 #if IS_DOUBLE
-#define OPTICAL_DEPTH_STEPS   0x1p48
-#define LN_2                  0x1.62e42fefa39efp-1
-#define OPTICAL_DEPTH_LARGEST 0x7f000000000000L
+#define OPTICAL_DEPTH_STEPS 0x1p48
+#define LN_2                0x1.62e42fefa39efp-1
+#define OPTICAL_DEPTH_MAX   0x7f000000000000L
 #else
-#define OPTICAL_DEPTH_STEPS   0x1p24f
-#define LN_2                  0x1.62e43p-1f
-#define OPTICAL_DEPTH_LARGEST OPAQUE
+#define OPTICAL_DEPTH_STEPS 0x1p24f
+#define LN_2                0x1.62e43p-1f
+#define OPTICAL_DEPTH_MAX   OPAQUE
 #endif
 
 static inline integer object_optical_depth(const Scene *scene, uint id)
 {
     uint4 steps = scene->materials[scene->objects[id].kind_index_material.z].optical_depth;
 #if IS_DOUBLE
-    return (integer)(steps.x == OPAQUE ? OPTICAL_DEPTH_LARGEST : upsample(as_int(steps.z), steps.y));
+    return (integer)(steps.x == OPAQUE ? OPTICAL_DEPTH_MAX : upsample(as_int(steps.z), steps.y));
 #else
     return (integer)((scalar_integer)steps.x);
 #endif
@@ -52,7 +52,7 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
         return;
     }
     integer optical_depth = object_optical_depth(scene, id);
-    const integer largest = (integer)(OPTICAL_DEPTH_LARGEST);
+    const integer largest = (integer)(OPTICAL_DEPTH_MAX);
     integer saturated_sum = lanes_select(traversal->optical_depth < largest - optical_depth,
                                          traversal->optical_depth + optical_depth, largest);
     traversal->optical_depth = lanes_select(found, saturated_sum, traversal->optical_depth);

@@ -30,14 +30,14 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     scalar limit = traversal_limit(traversal);
     if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, limit)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
-    StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, 1, box_ray.near};
+    StackEntry entries[STACK_MAX], next = {0, BVH_NODE, 1, box_ray.near};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.near <= limit) {
-            if (next.what == BVH_NODE) {
+            if (next.leaf_info == BVH_NODE) {
                 visit_node(&stack, scene, &scene->nodes[next.first], &box_ray, octant, limit);
             } else {
-                intersect_leaf(traversal, scene, ray, next.what, next.first);
+                intersect_leaf(traversal, scene, ray, next.leaf_info, next.first);
                 if (!traversal->active) return;
                 limit = traversal_limit(traversal);
             }

@@ -7,14 +7,14 @@
 
 // A pending child. Kept small: a GPU may reserve the whole stack for each thread.
 typedef struct {
-    uint first;   // the node, or the leaf's first primitive
-    ushort what;  // BVH_NODE, or a leaf
-    ushort lanes; // whose rays intersect its box, as bits
-    scalar near;  // its entry distance
+    uint first;       // the node, or the leaf's first primitive
+    ushort leaf_info; // BVH_NODE, or a leaf
+    ushort lanes;     // whose rays intersect its box, as bits
+    scalar near;      // its entry distance
 } StackEntry;
 
 // A visit replaces a node by at most BVH_WIDTH children.
-#define STACK_LARGEST ((BVH_WIDTH - 1) * BVH_DEPTH_LARGEST + 1)
+#define STACK_MAX ((BVH_WIDTH - 1) * BVH_DEPTH_MAX + 1)
 
 // `entries` is an array of its own, so that the count stays in a register.
 typedef struct {
@@ -25,13 +25,13 @@ typedef struct {
     bool farthest_first;
 } TraversalStack;
 
-static inline void entry_prefetch(const Scene *scene, uint first, uint what)
+static inline void entry_prefetch(const Scene *scene, uint first, uint leaf_info)
 {
-    if (what == BVH_NODE)
+    if (leaf_info == BVH_NODE)
         memory_prefetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
-    else if (HAS_TRIANGLES && (what & 0xff) == KIND_TRIANGLES)
+    else if (HAS_TRIANGLES && (leaf_info & 0xff) == KIND_TRIANGLES)
         memory_prefetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
-    else if (HAS_SPHERES && (what & 0xff) == KIND_SPHERES)
+    else if (HAS_SPHERES && (leaf_info & 0xff) == KIND_SPHERES)
         memory_prefetch((global const char *)&scene->spheres[first], sizeof(Sphere));
 }
 
@@ -46,9 +46,10 @@ static inline void stack_push_child(TraversalStack *stack, uint bottom, const Sc
         if (stack->farthest_first ? below.near <= near : below.near >= near) break;
         stack->entries[slot] = below;
     }
-    uint first = ((global const uint *)node->first)[child], what = ((global const uint *)node->what)[child];
-    stack->entries[slot] = (StackEntry){first, (ushort)what, (ushort)lanes, near};
-    entry_prefetch(scene, first, what);
+    uint first = ((global const uint *)node->first)[child],
+         leaf_info = ((global const uint *)node->leaf_info)[child];
+    stack->entries[slot] = (StackEntry){first, (ushort)leaf_info, (ushort)lanes, near};
+    entry_prefetch(scene, first, leaf_info);
 }
 
 #endif

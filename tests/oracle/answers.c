@@ -6,7 +6,7 @@
 //
 // SAMPLES: how many random rays at each random object; FURTHER: the last ray, without an answer, to print of
 // each family that is closed. A line is a JSON object: a set's name, then its objects, then its rays.
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 #include "tests/random_ray.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,9 +33,9 @@ static const char *json_of(bool value)
     return value ? "true" : "false";
 }
 
-static void set_print(const char *name, bool wide)
+static void set_print(const char *name, bool is_double)
 {
-    printf("{\"set\": \"%s\", \"wide\": %s}\n", name, json_of(wide));
+    printf("{\"set\": \"%s\", \"wide\": %s}\n", name, json_of(is_double));
 }
 
 static void flags_print(bool finite, bool caps)
@@ -86,9 +86,9 @@ static void hit_print(const ReferenceHit *hit)
 
 // The nearest hit, and what the tiers leave open and allow; where nothing is hit, of the object that is
 // missed by the least.
-static void judged_print(bool wide, const Object *objects, size_t count, const VerifyJudgedRay *judged)
+static void test_ray_print(bool is_double, const Object *objects, size_t count, const VerifyTestRay *test)
 {
-    ReferenceRay ray = verify_reference_ray(&judged->ray);
+    ReferenceRay ray = verify_reference_ray(&test->ray);
     size_t nearest = 0;
     ReferenceHit hit = reference_hit_object(&objects[0], &ray);
     for (size_t i = 1; i < count; i++) {
@@ -98,38 +98,38 @@ static void judged_print(bool wide, const Object *objects, size_t count, const V
         nearest = i;
         hit = other;
     }
-    ray_print(&judged->ray);
+    ray_print(&test->ray);
     hit_print(&hit);
     printf(", \"object\": %zu, \"tiers\": {", nearest);
-    for (VerifyTier tier = wide ? TIER_D : TIER_A; tier <= (wide ? TIER_D : TIER_C); tier++) {
+    for (VerifyTier tier = is_double ? TIER_D : TIER_A; tier <= (is_double ? TIER_D : TIER_C); tier++) {
         const VerifyRun run = {.tier = tier};
-        VerifyExpected expected = verify_expected(&run, &objects[nearest], judged, hit);
+        VerifyExpected expected = verify_expected(&run, &objects[nearest], test, hit);
         printf("%s\"%c\": {\"open\": %s, \"decided\": %s, \"touch\": %s, \"bound\": %.17g}",
                tier % TIER_D > 0 ? ", " : "", 'A' + (int)tier, json_of(expected.open),
-               json_of(verify_is_decided(&run, judged)), json_of(expected.exact.found && !hit.found),
+               json_of(verify_is_decided(&run, test)), json_of(expected.exact.found && !hit.found),
                fmin(expected.bound, DBL_MAX));
     }
     printf("}}\n");
 }
 
-static void case_print(const VerifyRays *set, bool wide, size_t further)
+static void case_print(const VerifyRays *set, bool is_double, size_t further)
 {
-    const VerifyRun run = {.tier = wide ? TIER_D : TIER_C};
+    const VerifyRun run = {.tier = is_double ? TIER_D : TIER_C};
     Scene scene = verify_rays_scene(set);
     Object *objects = verify_objects(&run, &scene);
-    VerifyJudgedRays judged = verify_rays_judged(&run, set);
-    set_print(set->name, wide);
+    VerifyTestRays tests = verify_test_rays(&run, set);
+    set_print(set->name, is_double);
     for (size_t i = 0; i < scene.objects.count; i++)
         object_print(&objects[i]);
-    for (size_t i = 0; i < judged.count; i++)
-        judged_print(wide, objects, scene.objects.count, &judged.items[i]);
-    for (size_t i = judged.count; set->closed && i < further; i++) {
+    for (size_t i = 0; i < tests.count; i++)
+        test_ray_print(is_double, objects, scene.objects.count, &tests.items[i]);
+    for (size_t i = tests.count; set->closed && i < further; i++) {
         TraceRay ray = set->family(i);
         verify_round_ray(&run, &ray);
         ray_print(&ray);
         printf("}\n");
     }
-    free(judged.items);
+    free(tests.items);
     free(objects);
     scene_free(&scene);
 }
@@ -159,9 +159,9 @@ int main(int argument_count, char **arguments)
     size_t samples = argument_count > 1 ? strtoul(arguments[1], NULL, 10) : 0;
     size_t further = argument_count > 2 ? strtoul(arguments[2], NULL, 10) : 0;
     for (size_t i = 0; i < verify_rays_count; i++)
-        for (int wide = 0; wide < 2; wide++)
-            case_print(&verify_rays[i], wide, further);
-    ShapeForm forms[SHAPE_FORMS_LARGEST];
+        for (int is_double = 0; is_double < 2; is_double++)
+            case_print(&verify_rays[i], is_double, further);
+    ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     for (size_t i = 0; i < form_count && samples > 0; i++)
         shapes_print(&forms[i], i, samples);

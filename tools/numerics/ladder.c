@@ -78,8 +78,8 @@ static Vector3 vector_from(const double parts[3])
 static RandomRay ladder_ray(const RandomShape *aim, double rung, Random *random)
 {
     Vector3 out = vector_normalize(random_in_sphere(random));
-    Vector3 eye = vector_add(aim->center, vector_scale(out, rung * aim->reach));
-    Vector3 target = vector_add(aim->center, vector_scale(random_in_sphere(random), 1.02 * aim->reach));
+    Vector3 eye = vector_add(aim->center, vector_scale(out, rung * aim->radius));
+    Vector3 target = vector_add(aim->center, vector_scale(random_in_sphere(random), 1.02 * aim->radius));
     return (RandomRay){eye, vector_normalize(vector_subtract(target, eye))};
 }
 
@@ -90,7 +90,7 @@ static void rays_free(Rays *rays)
     free(rays->answers);
 }
 
-static Rays rays_make(const Object *object, const RandomShape *aim, double rung, size_t count, bool wide,
+static Rays rays_make(const Object *object, const RandomShape *aim, double rung, size_t count, bool is_double,
                       Random *random)
 {
     Rays rays = {memory_allocate(count + 1, sizeof(TraceRay)),
@@ -98,8 +98,8 @@ static Rays rays_make(const Object *object, const RandomShape *aim, double rung,
                  memory_allocate(count + 1, sizeof(TraceHit)), count};
     for (size_t i = 0; i < count; i++) {
         RandomRay given = ladder_ray(aim, rung, random);
-        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
-                                : reference_ray_rounded(given.origin, given.direction);
+        ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
+                                     : reference_ray_rounded(given.origin, given.direction);
         rays.rays[i] = (TraceRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
                                   {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
                                   (double)ray.tmin,
@@ -145,10 +145,10 @@ static void tally_add(Tally *tally, const RandomShape *aim, const Rays *rays, si
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
-    double distance = vector_length(vector_subtract(origin, aim->center)) + aim->reach;
-    // a plane may be hit far beyond the reach
+    double distance = vector_length(vector_subtract(origin, aim->center)) + aim->radius;
+    // a plane may be hit far beyond the radius
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
-    double scale = u * (tier->of_size ? aim->reach : distance);
+    double scale = u * (tier->of_size ? aim->radius : distance);
     // flat shapes have no compensated edges; a triangle's are open below 16 u of edge and distance
     double flat = aim->object.kind == SHAPE_TRIANGLE ? 16 : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
@@ -215,8 +215,8 @@ static double trace_seconds(Renderer *renderer, const Rays *rays)
 // A shape's test costs what a scene with 64 more copies of it takes longer, for rays of all rungs.
 static double test_seconds(Compute *compute, const RandomShape *aim, Precision precision)
 {
-    bool wide = precision == PRECISION_DOUBLE;
-    Object object = wide ? aim->object : reference_round_object(&aim->object);
+    bool is_double = precision == PRECISION_DOUBLE;
+    Object object = is_double ? aim->object : reference_round_object(&aim->object);
     Rays all = {memory_allocate(TIMED_RAYS, sizeof(TraceRay)), NULL,
                 memory_allocate(TIMED_RAYS, sizeof(TraceHit)), 0};
     Random random = {2};
@@ -281,8 +281,8 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
 }
 
 // One shape on one rung: each precision of the same width on the same rays. True if all kept to their tiers.
-static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, const LadderOptions *options,
-                     Json *json)
+static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool is_double,
+                     const LadderOptions *options, Json *json)
 {
     size_t count = options->ray_count / (RUNG_COUNT * INSTANCES) + 1;
     Tally tallies[PRECISION_COUNT] = {0};
@@ -293,10 +293,11 @@ static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, 
     }
     for (int which = 0; which < INSTANCES; which++) {
         const RandomShape *aim = &shape->instances[which];
-        Object object = wide ? aim->object : reference_round_object(&aim->object);
-        Rays rays = rays_make(&object, aim, rungs[rung], count, wide, &random);
+        Object object = is_double ? aim->object : reference_round_object(&aim->object);
+        Rays rays = rays_make(&object, aim, rungs[rung], count, is_double, &random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-            if (!(options->precisions >> precision & 1) || wide != (precision == PRECISION_DOUBLE)) continue;
+            if (!(options->precisions >> precision & 1) || is_double != (precision == PRECISION_DOUBLE))
+                continue;
             shape_trace(shape, which, precision, compute, &object, &rays);
             for (size_t i = 0; i < count; i++)
                 tally_add(&tallies[precision], aim, &rays, i, precision);
@@ -379,8 +380,8 @@ int main(int argument_count, char **arguments)
         LadderShape shape = shape_make((ShapeKind)i);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
         for (int rung = 0; rung < RUNG_COUNT; rung++)
-            for (int wide = 0; wide < 2; wide++)
-                held &= rung_run(&compute, &shape, rung, wide, &options, json);
+            for (int is_double = 0; is_double < 2; is_double++)
+                held &= rung_run(&compute, &shape, rung, is_double, &options, json);
         shape_close(&shape);
     }
     json_end(json);

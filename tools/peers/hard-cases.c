@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TRIANGLES_LARGEST = 1 << 15 };
+enum { TRIANGLES_MAX = 1 << 15 };
 
 static void numbers_read(float *numbers, int count)
 {
@@ -50,8 +50,8 @@ static void round_add(RTCDevice device, RTCScene scene, enum RTCGeometryType typ
 
 // The triangles of one object, as one mesh.
 typedef struct {
-    float vertices[3 * TRIANGLES_LARGEST][3];
-    unsigned indices[TRIANGLES_LARGEST][3];
+    float vertices[3 * TRIANGLES_MAX][3];
+    unsigned indices[TRIANGLES_MAX][3];
     unsigned vertex_count, triangle_count;
 } Mesh;
 
@@ -127,7 +127,7 @@ int main(int argc, char **argv)
             round_add(device, scene, RTC_GEOMETRY_TYPE_CONE_LINEAR_CURVE, numbers, 2, NULL, object);
         } else if (strcmp(word, "triangle") == 0) {
             numbers_read(numbers, 9);
-            if (mesh.triangle_count == TRIANGLES_LARGEST) return 1;
+            if (mesh.triangle_count == TRIANGLES_MAX) return 1;
             unsigned *corners = mesh.indices[mesh.triangle_count++];
             for (int i = 0; i < 3; i++)
                 corners[i] = vertex_index(&mesh, &numbers[3 * i]);

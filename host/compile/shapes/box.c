@@ -33,10 +33,10 @@ static void box_randomize(RandomShape *made, unsigned form, Random *random)
     (void)form;
     Vector3 half = {random_between(random, 0.2, 1), random_between(random, 0.2, 1),
                     random_between(random, 0.2, 1)};
-    half = vector_scale(half, made->reach);
+    half = vector_scale(half, made->radius);
     made->object.as.box.min = vector_subtract(made->center, half);
     made->object.as.box.max = vector_add(made->center, half);
-    made->reach = vector_length(half);
+    made->radius = vector_length(half);
 }
 
 const ShapeOps box_ops = {

@@ -44,7 +44,7 @@ static void disc_randomize(RandomShape *made, unsigned form, Random *random)
     (void)form, (void)random;
     made->object.as.disc.center = made->center;
     made->object.as.disc.normal = made->axis;
-    made->object.as.disc.radius = made->reach;
+    made->object.as.disc.radius = made->radius;
 }
 
 const ShapeOps disc_ops = {

@@ -27,7 +27,7 @@ static double paraboloid_extent(double along, double across, double focal_length
 
 static Bounds paraboloid_bounds_of(Vector3 apex, Vector3 axis, double focal_length, double height)
 {
-    const Vector3 along = vector_normalize(axis), across = circle_reach(along);
+    const Vector3 along = vector_normalize(axis), across = circle_half_extents(along);
     const double f = focal_length, h = height;
     const Vector3 above = {paraboloid_extent(along.x, across.x, f, h),
                            paraboloid_extent(along.y, across.y, f, h),
@@ -58,7 +58,7 @@ static bool paraboloid_primitive_bounds(const void *primitive, Bounds *bounds)
     return true;
 }
 
-static double paraboloid_reach(const void *primitive)
+static double paraboloid_largest_coordinate(const void *primitive)
 {
     const Paraboloid *shape = primitive;
     return vector_largest(vector3_of(&shape->apex_k)) + shape->apex_k.w;
@@ -69,7 +69,7 @@ enum { PARABOLOID_CAPPED, PARABOLOID_OPEN, PARABOLOID_INFINITE };
 // A rim from a fifth to twice as wide as the paraboloid is high.
 static void paraboloid_randomize(RandomShape *made, unsigned form, Random *random)
 {
-    double height = made->reach * random_between(random, 0.5, 3);
+    double height = made->radius * random_between(random, 0.5, 3);
     double rim = height * random_between(random, 0.1, 1);
     made->axis = random_coin(random) ? random_world_axis(random) : vector_on_grid(random_unit_vector(random));
     Vector3 to_center = vector_scale(vector_normalize(made->axis), height / 2);
@@ -79,7 +79,7 @@ static void paraboloid_randomize(RandomShape *made, unsigned form, Random *rando
     made->object.as.paraboloid.height = height;
     made->object.as.paraboloid.finite = form != PARABOLOID_INFINITE;
     made->object.as.paraboloid.caps = form == PARABOLOID_CAPPED;
-    made->reach = hypot(height / 2, rim);
+    made->radius = hypot(height / 2, rim);
 }
 
 const ShapeOps paraboloid_ops = {
@@ -91,6 +91,6 @@ const ShapeOps paraboloid_ops = {
     .forms = {"capped paraboloid", "open paraboloid", "infinite paraboloid"},
     .randomize = paraboloid_randomize,
     .primitive_bounds = paraboloid_primitive_bounds,
-    .reach = paraboloid_reach,
+    .largest_coordinate = paraboloid_largest_coordinate,
     .test_flops = 50,
 };

@@ -23,7 +23,7 @@ static void plane_plane(const void *primitive, Vector3 *point, Vector3 *normal)
     *normal = vector3_of(&plane->normal);
 }
 
-static double plane_reach(const void *primitive)
+static double plane_largest_coordinate(const void *primitive)
 {
     const Plane *plane = primitive;
     return fabs(vector_dot(vector_normalize(vector3_of(&plane->normal)), vector3_of(&plane->point)));
@@ -44,6 +44,6 @@ const ShapeOps plane_ops = {
     .forms = {"plane"},
     .randomize = plane_randomize,
     .plane = plane_plane,
-    .reach = plane_reach,
+    .largest_coordinate = plane_largest_coordinate,
     .test_flops = 14,
 };

@@ -7,6 +7,7 @@ static Revolution revolution_make(const Rounding *rounding, Vector3 from, Vector
 {
     Vector3 base = point_from_eye(rounding, from);
     Vector3 axis = whole_axis;
+    // both ends are rounded as points, so that they stay where the points of other objects are rounded to
     if (finite) axis = vector_subtract(point_from_eye(rounding, vector_add(from, whole_axis)), base);
     Vector3 scaled = vector_rounded(rounding, axis_scaled(axis));
     double length = vector_length(scaled);
@@ -74,14 +75,14 @@ static bool revolution_bounds(const void *primitive, Bounds *bounds)
     double length = shape->range.y, radius = shape->base_radius.w / length;
     double height = shape->range.x / shape->range.z; // in units of the stored axis
     double end_radius = radius + shape->axis_slope.w * height * length;
-    Vector3 reach = circle_reach(vector_scale(axis, 1 / length));
-    *bounds = bounds_join(
-        bounds_around(base, vector_scale(reach, fabs(radius))),
-        bounds_around(vector_add(base, vector_scale(axis, height)), vector_scale(reach, fabs(end_radius))));
+    Vector3 half_extents = circle_half_extents(vector_scale(axis, 1 / length));
+    *bounds = bounds_join(bounds_around(base, vector_scale(half_extents, fabs(radius))),
+                          bounds_around(vector_add(base, vector_scale(axis, height)),
+                                        vector_scale(half_extents, fabs(end_radius))));
     return true;
 }
 
-static double revolution_reach(const void *primitive)
+static double revolution_largest_coordinate(const void *primitive)
 {
     const Revolution *shape = primitive;
     return vector_largest(vector3_of(&shape->base_radius)) + shape->base_radius.w / shape->range.y;
@@ -90,11 +91,11 @@ static double revolution_reach(const void *primitive)
 // A random axis and the two radii at its ends. Returns where it starts.
 static Vector3 random_axis(RandomShape *made, double radii[2], Random *random)
 {
-    double size = made->reach, length = size * random_between(random, 0.5, 3);
+    double size = made->radius, length = size * random_between(random, 0.5, 3);
     radii[0] = size * random_between(random, 0.2, 1);
     radii[1] = size * random_between(random, 0.2, 1);
     made->axis = vector_on_grid(vector_scale(random_unit_vector(random), length));
-    made->reach = hypot(length / 2, fmax(radii[0], radii[1]));
+    made->radius = hypot(length / 2, fmax(radii[0], radii[1]));
     return vector_on_grid(vector_subtract(made->center, vector_scale(made->axis, 0.5)));
 }
 
@@ -120,7 +121,7 @@ const ShapeOps cylinder_ops = {
     .forms = {"capped cylinder", "open cylinder", "infinite cylinder"},
     .randomize = cylinder_randomize,
     .primitive_bounds = revolution_bounds,
-    .reach = revolution_reach,
+    .largest_coordinate = revolution_largest_coordinate,
     .test_flops = 40,
 };
 
@@ -153,6 +154,6 @@ const ShapeOps cone_ops = {
     .forms = {"capped cone", "open cone", "pointed cone", "infinite cone"},
     .randomize = cone_randomize,
     .primitive_bounds = revolution_bounds,
-    .reach = revolution_reach,
+    .largest_coordinate = revolution_largest_coordinate,
     .test_flops = 50,
 };

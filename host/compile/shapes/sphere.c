@@ -32,7 +32,7 @@ static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
 {
     (void)form, (void)random;
     made->object.as.sphere.center = made->center;
-    made->object.as.sphere.radius = made->reach;
+    made->object.as.sphere.radius = made->radius;
 }
 
 const ShapeOps sphere_ops = {

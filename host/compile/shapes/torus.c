@@ -22,9 +22,10 @@ static void torus_flatten(Flattening *flattening, const Object *object)
 static bool torus_primitive_bounds(const void *primitive, Bounds *bounds)
 {
     const Torus *torus = primitive;
-    Vector3 reach = vector_scale(circle_reach(vector3_of(&torus->axis_minor)), torus->center_major.w);
-    *bounds =
-        bounds_around(vector3_of(&torus->center_major), vector_add(reach, vector_all(torus->axis_minor.w)));
+    Vector3 half_extents =
+        vector_scale(circle_half_extents(vector3_of(&torus->axis_minor)), torus->center_major.w);
+    *bounds = bounds_around(vector3_of(&torus->center_major),
+                            vector_add(half_extents, vector_all(torus->axis_minor.w)));
     return true;
 }
 
@@ -40,7 +41,7 @@ enum { TORUS, TORUS_THIN, TORUS_FAT, TORUS_SPINDLE };
 // axis.
 static void torus_randomize(RandomShape *made, unsigned form, Random *random)
 {
-    const double major = made->reach;
+    const double major = made->radius;
     double minor = major * random_between(random, 0.1, 0.6);
     if (form == TORUS_THIN) minor = major * 0.01;
     if (form == TORUS_FAT) minor = major * 0.9;
@@ -50,7 +51,7 @@ static void torus_randomize(RandomShape *made, unsigned form, Random *random)
     made->object.as.torus.axis = made->axis;
     made->object.as.torus.major = major;
     made->object.as.torus.minor = minor;
-    made->reach = major + minor;
+    made->radius = major + minor;
 }
 
 const ShapeOps torus_ops = {

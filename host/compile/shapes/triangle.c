@@ -29,7 +29,7 @@ static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Ve
     Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
             seen_c = point_from_eye(rounding, c);
     Vector3 ab = vector_subtract(seen_b, seen_a), ac = vector_subtract(seen_c, seen_a);
-    if (rounding->wide) { // the products of floats fit double, those of doubles may not
+    if (rounding->is_double) { // the products of floats fit double, those of doubles may not
         ab = axis_scaled(ab);
         ac = axis_scaled(ac);
     }
@@ -51,10 +51,10 @@ static uint32_t normals_add(Flattening *flattening, Vector3 a, Vector3 b, Vector
 // What a triangle's id.z holds.
 static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const uint32_t *corners, uint32_t material)
 {
-    uint32_t image = flattening->scene->materials.items[material].image;
-    if (!mesh->uvs || image == 0) return 0;
+    uint32_t texture = flattening->scene->materials.items[material].texture;
+    if (!mesh->uvs || texture == 0) return 0;
     TriangleUvs *uvs = flattening->compiled->arrays[FLAT_TRIANGLE_UVS].items;
-    uvs[flattening->uvs_count++] = triangle_uvs(mesh, corners, &flattening->compiled->textures[image - 1]);
+    uvs[flattening->uvs_count++] = triangle_uvs(mesh, corners, &flattening->compiled->textures[texture - 1]);
     return (uint32_t)flattening->uvs_count;
 }
 
@@ -116,7 +116,7 @@ static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
 {
     Vector3 *vertices = made->object.as.triangle.vertices, *normals = made->object.as.triangle.normals;
     for (int i = 0; i < 3; i++)
-        vertices[i] = vector_add(made->center, vector_scale(random_unit_vector(random), made->reach));
+        vertices[i] = vector_add(made->center, vector_scale(random_unit_vector(random), made->radius));
     made->axis = vector_subtract(vertices[1], vertices[0]);
     if (form != TRIANGLE_SMOOTH) return;
     Vector3 normal = vector_normalize(vector_cross(made->axis, vector_subtract(vertices[2], vertices[0])));

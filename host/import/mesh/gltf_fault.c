@@ -11,7 +11,7 @@
 #include <string.h>
 #include <strings.h>
 
-enum { LISTS_DEEPEST = 64, NODES_DEEPEST = 1000, NODES_MOST = 1000000 };
+enum { LIST_DEPTH_MAX = 64, NODE_DEPTH_MAX = 1000, NODES_MAX = 1000000 };
 
 static const size_t none = SIZE_MAX;
 
@@ -29,9 +29,9 @@ typedef enum { KEY_OTHER, KEY_ESCAPED, KEY_NODES, KEY_SCENES, KEY_CHILDREN } Key
 // The JSON is read up to its first error, which assimp rejects.
 typedef struct {
     const char *at, *end;
-    size_t depth;                    // of nested lists and objects
-    size_t index[LISTS_DEEPEST + 1]; // current item at each depth
-    Key key[LISTS_DEEPEST + 1];      // last key at each depth
+    size_t depth;                     // of nested lists and objects
+    size_t index[LIST_DEPTH_MAX + 1]; // current item at each depth
+    Key key[LIST_DEPTH_MAX + 1];      // last key at each depth
     size_t node_count;
     Links children, scene_nodes;
     char *fault;
@@ -74,9 +74,9 @@ static bool string_is_faulty(Search *search)
 
 static bool opening_is_faulty(Search *search, char bracket)
 {
-    if (search->depth == LISTS_DEEPEST)
+    if (search->depth == LIST_DEPTH_MAX)
         return snprintf(search->fault, search->size, "lists and objects are nested more than %d deep",
-                        LISTS_DEEPEST) > 0;
+                        LIST_DEPTH_MAX) > 0;
     search->depth++;
     search->index[search->depth] = 0;
     search->key[search->depth] = KEY_OTHER;
@@ -124,13 +124,13 @@ static bool tree_is_faulty(Search *search, const size_t *parents, const size_t *
         size_t depth = 0;
         for (size_t above = node; above != none; above = parents[above]) {
             placed_count += named[above];
-            if (++depth > NODES_DEEPEST)
+            if (++depth > NODE_DEPTH_MAX)
                 return snprintf(search->fault, search->size,
-                                "nodes are nested more than %d deep, or in a circle", NODES_DEEPEST) > 0;
+                                "nodes are nested more than %d deep, or in a circle", NODE_DEPTH_MAX) > 0;
         }
-        if (placed_count > NODES_MOST)
+        if (placed_count > NODES_MAX)
             return snprintf(search->fault, search->size, "more than %d nodes, with those placed again",
-                            NODES_MOST) > 0;
+                            NODES_MAX) > 0;
     }
     return false;
 }

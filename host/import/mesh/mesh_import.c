@@ -18,7 +18,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-enum { MESH_TRIANGLES_LARGEST = 1 << 28, MESH_POLYGON_LARGEST = 1 << 14 };
+enum { MESH_TRIANGLES_MAX = 1 << 28, MESH_POLYGON_MAX = 1 << 14 };
 
 // Three rows of a matrix, the last column the translation.
 typedef struct {
@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     const struct aiMesh *mesh;
     Affine affine;
-} Placed;
+} MeshInstance;
 
 typedef struct {
     const MeshImport *import;
@@ -38,9 +38,9 @@ typedef struct {
     Scene *scene;
     const struct aiScene *file;
     struct {
-        Placed *items;
+        MeshInstance *items;
         size_t count, capacity;
-    } placed;
+    } instances;
     uint32_t *materials; // scene index of each of the file's materials; UINT32_MAX: not added yet
     struct {
         Vector3 *items;
@@ -165,7 +165,10 @@ static bool ply_open(Importer *importer)
     char fault[200];
     Text clean = {0};
     bool read = ply_read(&clean, importer->import->path, fault, sizeof fault);
-    if (read && clean.count > UINT_MAX) read = snprintf(fault, sizeof fault, "larger than 4 GiB") < 0;
+    if (read && clean.count > UINT_MAX) {
+        snprintf(fault, sizeof fault, "larger than 4 GiB");
+        read = false;
+    }
     if (read) importer->file = aiImportFileFromMemory(text_c(&clean), (unsigned)clean.count, 0, "ply");
     text_free(&clean);
     return read ? importer->file || import_fails(importer, "%s", aiGetErrorString())
@@ -196,7 +199,8 @@ static void node_place(Importer *importer, const struct aiNode *node, const Affi
     Affine affine = affine_multiply(parent, &own);
     for (unsigned i = 0; i < node->mNumMeshes; i++)
         if (node->mMeshes[i] < importer->file->mNumMeshes)
-            array_push(importer->placed, ((Placed){importer->file->mMeshes[node->mMeshes[i]], affine}));
+            array_push(importer->instances,
+                       ((MeshInstance){importer->file->mMeshes[node->mMeshes[i]], affine}));
     for (unsigned i = 0; i < node->mNumChildren; i++)
         node_place(importer, node->mChildren[i], &affine);
 }
@@ -206,12 +210,12 @@ static Vector3 vector_of(const struct aiVector3D *v)
     return (Vector3){v->x, v->y, v->z};
 }
 
-static bool is_ordinary(Vector3 v)
+static bool is_in_range(Vector3 v)
 {
-    return fabs(v.x) <= NUMBER_LARGEST && fabs(v.y) <= NUMBER_LARGEST && fabs(v.z) <= NUMBER_LARGEST;
+    return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
 }
 
-static void default_taken(const Importer *importer, const struct aiMaterial *material, const char *what)
+static void warn_default(const Importer *importer, const struct aiMaterial *material, const char *what)
 {
     struct aiString name = {0};
     aiGetMaterialString(material, AI_MATKEY_NAME, &name);
@@ -227,9 +231,9 @@ static Color color_of(const Importer *importer, const struct aiMaterial *materia
 {
     struct aiColor4D color;
     if (aiGetMaterialColor(material, key, type, index, &color) != aiReturn_SUCCESS) return otherwise;
-    if (is_ordinary((Vector3){color.r, color.g, color.b}))
+    if (is_in_range((Vector3){color.r, color.g, color.b}))
         return (Color){fmax(color.r, 0), fmax(color.g, 0), fmax(color.b, 0)};
-    default_taken(importer, material, "color");
+    warn_default(importer, material, "color");
     return otherwise;
 }
 
@@ -239,8 +243,8 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
     ai_real number;
     if (aiGetMaterialFloatArray(material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
         return otherwise;
-    if (fabs(number) <= NUMBER_LARGEST) return number >= 0 ? number : otherwise;
-    default_taken(importer, material, "number");
+    if (fabs(number) <= NUMBER_MAX) return number >= 0 ? number : otherwise;
+    warn_default(importer, material, "number");
     return otherwise;
 }
 
@@ -272,17 +276,17 @@ static uint32_t material_index(Importer *importer, unsigned index)
     return *known;
 }
 
-static void vertices_add(Importer *importer, const Placed *placed)
+static void vertices_add(Importer *importer, const MeshInstance *instance)
 {
-    const struct aiMesh *from = placed->mesh;
+    const struct aiMesh *from = instance->mesh;
     Mesh *mesh = &importer->mesh;
-    Affine for_normals = affine_for_normals(&placed->affine);
+    Affine for_normals = affine_for_normals(&instance->affine);
     for (unsigned i = 0; i < from->mNumVertices; i++) {
         size_t index = mesh->vertex_count + i;
-        mesh->vertices[index] = affine_point(&placed->affine, vector_of(&from->mVertices[i]));
+        mesh->vertices[index] = affine_point(&instance->affine, vector_of(&from->mVertices[i]));
         if (mesh->normals && from->mNormals) {
             Vector3 normal = vector_normalize(affine_direction(&for_normals, vector_of(&from->mNormals[i])));
-            mesh->normals[index] = is_ordinary(normal) ? normal : (Vector3){0, 0, 0};
+            mesh->normals[index] = is_in_range(normal) ? normal : (Vector3){0, 0, 0};
         }
         if (mesh->uvs && from->mTextureCoords[0]) {
             mesh->uvs[index][0] = from->mTextureCoords[0][i].x;
@@ -291,7 +295,7 @@ static void vertices_add(Importer *importer, const Placed *placed)
     }
 }
 
-// Tested before the transform, whose rounding would give an empty mesh a width.
+// Tested before the transform, whose rounding could give a degenerate triangle an area.
 static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
 {
     Vector3 a = vector_of(&mesh->mVertices[corners[0]]), b = vector_of(&mesh->mVertices[corners[1]]),
@@ -299,37 +303,40 @@ static bool face_has_area(const struct aiMesh *mesh, const unsigned corners[3])
     return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
 }
 
-// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
-static void triangle_add(Importer *importer, const Placed *placed, bool mirrored, const unsigned corners[3])
+// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side. Degenerate
+// triangles collapse to a point, which no ray hits.
+static void triangle_add(Importer *importer, const MeshInstance *instance, bool mirrored,
+                         const unsigned corners[3])
 {
     Mesh *mesh = &importer->mesh;
     uint32_t first = (uint32_t)mesh->vertex_count, *triangle = mesh->triangles[mesh->triangle_count];
-    bool has_area = face_has_area(placed->mesh, corners);
+    bool has_area = face_has_area(instance->mesh, corners);
     triangle[0] = first + corners[0];
     triangle[1] = has_area ? first + corners[mirrored ? 2 : 1] : triangle[0];
     triangle[2] = has_area ? first + corners[mirrored ? 1 : 2] : triangle[0];
     if (mesh->materials)
-        mesh->materials[mesh->triangle_count] = material_index(importer, placed->mesh->mMaterialIndex);
+        mesh->materials[mesh->triangle_count] = material_index(importer, instance->mesh->mMaterialIndex);
     mesh->triangle_count++;
 }
 
-// Triangulated from the second corner, so that the diagonal of a convex quadrilateral starts at the first. A
-// polygon without area becomes a fan.
-static void polygon_add(Importer *importer, const Placed *placed, bool mirrored, const struct aiFace *face)
+// Triangulated from the second corner, so that a convex quadrilateral is cut as a fan cuts it: by the
+// diagonal from the first. A polygon without area becomes a fan.
+static void polygon_add(Importer *importer, const MeshInstance *instance, bool mirrored,
+                        const struct aiFace *face)
 {
     const unsigned count = face->mNumIndices, *indices = face->mIndices;
     importer->corners.count = 0;
     for (unsigned i = 0; i < count; i++)
-        array_push(importer->corners, vector_of(&placed->mesh->mVertices[indices[(i + 1) % count]]));
+        array_push(importer->corners, vector_of(&instance->mesh->mVertices[indices[(i + 1) % count]]));
     PolygonTriangles *cut = &importer->cut;
     PolygonStatus status = polygon_triangulate(importer->corners.items, count, cut);
     importer->crossed_count += status == POLYGON_CROSSED;
     for (unsigned i = 0; i + 2 < count && status == POLYGON_WITHOUT_AREA; i++)
-        triangle_add(importer, placed, mirrored,
+        triangle_add(importer, instance, mirrored,
                      (const unsigned[3]){indices[0], indices[i + 1], indices[i + 2]});
     for (size_t i = 0; i < cut->count; i++) {
         const uint32_t *at = cut->items[i];
-        triangle_add(importer, placed, mirrored,
+        triangle_add(importer, instance, mirrored,
                      (const unsigned[3]){indices[(at[0] + 1) % count], indices[(at[1] + 1) % count],
                                          indices[(at[2] + 1) % count]});
     }
@@ -341,12 +348,12 @@ static bool corner_is_sound(Importer *importer, const struct aiMesh *from, unsig
     const Mesh *mesh = &importer->mesh;
     size_t index = mesh->vertex_count + vertex;
     char fault[100];
-    if (!is_ordinary(mesh->vertices[index])) {
+    if (!is_in_range(mesh->vertices[index])) {
         snprintf(fault, sizeof fault, "vertex %u (from 0) of '%.40s' is not finite or too large", vertex,
                  from->mName.data);
         return vertex_fails(importer, fault);
     }
-    if (mesh->uvs && !is_ordinary((Vector3){mesh->uvs[index][0], mesh->uvs[index][1], 0}))
+    if (mesh->uvs && !is_in_range((Vector3){mesh->uvs[index][0], mesh->uvs[index][1], 0}))
         return import_fails(
             importer, "a texture coordinate of vertex %u (from 0) of '%.40s' is not finite or too large",
             vertex, from->mName.data);
@@ -357,9 +364,9 @@ static bool face_is_sound(Importer *importer, const struct aiMesh *mesh, unsigne
 {
     const struct aiFace *face = &mesh->mFaces[number];
     char fault[100];
-    if (face->mNumIndices > MESH_POLYGON_LARGEST)
+    if (face->mNumIndices > MESH_POLYGON_MAX)
         return import_fails(importer, "face %u (from 0) has %u corners, more than %d", number,
-                            face->mNumIndices, MESH_POLYGON_LARGEST);
+                            face->mNumIndices, MESH_POLYGON_MAX);
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         if (face->mIndices[i] >= mesh->mNumVertices) {
             snprintf(fault, sizeof fault, "face %u (from 0) names vertex %u, which is not there", number,
@@ -371,10 +378,10 @@ static bool face_is_sound(Importer *importer, const struct aiMesh *mesh, unsigne
     return true;
 }
 
-static bool faces_add(Importer *importer, const Placed *placed)
+static bool faces_add(Importer *importer, const MeshInstance *instance)
 {
-    const struct aiMesh *from = placed->mesh;
-    bool mirrored = affine_determinant(&placed->affine) < 0;
+    const struct aiMesh *from = instance->mesh;
+    bool mirrored = affine_determinant(&instance->affine) < 0;
     if (importer->materials && from->mMaterialIndex >= importer->file->mNumMaterials)
         return import_fails(importer, "material %u (from 0) is not there", from->mMaterialIndex);
     for (unsigned i = 0; i < from->mNumFaces; i++) {
@@ -382,9 +389,9 @@ static bool faces_add(Importer *importer, const Placed *placed)
         if (face->mNumIndices < 3) continue; // points and lines
         if (!face_is_sound(importer, from, i)) return false;
         if (face->mNumIndices == 3)
-            triangle_add(importer, placed, mirrored, face->mIndices);
+            triangle_add(importer, instance, mirrored, face->mIndices);
         else
-            polygon_add(importer, placed, mirrored, face);
+            polygon_add(importer, instance, mirrored, face);
     }
     return true;
 }
@@ -403,15 +410,15 @@ static bool mesh_reserve(Importer *importer)
 {
     size_t vertex_count = 0, triangle_count = 0;
     bool has_normals = false, has_uvs = false;
-    for (size_t i = 0; i < importer->placed.count; i++) {
-        const struct aiMesh *from = importer->placed.items[i].mesh;
+    for (size_t i = 0; i < importer->instances.count; i++) {
+        const struct aiMesh *from = importer->instances.items[i].mesh;
         vertex_count += from->mNumVertices;
         triangle_count += triangles_count(from);
         has_normals |= from->mNormals != NULL;
         has_uvs |= from->mTextureCoords[0] != NULL;
     }
-    if (vertex_count >= UINT32_MAX || triangle_count > MESH_TRIANGLES_LARGEST)
-        return import_fails(importer, "%zu triangles, more than %d", triangle_count, MESH_TRIANGLES_LARGEST);
+    if (vertex_count >= UINT32_MAX || triangle_count > MESH_TRIANGLES_MAX)
+        return import_fails(importer, "%zu triangles, more than %d", triangle_count, MESH_TRIANGLES_MAX);
     Mesh *mesh = &importer->mesh;
     mesh->vertices = memory_allocate(vertex_count + 1, sizeof *mesh->vertices);
     mesh->triangles = memory_allocate(triangle_count + 1, sizeof *mesh->triangles);
@@ -426,11 +433,11 @@ static bool mesh_reserve(Importer *importer)
     return true;
 }
 
-static bool placed_add(Importer *importer, const Placed *placed)
+static bool instance_add(Importer *importer, const MeshInstance *instance)
 {
-    vertices_add(importer, placed);
-    if (!faces_add(importer, placed)) return false;
-    importer->mesh.vertex_count += placed->mesh->mNumVertices;
+    vertices_add(importer, instance);
+    if (!faces_add(importer, instance)) return false;
+    importer->mesh.vertex_count += instance->mesh->mNumVertices;
     return true;
 }
 
@@ -440,8 +447,8 @@ static bool mesh_read(Importer *importer)
     Affine transform = affine_of_transform(&importer->import->transform);
     if (importer->file->mRootNode) node_place(importer, importer->file->mRootNode, &transform);
     if (!mesh_reserve(importer)) return false;
-    for (size_t i = 0; i < importer->placed.count; i++)
-        if (!placed_add(importer, &importer->placed.items[i])) return false;
+    for (size_t i = 0; i < importer->instances.count; i++)
+        if (!instance_add(importer, &importer->instances.items[i])) return false;
     if (importer->mesh.triangle_count == 0) return import_fails(importer, "no triangles");
     return true;
 }
@@ -451,7 +458,7 @@ bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t 
     Importer importer = {.import = import, .report = report, .offset = offset, .scene = scene};
     bool read = mesh_read(&importer);
     if (importer.file) aiReleaseImport(importer.file);
-    free(importer.placed.items);
+    free(importer.instances.items);
     free(importer.materials);
     free(importer.corners.items);
     free(importer.cut.items);

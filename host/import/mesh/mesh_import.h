@@ -24,7 +24,7 @@ typedef struct {
 
 // Adds the file's triangles to the scene as one mesh and sets *index to its index. Reports an error at
 // `offset` and returns false if the file cannot be read as a mesh, or if a vertex of a face is missing, not
-// finite or beyond NUMBER_LARGEST.
+// finite or beyond NUMBER_MAX.
 bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t offset, uint32_t *index);
 
 // Writes the first error in an OBJ file's vertices or faces as `line N: what`; vertices that faces use come

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
-enum { SHOWN_LARGEST = 40 };
+enum { SHOWN_MAX = 40 };
 
 bool ply_line(PlyReading *reading, PlySpan *line)
 {
@@ -42,7 +42,7 @@ bool ply_span_is(PlySpan span, const char *text)
 
 int ply_shown(PlySpan span)
 {
-    return span.end - span.at < SHOWN_LARGEST ? (int)(span.end - span.at) : SHOWN_LARGEST;
+    return span.end - span.at < SHOWN_MAX ? (int)(span.end - span.at) : SHOWN_MAX;
 }
 
 bool ply_fails(PlyReading *reading, const char *format, ...)
@@ -74,10 +74,10 @@ static bool format_read(PlyHeader *header, PlyReading *reading, PlySpan line)
 // No file holds as many rows as a longer number says.
 static bool count_read(PlySpan word, size_t *count)
 {
-    enum { DIGITS_MOST = 18 };
+    enum { DIGITS_MAX = 18 };
     *count = 0;
     for (const char *at = word.at; at < word.end; at++) {
-        if (*at < '0' || *at > '9' || at - word.at >= DIGITS_MOST) return false;
+        if (*at < '0' || *at > '9' || at - word.at >= DIGITS_MAX) return false;
         *count = 10 * *count + (size_t)(*at - '0');
     }
     return word.end > word.at;

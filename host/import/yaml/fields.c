@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FIELD_LIMIT = 32 };
+enum { FIELDS_MAX = 32 };
 
 void expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
@@ -34,7 +34,7 @@ void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, 
 static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,
                                  const Field *fields, size_t field_count)
 {
-    const char *known[FIELD_LIMIT];
+    const char *known[FIELDS_MAX];
     for (size_t i = 0; i < field_count; i++)
         known[i] = fields[i].name;
     char kind[64];
@@ -82,7 +82,7 @@ bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
         return false;
     }
     size_t errors_before = reader->report.error_count;
-    bool seen[FIELD_LIMIT] = {false};
+    bool seen[FIELDS_MAX] = {false};
     unsigned forms = FORM_ANY;
     bool mixed = false;
     const YamlNode *value;

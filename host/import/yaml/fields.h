@@ -29,8 +29,9 @@ typedef struct Field Field;
 // Reads the value of `field` at `node` into `target`; reports an error and returns false if it is invalid.
 typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode *node, void *target);
 
-// Alternative forms of a mapping; keys of different forms exclude each other.
-typedef enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_ANY = 7 } Form;
+// Alternative forms of a mapping, as bits; keys of different forms exclude each other.
+typedef unsigned Form;
+enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_ANY = 7 };
 
 enum { OPTIONAL = false, REQUIRED = true };
 

@@ -31,7 +31,7 @@ static const Field spot_fields[] = {
     {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
     {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED, NULL},
     {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED, NULL},
-    {"angle", read_number, offsetof(LightFields, light.angle), FORM_ANY, REQUIRED, &range_half_turn},
+    {"angle", read_number, offsetof(LightFields, light.half_angle), FORM_ANY, REQUIRED, &range_half_turn},
     {"penumbra", read_number, offsetof(LightFields, light.penumbra), FORM_ANY, OPTIONAL, &range_not_negative},
     COLOR,
 };
@@ -44,7 +44,7 @@ static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
                      "'look_at' must differ from 'position'");
         return false;
     }
-    if (light->penumbra > light->angle) {
+    if (light->penumbra > light->half_angle) {
         report_error(&reader->report, field_node(reader, mapping, "penumbra")->offset,
                      "'penumbra' must not exceed 'angle'");
         return false;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 // Bounds the cost of wrong names and many textures in a hostile file.
-enum { NAMES_COMPARED = 1000, IMAGES_LARGEST = 1000 };
+enum { NAMES_COMPARED = 1000, TEXTURES_MAX = 1000 };
 
 typedef struct {
     Color colors[2];
@@ -47,22 +47,22 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 }
 
 // Materials with the same texture share it.
-static bool read_image(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+static bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Scene *scene = reader->scene;
     char *path = yaml_read_path(reader, field->name, node);
     if (!path) return false;
     size_t index = 0;
-    while (index < scene->images.count && strcmp(scene->images.items[index].path, path) != 0)
+    while (index < scene->textures.count && strcmp(scene->textures.items[index].path, path) != 0)
         index++;
-    if (index == IMAGES_LARGEST) {
-        report_error(&reader->report, node->offset, "more than %d textures", IMAGES_LARGEST);
+    if (index == TEXTURES_MAX) {
+        report_error(&reader->report, node->offset, "more than %d textures", TEXTURES_MAX);
         free(path);
         return false;
     }
-    if (index == scene->images.count) {
-        SceneImage image = {path, node->offset};
-        array_push(scene->images, image);
+    if (index == scene->textures.count) {
+        SceneTexture texture = {path, node->offset};
+        array_push(scene->textures, texture);
     } else {
         free(path);
     }
@@ -75,8 +75,8 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     static const Field fields[] = {
         {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL, NULL},
         {"checker", read_checker, 0, FORM_SECOND, OPTIONAL, NULL},
-        {"image", read_image, offsetof(Material, image), FORM_THIRD, REQUIRED, NULL},
-        {"size", read_number, offsetof(Material, image_size), FORM_THIRD, OPTIONAL, &range_positive},
+        {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED, NULL},
+        {"size", read_number, offsetof(Material, texture_size), FORM_THIRD, OPTIONAL, &range_positive},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
         {"diffuse", read_factors, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
         {"specular", read_number, offsetof(Material, specular), FORM_ANY, OPTIONAL, &range_not_negative},

@@ -63,7 +63,7 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
         reader->scene->meshes.items[object.as.mesh.index].path = path;
         path = NULL;
         if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-        if (reader->scene->materials.items[object.material].image > 0 &&
+        if (reader->scene->materials.items[object.material].texture > 0 &&
             !reader->scene->meshes.items[object.as.mesh.index].uvs)
             report_error(&reader->report, field_node(reader, mapping, "material")->offset,
                          "the mesh has no uv for the material's image");

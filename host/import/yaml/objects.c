@@ -5,6 +5,10 @@
 
 static const Range range_quarter_turn = {0, 90, true, "greater than 0 and less than 90"};
 
+// The forms of a cylinder and a cone, and those of a paraboloid.
+enum { FORM_FINITE = FORM_FIRST, FORM_INFINITE = FORM_SECOND };
+enum { FORM_FOCAL_LENGTH = FORM_FIRST, FORM_RADIUS = FORM_SECOND };
+
 #define MATERIAL                                                                                             \
     {                                                                                                        \
         "material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL, NULL                      \
@@ -45,14 +49,15 @@ static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, O
     return false;
 }
 
-// `from` and `to` share members with `point` and `axis`: the finite form's `to` becomes the axis at the end.
+// `from` and `to` share members with `point` and `axis`: until cylinder_finish the axis holds the finite
+// form's `to`.
 static const Field cylinder_fields[] = {
-    {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FIRST, REQUIRED, NULL},
-    {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FIRST, REQUIRED, NULL},
-    {"point", read_vector, offsetof(Object, as.cylinder.from), FORM_SECOND, REQUIRED, NULL},
-    {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_SECOND, REQUIRED, NULL},
+    {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FINITE, REQUIRED, NULL},
+    {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FINITE, REQUIRED, NULL},
+    {"point", read_vector, offsetof(Object, as.cylinder.from), FORM_INFINITE, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_INFINITE, REQUIRED, NULL},
     {"radius", read_number, offsetof(Object, as.cylinder.radius), FORM_ANY, REQUIRED, &range_positive},
-    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FIRST, OPTIONAL, NULL},
+    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FINITE, OPTIONAL, NULL},
     MATERIAL,
 };
 
@@ -66,9 +71,9 @@ static bool axis_finish(YamlReader *reader, const YamlNode *mapping, Vector3 fro
 
 static bool cylinder_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
 {
-    object->as.cylinder.finite = form == FORM_FIRST;
+    object->as.cylinder.finite = form == FORM_FINITE;
     object->as.cylinder.caps &= object->as.cylinder.finite;
-    return form == FORM_SECOND ||
+    return form == FORM_INFINITE ||
            axis_finish(reader, mapping, object->as.cylinder.from, &object->as.cylinder.axis);
 }
 
@@ -77,22 +82,23 @@ static bool read_two_radii(YamlReader *reader, const Field *field, const YamlNod
     return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
 }
 
+// As of cylinders; and until cone_finish the slope holds the infinite form's angle in degrees.
 static const Field cone_fields[] = {
-    {"from", read_vector, offsetof(Object, as.cone.from), FORM_FIRST, REQUIRED, NULL},
-    {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FIRST, REQUIRED, NULL},
-    {"radius", read_two_radii, offsetof(Object, as.cone.radius), FORM_FIRST, REQUIRED, &range_not_negative},
-    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FIRST, OPTIONAL, NULL},
-    {"apex", read_vector, offsetof(Object, as.cone.from), FORM_SECOND, REQUIRED, NULL},
-    {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_SECOND, REQUIRED, NULL},
-    {"angle", read_number, offsetof(Object, as.cone.slope), FORM_SECOND, REQUIRED, &range_quarter_turn},
+    {"from", read_vector, offsetof(Object, as.cone.from), FORM_FINITE, REQUIRED, NULL},
+    {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FINITE, REQUIRED, NULL},
+    {"radius", read_two_radii, offsetof(Object, as.cone.radius), FORM_FINITE, REQUIRED, &range_not_negative},
+    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FINITE, OPTIONAL, NULL},
+    {"apex", read_vector, offsetof(Object, as.cone.from), FORM_INFINITE, REQUIRED, NULL},
+    {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_INFINITE, REQUIRED, NULL},
+    {"angle", read_number, offsetof(Object, as.cone.slope), FORM_INFINITE, REQUIRED, &range_quarter_turn},
     MATERIAL,
 };
 
 static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
 {
-    object->as.cone.finite = form == FORM_FIRST;
+    object->as.cone.finite = form == FORM_FINITE;
     object->as.cone.caps &= object->as.cone.finite;
-    if (form == FORM_SECOND) {
+    if (form == FORM_INFINITE) {
         object->as.cone.slope = tan(object->as.cone.slope * (M_PI / 180));
         return true;
     }
@@ -139,14 +145,14 @@ static const Field torus_fields[] = {
     MATERIAL,
 };
 
-// `radius` is that of the rim; it shares its member with the focal length.
+// `radius` is that of the rim: until paraboloid_finish the focal length holds it.
 static const Field paraboloid_fields[] = {
     {"apex", read_vector, offsetof(Object, as.paraboloid.apex), FORM_ANY, REQUIRED, NULL},
     {"axis", read_direction, offsetof(Object, as.paraboloid.axis), FORM_ANY, REQUIRED, NULL},
     {"height", read_number, offsetof(Object, as.paraboloid.height), FORM_ANY, OPTIONAL, &range_positive},
-    {"focal_length", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_FIRST, REQUIRED,
+    {"focal_length", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_FOCAL_LENGTH, REQUIRED,
      &range_positive},
-    {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_SECOND, REQUIRED,
+    {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_RADIUS, REQUIRED,
      &range_positive},
     {"caps", read_boolean, offsetof(Object, as.paraboloid.caps), FORM_ANY, OPTIONAL, NULL},
     MATERIAL,
@@ -156,7 +162,7 @@ static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form 
 {
     object->as.paraboloid.finite = object->as.paraboloid.height > 0;
     object->as.paraboloid.caps &= object->as.paraboloid.finite;
-    if (form == FORM_FIRST) return true;
+    if (form == FORM_FOCAL_LENGTH) return true;
     if (!object->as.paraboloid.finite) {
         report_error(&reader->report, mapping->offset, "a paraboloid with a 'radius' needs a 'height'");
         return false;
@@ -173,7 +179,7 @@ typedef struct {
     // Checks fields against each other and derives members. Reports an error and returns false if they do not
     // fit. May be NULL.
     bool (*finish)(YamlReader *reader, const YamlNode *mapping, Form form, Object *object);
-    bool takes_image; // of its material
+    bool takes_texture; // of its material
 } Shape;
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
@@ -217,7 +223,7 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         return;
     if (shape->finish && !shape->finish(reader, mapping, form, &object)) return;
     if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-    if (reader->scene->materials.items[object.material].image > 0 && !shape->takes_image) {
+    if (reader->scene->materials.items[object.material].texture > 0 && !shape->takes_texture) {
         report_error(&reader->report, field_node(reader, mapping, "material")->offset,
                      "an image lies on a sphere, plane, disc or mesh, not on a %s", shape_names[kind]);
         return;

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DEPTH_LIMIT = 32, ANCHOR_LIMIT = 1000 };
+enum { DEPTH_MAX = 32, ANCHORS_MAX = 1000 };
 
 typedef struct {
     size_t text, length; // name in the source
@@ -20,7 +20,7 @@ typedef struct {
 typedef struct {
     YamlTree *tree;
     Report *report;
-    OpenNode open[DEPTH_LIMIT];
+    OpenNode open[DEPTH_MAX];
     size_t depth;
     size_t end; // of the last event: the position of an empty value
     struct {
@@ -78,8 +78,8 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
 
 static bool collection_open(TreeBuilder *builder, YamlNode node)
 {
-    if (builder->depth == DEPTH_LIMIT) {
-        report_error(builder->report, node.offset, "nested more than %d levels deep", DEPTH_LIMIT);
+    if (builder->depth == DEPTH_MAX) {
+        report_error(builder->report, node.offset, "nested more than %d levels deep", DEPTH_MAX);
         return false;
     }
     uint32_t index = (uint32_t)builder->tree->nodes.count;
@@ -123,8 +123,8 @@ static bool anchor_add(TreeBuilder *builder, struct fy_token *token)
 {
     size_t start = fy_token_start_mark(token)->input_pos,
            length = fy_token_end_mark(token)->input_pos - start;
-    if (builder->anchors.count == ANCHOR_LIMIT) {
-        report_error(builder->report, start, "more than %d anchors", ANCHOR_LIMIT);
+    if (builder->anchors.count == ANCHORS_MAX) {
+        report_error(builder->report, start, "more than %d anchors", ANCHORS_MAX);
         return false;
     }
     Anchor anchor = {.text = start, .length = length, .node = (uint32_t)builder->tree->nodes.count};

@@ -76,7 +76,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages)
     YamlReader reader = {
         .report = report_open(source, messages), .scene = scene, .default_material = UINT32_MAX};
     if (yaml_tree_read(&reader.tree, &reader.report)) document_read(&reader);
-    if (scene->images.count > 0) {
+    if (scene->textures.count > 0) {
         scene->file = memory_copy_text(source->file);
         text_append(&scene->text, source->bytes, source->length);
     }

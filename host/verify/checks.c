@@ -1,8 +1,10 @@
-#include "host/verify/judge.h"
+#include "host/verify/checks.h"
 
 #include "host/base/memory.h"
 #include <math.h>
 #include <string.h>
+
+// The factors of u and ulp below are those of docs/verify.md, tiers B to D.
 
 int verify_reference_bits(void)
 {
@@ -11,14 +13,14 @@ int verify_reference_bits(void)
 
 static Object object_at_work(const VerifyRun *run, const Object *object)
 {
-    return verify_is_wide(run) ? *object : reference_round_object(object);
+    return verify_is_double(run) ? *object : reference_round_object(object);
 }
 
 static VerifyTarget target_from(const Object *object, Vector3 origin)
 {
     ReferenceSurface surface = reference_surface(object, quad3(origin));
     double distance = vector_length(vector_subtract(surface.center, origin));
-    return (VerifyTarget){*object, distance, surface.size, surface.radius};
+    return (VerifyTarget){*object, distance, surface.bounding_radius, surface.feature_radius};
 }
 
 VerifyTarget verify_target(const VerifyRun *run, const Object *object, Vector3 eye)
@@ -43,8 +45,8 @@ static bool is_open(const VerifyRun *run, const VerifyTarget *target, const Refe
     const double u = verify_roundoff(run);
     if (run->tier == TIER_A) return true;
     if (target->object.kind == SHAPE_TRIANGLE) return exact->margin <= 16 * u * target->distance;
-    if (run->tier == TIER_B) return exact->margin <= 4 * u * fmax(target->distance, target->radius);
-    return exact->margin <= 16 * u * target->radius;
+    if (run->tier == TIER_B) return exact->margin <= 4 * u * fmax(target->distance, target->feature_radius);
+    return exact->margin <= 16 * u * target->feature_radius;
 }
 
 // What t may be off, in its own unit.
@@ -57,11 +59,12 @@ static double bound_of(const VerifyRun *run, const VerifyTarget *target, const R
     if (run->tier == TIER_A) return INFINITY;
     double cosine = fmax((double)exact->cosine, 1e-30), slope = 1 / (cosine * length);
     if (run->tier == TIER_B)
-        return 8 * ulp + (cosine < 0.1 ? 16 * u * (target->distance + target->size) * slope : 0);
-    return 4 * ulp + 4 * u * (target->size > 0 ? target->size : target->distance) * slope;
+        return 8 * ulp + (cosine < 0.1 ? 16 * u * (target->distance + target->bounding_radius) * slope : 0);
+    return 4 * ulp +
+           4 * u * (target->bounding_radius > 0 ? target->bounding_radius : target->distance) * slope;
 }
 
-static void judge_distance(VerifyRun *run, const ReferenceHit *exact, double t, double bound)
+static void check_distance(VerifyRun *run, const ReferenceHit *exact, double t, double bound)
 {
     double ulp = verify_ulp(run, (double)exact->t);
     verify_note_error(run, (double)quad_absolute(t - exact->t) / ulp, bound / ulp);
@@ -74,14 +77,14 @@ ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, siz
     return reference_hit_object(&target->object, &ray);
 }
 
-ReferenceHit verify_judge_pixel(VerifyRun *run, const VerifyTarget *target, const Film *image, size_t pixel)
+ReferenceHit verify_check_pixel(VerifyRun *run, const VerifyTarget *target, const Film *image, size_t pixel)
 {
     ReferenceHit exact = verify_pixel_hit(target, image, pixel);
     if (verify_pixel_found(image, pixel) != exact.found) {
         run->result->wrong += !is_open(run, target, &exact);
     } else if (exact.found) {
         double length = vector_length(verify_vector(&image->ray[3 * pixel]));
-        judge_distance(run, &exact, image->t[pixel], bound_of(run, target, &exact, length, NULL));
+        check_distance(run, &exact, image->t[pixel], bound_of(run, target, &exact, length, NULL));
     }
     return exact;
 }
@@ -93,42 +96,42 @@ ReferenceRay verify_reference_ray(const TraceRay *ray)
     return exact;
 }
 
-bool verify_is_decided(const VerifyRun *run, const VerifyJudgedRay *judged)
+bool verify_is_decided(const VerifyRun *run, const VerifyTestRay *test)
 {
-    return judged->required.must && strchr(judged->required.must, 'A' + (int)run->tier);
+    return test->required.decided_tiers && strchr(test->required.decided_tiers, 'A' + (int)run->tier);
 }
 
-VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyJudgedRay *judged,
+VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyTestRay *test,
                                ReferenceHit exact)
 {
-    const VerifyRay *required = &judged->required;
-    VerifyTarget target = target_from(object, verify_vector(judged->ray.origin));
+    const VerifyRay *required = &test->required;
+    VerifyTarget target = target_from(object, verify_vector(test->ray.origin));
     VerifyExpected expected = {exact, is_open(run, &target, &exact), 0};
-    if (!exact.found && required->touch != 0) {
+    if (!exact.found && required->tangent_t != 0) {
         expected.exact.found = true;
-        expected.exact.t = required->touch;
+        expected.exact.t = required->tangent_t;
     }
-    double length = vector_length(verify_vector(judged->ray.direction));
+    double length = vector_length(verify_vector(test->ray.direction));
     if (expected.exact.found)
         expected.bound = bound_of(run, &target, &expected.exact, length, required->limits);
     return expected;
 }
 
-void verify_judge_ray(VerifyRun *run, const Object *objects, size_t count, const VerifyJudgedRay *judged,
+void verify_check_ray(VerifyRun *run, const Object *objects, size_t count, const VerifyTestRay *test,
                       const TraceHit *hit)
 {
-    ReferenceRay ray = verify_reference_ray(&judged->ray);
-    const bool decided = verify_is_decided(run, judged);
+    ReferenceRay ray = verify_reference_ray(&test->ray);
+    const bool decided = verify_is_decided(run, test);
     bool found = false, certain = false, wrong = false;
     for (size_t i = 0; i < count; i++) {
         ReferenceHit exact = reference_hit_object(&objects[i], &ray);
         bool reported = i == hit->object;
-        if (!exact.found && judged->required.touch == 0 && !reported) continue;
-        VerifyExpected expected = verify_expected(run, &objects[i], judged, exact);
+        if (!exact.found && test->required.tangent_t == 0 && !reported) continue;
+        VerifyExpected expected = verify_expected(run, &objects[i], test, exact);
         found |= expected.exact.found;
         certain |= expected.exact.found && !expected.open;
         if (reported && expected.exact.found)
-            judge_distance(run, &expected.exact, hit->t, expected.bound);
+            check_distance(run, &expected.exact, hit->t, expected.bound);
         else if (reported)
             wrong |= !expected.open;
         else if (verify_is_hit(hit) && !expected.open) // this one may be nearer
@@ -142,12 +145,13 @@ void verify_judge_ray(VerifyRun *run, const Object *objects, size_t count, const
 }
 
 // How far a hit's point may be off the surface.
-static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length, double size)
+static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length,
+                            double bounding_radius)
 {
     const double u = verify_roundoff(run), *o = ray->origin;
     double start = fmax(fabs(o[0]), fmax(fabs(o[1]), fabs(o[2])));
-    if (run->tier == TIER_B) return 16 * u * (start + t * length + size);
-    return 2 * verify_ulp(run, t) * length + 8 * u * size;
+    if (run->tier == TIER_B) return 16 * u * (start + t * length + bounding_radius);
+    return 2 * verify_ulp(run, t) * length + 8 * u * bounding_radius;
 }
 
 // The angle between two nearly parallel vectors, the second a unit vector.
@@ -159,16 +163,16 @@ static double turned_by(Quad3 normal, Quad3 exact)
     return vector_length(vector_cross(change, unit));
 }
 
-void verify_judge_surface(VerifyRun *run, const Object *object, const TraceRay *ray, const TraceHit *hit)
+void verify_check_surface(VerifyRun *run, const Object *object, const TraceRay *ray, const TraceHit *hit)
 {
     if (run->tier == TIER_A || !verify_is_hit(hit)) return;
     Vector3 origin = verify_vector(ray->origin), direction = verify_vector(ray->direction);
     Quad3 point = quad3_add(quad3(origin), quad3_scale(quad3(direction), hit->t));
     ReferenceSurface surface = reference_surface(object, point);
     Quad distance = reference_surface_distance(&surface);
-    double bound = surface_bound(run, ray, hit->t, vector_length(direction), surface.size);
-    run->result->off += !(distance <= bound);
-    run->result->surface_part = fmax(run->result->surface_part, (double)distance / bound);
+    double bound = surface_bound(run, ray, hit->t, vector_length(direction), surface.bounding_radius);
+    run->result->off_surface += !(distance <= bound);
+    run->result->worst_position_ratio = fmax(run->result->worst_position_ratio, (double)distance / bound);
 
     // at an edge the normal may be that of any of the sheets that meet there
     Quad3 normal = quad3(verify_vector(hit->normal));
@@ -177,9 +181,10 @@ void verify_judge_surface(VerifyRun *run, const Object *object, const TraceRay *
         const ReferenceSheet *sheet = &surface.sheets[i];
         if (sheet->distance > distance + bound) continue;
         double turned = turned_by(normal, sheet->normal);
-        double tolerance = 8 * verify_roundoff(run) * surface.condition + bound / (double)sheet->bend;
+        double tolerance =
+            8 * verify_roundoff(run) * surface.normal_condition + bound / (double)sheet->curvature_radius;
         least_part = fmin(least_part, turned / tolerance);
     }
-    run->result->turned += !(least_part <= 1);
-    run->result->normal_part = fmax(run->result->normal_part, least_part);
+    run->result->wrong_normals += !(least_part <= 1);
+    run->result->worst_normal_ratio = fmax(run->result->worst_normal_ratio, least_part);
 }
