@@ -40,7 +40,7 @@ static inline mask vector_refract(Vector direction, Vector normal, mask entering
     real scale = lanes_select(entering, (real)(1), ior);
     real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
     real scaled = scale * -vector_dot(direction, normal);
-    real squared = product_difference(scaled, scaled, above_one, ior + (real)(1));
+    real squared = difference_of_products(scaled, scaled, above_one, ior + (real)(1));
     mask total = squared < (real)(0);
     real cosine = real_sqrt(real_max(squared, (real)(0)));
     *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, scale)));

@@ -161,8 +161,8 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     mask opposite = vector_dot(point->shading_normal, surface->normal) < (real)(0);
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
-    surface->error = (real)(UNIT_ROUNDOFF)*real_fma((real)(16), point->size,
-                                                    (real)(4) * vector_magnitude(point->position));
+    surface->error =
+        (real)(UNIT_ROUNDOFF)*real_fma((real)(16), point->size, (real)(4) * vector_norm1(point->position));
     surface->behind = surface->error + surface->error;
 }
 

@@ -88,7 +88,7 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         position = vector_fma(gradient, -step, position);
         normal = gradient;
     }
-    real size = vector_magnitude(p) + vector_magnitude(apex);
+    real size = vector_norm1(p) + vector_norm1(apex);
     SurfacePoint point = surface_point_make(vector_add(position, apex), vector_normalize(normal), size);
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, size);
 

@@ -13,11 +13,11 @@ typedef struct {
     real a, b, c, discriminant;
     Vector q, m;
     real g, h;
-    mask exact; // all of these are rounded about once
+    mask compensated; // all of these are rounded about once
 } RevolutionQuadric;
 
-static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *shape, bool sloped,
-                                                           const Ray *ray)
+static inline RevolutionQuadric revolution_quadric_compensated(const Revolution *shape, bool sloped,
+                                                               const Ray *ray)
 {
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     Vector d = ray->direction;
@@ -31,8 +31,9 @@ static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *sha
     if (sloped) {
         g = pair_add(g, pair_scale(pair_vector_dot_vector(f, axis), slope));
         h = pair_scale(pair_vector_dot_vector(pair_vector_of(d), axis), slope);
-        v = (PairVector){pair_product_difference(g, q.x, h, m.x), pair_product_difference(g, q.y, h, m.y),
-                         pair_product_difference(g, q.z, h, m.z)};
+        v = (PairVector){pair_difference_of_products(g, q.x, h, m.x),
+                         pair_difference_of_products(g, q.y, h, m.y),
+                         pair_difference_of_products(g, q.z, h, m.z)};
     } else {
         v = (PairVector){pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};
     }
@@ -48,12 +49,11 @@ static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *sha
     quadric.m = pair_vector_high(m);
     quadric.g = g.high;
     quadric.h = h.high;
-    quadric.exact = mask_all();
+    quadric.compensated = mask_all();
     return quadric;
 }
 
-static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *shape, bool sloped,
-                                                           const Ray *ray)
+static inline RevolutionQuadric revolution_quadric_plain(const Revolution *shape, bool sloped, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_slope), d = ray->direction;
     real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
@@ -64,11 +64,11 @@ static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *sha
     if (sloped) {
         g = real_fma(slope, vector_dot(f, axis), radius);
         h = slope * vector_dot(d, axis);
-        Vector v = {product_difference(g, q.x, h, m.x), product_difference(g, q.y, h, m.y),
-                    product_difference(g, q.z, h, m.z)};
-        reach = vector_length(v);
+        Vector v = {difference_of_products(g, q.x, h, m.x), difference_of_products(g, q.y, h, m.y),
+                    difference_of_products(g, q.z, h, m.z)};
+        reach = vector_norm(v);
     } else {
-        reach = radius * vector_length(q);
+        reach = radius * vector_norm(q);
     }
     real turn = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
     RevolutionQuadric quadric;
@@ -80,7 +80,7 @@ static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *sha
     quadric.m = m;
     quadric.g = g;
     quadric.h = h;
-    quadric.exact = mask_none();
+    quadric.compensated = mask_none();
     return quadric;
 }
 
@@ -95,7 +95,7 @@ static inline RevolutionQuadric revolution_quadric_select(mask condition, Revolu
                                vector_select(condition, yes.m, no.m),
                                lanes_select(condition, yes.g, no.g),
                                lanes_select(condition, yes.h, no.h),
-                               lanes_select(condition, yes.exact, no.exact)};
+                               lanes_select(condition, yes.compensated, no.compensated)};
 }
 
 // For lanes that start next to the side. Those that leave it outward have no crossing ahead and are rejected.
@@ -103,25 +103,25 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
                                                   bool sloped, const Ray *ray, mask near_side)
 {
     // a > 0 and c well beyond their roundings, which grow with the slope; b may have any sign within its own
-    real reach = vector_length(vector_subtract(ray->origin, vector_of(shape->base_radius)));
+    real reach = vector_norm(vector_subtract(ray->origin, vector_of(shape->base_radius)));
     scalar steepness = 1 + fabs(shape->axis_slope.w);
-    real least_c =
-        (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * reach * vector_length(quadric->m);
+    real least_c = (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * reach * vector_norm(quadric->m);
     real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
     mask leaves = near_side & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
                   (ray->near >= (real)(0));
     quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
     near_side = near_side & !leaves;
     if (!lanes_any(near_side)) return;
-    *quadric = revolution_quadric_select(near_side, revolution_quadric_exactly(shape, sloped, ray), *quadric);
+    *quadric =
+        revolution_quadric_select(near_side, revolution_quadric_compensated(shape, sloped, ray), *quadric);
 }
 
 // Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would break the horizon of
 // ground that is a cylinder: pairs there at any precision.
 static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
 {
-    if (IS_COMPENSATED) return revolution_quadric_exactly(shape, sloped, ray);
-    RevolutionQuadric quadric = revolution_quadric_plainly(shape, sloped, ray);
+    if (IS_COMPENSATED) return revolution_quadric_compensated(shape, sloped, ray);
+    RevolutionQuadric quadric = revolution_quadric_plain(shape, sloped, ray);
     real size = vector_dot(quadric.m, quadric.m);
     mask near_side = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
     if (RARELY(lanes_any(near_side))) {
@@ -139,7 +139,7 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
     for (uint i = 0; i < 2; i++) {
         Vector across = vector_fma(quadric->q, t, quadric->m);
         real radius = real_fma(quadric->h, t, quadric->g);
-        real norm = vector_length(across);
+        real norm = vector_norm(across);
         real excess = (norm - fabs(radius)) * (norm + fabs(radius));
         real steepness = (real)(2) * real_fma(-radius, quadric->h, vector_dot(across, quadric->q));
         mask steep = (fabs(excess) * (real)(SMALLEST_RATIO) < fabs(steepness)) & (fabs(t) < (real)(LARGEST));
@@ -209,11 +209,11 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
                                  lanes_select(positive_ratio, (real)(LARGEST), (real)(-LARGEST)));
     real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric->c, lanes_select(zero, (real)(1), q)));
     if (sloped && !IS_COMPENSATED) {
-        c_over_q = lanes_select(quadric->exact, c_over_q, revolution_polish(quadric, c_over_q));
+        c_over_q = lanes_select(quadric->compensated, c_over_q, revolution_polish(quadric, c_over_q));
         // with a near 0 a step may pass through infinity, which would swap inside and outside
         real polished = revolution_polish(quadric, q_over_a);
         mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
-        q_over_a = lanes_select(same_side & !quadric->exact, polished, q_over_a);
+        q_over_a = lanes_select(same_side & !quadric->compensated, polished, q_over_a);
     }
     crossings.side = (Roots){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
     crossings.outer = quadric->a < (real)(0);
@@ -243,10 +243,10 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
     scalar first = shape->base_radius.w;
     scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
     Vector offset = vector_scale(ray->direction, t);
-    real size = vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) +
-                vector_magnitude(offset);
+    real size =
+        vector_norm1(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_norm1(offset);
     real error = (real)(8 * UNIT_ROUNDOFF * shape->range.y) * size;
-    return vector_length(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
+    return vector_norm(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
 }
 
 // The first hit of a surface of revolution, of which the ray is inside the side between two roots and between
@@ -300,7 +300,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
 
     // outward from the axis: p minus its part along the axis
     Vector across = vector_fma(axis, -real_divide(height, squared_axis), p);
-    real axis_distance = vector_length(across);
+    real axis_distance = vector_norm(across);
     Vector radial = vector_normalize(across);
     real radius = real_divide((real)(shape->base_radius.w), axis_length);
     Vector normal = radial, position;
@@ -322,7 +322,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
         position = vector_fma(radial, radius - axis_distance, p);
     }
 
-    real size = vector_magnitude(p) + vector_magnitude(base) + radius;
+    real size = vector_norm1(p) + vector_norm1(base) + radius;
     SurfacePoint point = surface_point_make(vector_add(position, base), normal, size);
     if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, point.size);
 

@@ -25,9 +25,9 @@ static inline SurfacePoint surface_point_make(Vector position, Vector normal, re
 // still lose, 6 u^2 of the size.
 static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray, real t, real magnitude)
 {
-    real path_length = vector_magnitude(ray->direction) * fabs(t), limit = magnitude * (real)(0x1p-4f);
+    real path_length = vector_norm1(ray->direction) * fabs(t), limit = magnitude * (real)(0x1p-4f);
     if (RARELY(lanes_any(path_length < limit))) {
-        real reach = vector_magnitude(ray->origin) + path_length;
+        real reach = vector_norm1(ray->origin) + path_length;
         mask close = reach < limit;
         point->position = vector_select(close, ray_point(ray, t), point->position);
         point->size = lanes_select(close, real_fma((real)(UNIT_ROUNDOFF), magnitude, reach), point->size);

@@ -25,7 +25,7 @@ typedef struct {
 static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
     Vector radial = vector_fma(line->turn, s, line->across);
-    real rho = vector_length(radial);
+    real rho = vector_norm(radial);
     real z = real_fma(line->rise, s, line->height);
     real off = rho - line->major;
     real from_circle = real_sqrt(real_fma(off, off, z * z));
@@ -175,7 +175,7 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
     Vector from_circle = vector_fma(radial, -major, p); // from the nearest point of the circle
     Vector normal = vector_normalize(from_circle);
     Vector position = vector_fma(normal, minor, vector_fma(radial, major, center));
-    return surface_point_make(position, normal, major + minor + vector_magnitude(center));
+    return surface_point_make(position, normal, major + minor + vector_norm1(center));
 }
 
 #endif

@@ -2,7 +2,7 @@
 //
 // Vertices relative to the ray's start are rotated into a frame whose third axis is the ray; a shared vertex
 // gives the same numbers in every triangle. There the signs of three edge functions decide, and
-// product_difference has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
+// difference_of_products has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
 // JCGT 2(1), 2013; they shear along the direction's largest axis and fall back to double precision where an
 // edge function is 0).
 #ifndef TRIANGLE_H
@@ -41,9 +41,9 @@ static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
     real bx = vector_dot(b, ray->across_u), by = vector_dot(b, ray->across_v);
     real cx = vector_dot(c, ray->across_u), cy = vector_dot(c, ray->across_v);
     TriangleEdges edges;
-    edges.u = product_difference(cx, by, cy, bx);
-    edges.v = product_difference(ax, cy, ay, cx);
-    edges.w = product_difference(bx, ay, by, ax);
+    edges.u = difference_of_products(cx, by, cy, bx);
+    edges.v = difference_of_products(ax, cy, ay, cx);
+    edges.w = difference_of_products(bx, ay, by, ax);
     edges.determinant = edges.u + edges.v + edges.w;
     edges.a = a;
     edges.b = b;
@@ -102,15 +102,15 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
     if (IS_COMPENSATED) {
         PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
         PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
-        PairVector normal = {pair_product_difference(ab.y, ac.z, ab.z, ac.y),
-                             pair_product_difference(ab.z, ac.x, ab.x, ac.z),
-                             pair_product_difference(ab.x, ac.y, ab.y, ac.x)};
+        PairVector normal = {pair_difference_of_products(ab.y, ac.z, ab.z, ac.y),
+                             pair_difference_of_products(ab.z, ac.x, ab.x, ac.z),
+                             pair_difference_of_products(ab.x, ac.y, ab.y, ac.x)};
         along = pair_vector_dot_vector(normal, ray->direction).high;
         height = pair_vector_dot(pair_vector_difference(a, ray->origin), normal).high;
     } else {
         Vector normal = triangle_normal(triangle);
-        along = vector_dot_exactly(normal, ray->direction);
-        height = vector_dot_exactly(normal, vector_subtract(a, ray->origin));
+        along = vector_dot_compensated(normal, ray->direction);
+        height = vector_dot_compensated(normal, vector_subtract(a, ray->origin));
     }
     mask crosses = fabs(height) * (real)(SMALLEST_RATIO) < fabs(along);
     return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), in_plane);
@@ -145,7 +145,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
     Vector reach = corners_reach((Corners){a, b, c});
-    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_magnitude(reach);
+    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(reach);
     real t = accurate_t;
     t = roots_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
     t = roots_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
@@ -221,10 +221,10 @@ static inline SurfacePoint corners_surface_point(Corners corners, Vector normal,
 {
     Vector unit = vector_normalize(normal), reach = corners_reach(corners);
     SurfacePoint point =
-        surface_point_make(triangle_blend(weights, corners), unit, vector_magnitude_along(unit, reach));
+        surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, reach));
     if (IS_COMPENSATED) {
-        real magnitude = real_max(real_max(vector_magnitude(corners.a), vector_magnitude(corners.b)),
-                                  vector_magnitude(corners.c));
+        real magnitude =
+            real_max(real_max(vector_norm1(corners.a), vector_norm1(corners.b)), vector_norm1(corners.c));
         surface_point_move_to_ray(&point, ray, t, magnitude);
     }
     return point;

@@ -26,11 +26,11 @@ typedef struct {
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
 {
     Vector center = vector_of(bounds);
-    real reach = vector_magnitude(vector_subtract(ray->origin, center)) + (real)(bounds.w);
-    real coordinates = real_fma((real)(2), vector_magnitude(center), reach);
+    real reach = vector_norm1(vector_subtract(ray->origin, center)) + (real)(bounds.w);
+    real coordinates = real_fma((real)(2), vector_norm1(center), reach);
     real slack = real_fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
     const real huge = (real)(1 / SMALLEST_RATIO);
-    real largest = real_min(huge * real_inverse_power(coordinates), huge);
+    real largest = real_min(huge * real_inverse_power_of_two(coordinates), huge);
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),
                       real_min(real_max(ray->inverse.y, -largest), largest),
                       real_min(real_max(ray->inverse.z, -largest), largest)};

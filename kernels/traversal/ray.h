@@ -62,7 +62,7 @@ static inline real real_inverse_or_huge(real a)
 static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
     real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
-    real norm = vector_length(d);
+    real norm = vector_norm(d);
     real w = real_fma(side, norm, d.z);
     real norm_w = norm * w;
     *u = (Vector){real_fma(-side * d.x, d.x, norm_w), -side * d.x * d.y, -side * d.x * w};
@@ -93,7 +93,7 @@ static inline void ray_make_frame(Ray *ray)
     ray->inverse = (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
     if (!HAS_TRIANGLES) return;
     real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
-    frame_across(vector_scale(d, real_inverse_power(largest)), &ray->across_u, &ray->across_v);
+    frame_across(vector_scale(d, real_inverse_power_of_two(largest)), &ray->across_u, &ray->across_v);
     ray->along = vector_scale(d, ray->inverse_squared);
 }
 
@@ -130,7 +130,7 @@ static inline Vector ray_point(const Ray *ray, real t)
 // start + direction t, rounded about once.
 static inline real ray_coordinate(Pair start, real direction, real t)
 {
-    Pair offset = pair_product(direction, t), sum = pair_sum(start.high, offset.high);
+    Pair offset = two_product(direction, t), sum = two_sum(start.high, offset.high);
     return sum.high + (sum.low + (start.low + offset.low));
 }
 
