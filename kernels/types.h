@@ -195,7 +195,7 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 enum { ITEM_TILES_LARGEST = 8 };
 
 // The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
-enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_NEAR = 6, RAY_FAR, RAY_SCALARS };
+enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };
 enum {
     RESULT_T,
     RESULT_NORMAL,

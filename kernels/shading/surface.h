@@ -228,8 +228,8 @@ static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit
     if (!lanes_any(transparent)) return mask_none();
     real error = surface->error, before = error + error;
     Ray inward = ray_make_unit(surface_leave(surface, false), vector_negate(surface->normal), transparent);
-    inward.near = error;
-    inward.far = before + (real)(3) * error;
+    inward.tmin = error;
+    inward.tmax = before + (real)(3) * error;
     Hit opaque = closest_opaque_hit(scene, &inward);
     mask found = hit_found(&opaque);
     real gap = opaque.t - before;

@@ -33,7 +33,7 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
     real near = real_max(real_max(x.near, y.near), z.near);
     real far = real_min(real_min(x.far, y.far), z.far);
     *t = ray_first(ray, near, far);
-    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->near);
+    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
 }
 
 // |t - crossing| for the nearer of a slab's crossings, and whether that is its low face: a ray towards larger

@@ -59,7 +59,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     real half_chord = radius * real_sqrt(ray->inverse_squared);
     *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
     real reach = radius * crossing.along;
-    return hit & (vector_dot(crossing.across, crossing.across) <= reach * reach) & (*t > ray->near);
+    return hit & (vector_dot(crossing.across, crossing.across) <= reach * reach) & (*t > ray->tmin);
 }
 
 static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, real t)

@@ -67,7 +67,7 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
     mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
     hit = hit & revolution_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
-    return hit & (*t > ray->near) & (*t < (real)(LARGEST));
+    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
 // On the cap the point is moved along the axis, on the side by two Newton steps along the gradient of

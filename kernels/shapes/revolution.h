@@ -108,7 +108,7 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
     real least_c = (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * reach * vector_norm(quadric->m);
     real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
     mask leaves = near_side & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
-                  (ray->near >= (real)(0));
+                  (ray->tmin >= (real)(0));
     quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
     near_side = near_side & !leaves;
     if (!lanes_any(near_side)) return;
@@ -261,7 +261,7 @@ static inline mask revolution_first_hit(uint flags, const Ray *ray, Roots side, 
         return near <= far;
     }
     mask seen = flags & ONLY_INSIDE ? mask_none() : mask_all();
-    mask near_counts = seen & (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
+    mask near_counts = seen & (side.near > ray->tmin) & (side.near >= slab.near) & (side.near <= slab.far);
     *t = lanes_select(near_counts, side.near, side.far);
     return (*t >= slab.near) & (*t <= slab.far);
 }
@@ -284,7 +284,7 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     hit = hit & revolution_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
     if (sloped && (shape->id.y & REVOLUTION_FINITE))
         hit = hit & revolution_reaches(shape, &crossings, ray, *t);
-    return hit & (*t > ray->near) & (*t < (real)(LARGEST));
+    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
 // The position is moved onto the cap's plane, or else onto the side, along its normal.

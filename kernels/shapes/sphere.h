@@ -69,7 +69,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 
     real c = squared_distance - squared_radius;
     mask outside = c > (real)(32 * UNIT_ROUNDOFF) * squared_radius;
-    hit = hit & !(outside & (b > (real)(0)) & (ray->near >= (real)(0)));
+    hit = hit & !(outside & (b > (real)(0)) & (ray->tmin >= (real)(0)));
     if (!lanes_any(hit)) return mask_none();
 
     real discriminant;
@@ -99,7 +99,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         hit = hit & hits;
     }
     *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & ONLY_INSIDE);
-    return hit & (*t > ray->near);
+    return hit & (*t > ray->tmin);
 }
 
 // The point seen from the center; compensated n = (l -+ h d) / r with l = d x E / a and h the root of the

@@ -145,7 +145,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     real breaks[TORUS_BREAKS];
     torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
 
-    real start = (ray->near - closest_t) * real_sqrt(ray->squared); // of the ray, as s
+    real start = (ray->tmin - closest_t) * real_sqrt(ray->squared); // of the ray, as s
     real slope, found_s = (real)(LARGEST);
     real before = torus_distance(&line, breaks[0], &slope);
     mask found = mask_none();
@@ -155,7 +155,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
         mask crosses = hit & !found & (entering != (after > (real)(0))) & (breaks[i + 1] > start);
         if (lanes_any(crosses)) {
             real s = torus_zero(&line, breaks[i], breaks[i + 1], entering);
-            mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->near);
+            mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->tmin);
             found_s = lanes_select(first, s, found_s);
             found = found | first;
         }

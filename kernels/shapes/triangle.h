@@ -186,14 +186,14 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     mask remaining = hit;
     if (!IS_COMPENSATED) {
         TrianglePlane plane = triangle_plane(triangle, edges.a, ray);
-        hit = hit & !(plane.behind & (ray->near >= zero));
+        hit = hit & !(plane.behind & (ray->tmin >= zero));
         if (!lanes_any(hit)) return hit;
         remaining = hit & !plane.well_conditioned;
         *t = real_divide(plane.height, lanes_select(plane.well_conditioned, plane.along, (real)(1)));
     }
     if (lanes_any(remaining))
         *t = lanes_select(remaining, triangle_t_robust(triangle, &edges, ray, remaining), *t);
-    return hit & (*t > ray->near);
+    return hit & (*t > ray->tmin);
 }
 
 // Barycentric coordinates of the hit point.

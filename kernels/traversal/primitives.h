@@ -31,7 +31,7 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
             if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
             if (i == last) break;                                                                            \
             Type shape = scene->names[i];                                                                    \
-            real t = ray->far;                                                                               \
+            real t = ray->tmax;                                                                              \
             mask found = name##_hit(&shape, ray, &t);                                                        \
             if (!lanes_any(found)) continue;                                                                 \
             traversal_record(traversal, scene, found, t, shape.id.x);                                        \

@@ -10,9 +10,9 @@ typedef struct {
     Vector origin, direction; // the direction need not be unit
     real squared;             // direction . direction
     real inverse_squared;
-    real near, far; // hits lie strictly between
-    mask active;    // lanes that carry a ray
-    real travelled; // distance from the eye to the origin, for texture filtering
+    real tmin, tmax; // hits lie strictly between
+    mask active;     // lanes that carry a ray
+    real travelled;  // distance from the eye to the origin, for texture filtering
     // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|; at `fast`, whose
     // compiler may rearrange how the direction was computed, within u of the origin
     uint common_origin;
@@ -69,14 +69,14 @@ static inline void frame_across(Vector d, Vector *u, Vector *v)
     *v = (Vector){-d.x * d.y, real_fma(-d.y, d.y, side * norm_w), -d.y * w};
 }
 
-static inline Ray ray_make(Vector origin, Vector direction, real near, real far, mask active)
+static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax, mask active)
 {
     Ray ray;
     ray.origin = origin;
     ray.direction = direction;
     ray.squared = vector_dot(direction, direction);
-    ray.near = near;
-    ray.far = far;
+    ray.tmin = tmin;
+    ray.tmax = tmax;
     ray.travelled = (real)(0);
     ray.common_origin = COMMON_ORIGIN_NONE;
     ray.active = active & (ray.squared > (real)(0));
@@ -119,7 +119,7 @@ static inline void ray_set_common_origin(Ray *ray, uint common_origin)
 // The nearer of two crossings, near_t <= far_t, beyond the ray's start: far_t if near_t lies before it.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {
-    return lanes_select(near_t > ray->near, near_t, far_t);
+    return lanes_select(near_t > ray->tmin, near_t, far_t);
 }
 
 static inline Vector ray_point(const Ray *ray, real t)

@@ -10,7 +10,7 @@ typedef struct {
     uint first;   // the node, or the leaf's first primitive
     ushort what;  // BVH_NODE, or a leaf
     ushort lanes; // whose rays intersect its box, as bits
-    scalar near;  // its entry distance
+    scalar entry; // its entry distance
 } StackEntry;
 
 // A visit replaces a node by at most BVH_WIDTH children.
@@ -38,16 +38,16 @@ static inline void entry_prefetch(const Scene *scene, uint first, uint what)
 // Pushes a child of a node, keeping the node's children, which start at `bottom`, sorted by entry distance:
 // the one to visit first is on top.
 static inline void stack_push_child(TraversalStack *stack, uint bottom, const Scene *scene,
-                                    global const BvhNode *node, uint child, uint lanes, scalar near)
+                                    global const BvhNode *node, uint child, uint lanes, scalar entry)
 {
     uint slot = stack->count++;
     for (; slot > bottom; slot--) {
         StackEntry below = stack->entries[slot - 1];
-        if (stack->farthest_first ? below.near <= near : below.near >= near) break;
+        if (stack->farthest_first ? below.entry <= entry : below.entry >= entry) break;
         stack->entries[slot] = below;
     }
     uint first = ((global const uint *)node->first)[child], what = ((global const uint *)node->what)[child];
-    stack->entries[slot] = (StackEntry){first, (ushort)what, (ushort)lanes, near};
+    stack->entries[slot] = (StackEntry){first, (ushort)what, (ushort)lanes, entry};
     entry_prefetch(scene, first, what);
 }
 

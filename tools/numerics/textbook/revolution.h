@@ -12,7 +12,7 @@ typedef struct {
 
 static inline void nearest_take(Nearest *nearest, const Ray *ray, real t, mask counts)
 {
-    mask closer = counts & (t > ray->near) & (!nearest->found | (t < nearest->t));
+    mask closer = counts & (t > ray->tmin) & (!nearest->found | (t < nearest->t));
     nearest->t = lanes_select(closer, t, nearest->t);
     nearest->found = nearest->found | closer;
 }
