@@ -25,11 +25,11 @@ typedef struct {
 
 typedef struct {
     scalar4 center_radius; // xyz center, w radius
-    uint4 id;              // x: the object's id, y: ONLY_INSIDE
+    uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES
 } Sphere;
 
-// In a shape's id.y: rays from outside pass through its near side.
-enum { ONLY_INSIDE = 8 };
+// In a shape's id.y: front faces are ignored, only rays from inside hit. Never with REVOLUTION_CAPPED.
+enum { IGNORES_FRONT_FACES = 8 };
 
 typedef struct {
     scalar4 point;
@@ -50,18 +50,18 @@ typedef struct {
     uint4 id;
 } Box;
 
-// Cylinder and cone: the points with |p x axis| = radius + slope (p . axis), p from the base. Radius and
-// slope are in units of |axis|, so that the axis need not be unit.
+// Cylinder and cone: the points with |p x axis| = radius |axis| + slope (p . axis), p from the base, for an
+// axis of any length.
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
-    scalar4 axis_slope;  // xyz axis, w slope
+    scalar4 axis_slope;  // xyz axis, w slope: the tangent of the half-angle, 0 for a cylinder
     scalar4 range;       // x: p . axis runs from 0 to this where finite; y: |axis|; z: |axis|^2
-    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | ONLY_INSIDE
+    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | IGNORES_FRONT_FACES
 } Revolution;
 
 enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2 };
 
-typedef Revolution Cylinder; // slope 0
+typedef Revolution Cylinder;
 typedef Revolution Cone;
 
 typedef struct {
@@ -133,15 +133,16 @@ enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 // a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
 // whole BVH, then one of each primitive outside it, kind by kind; planes have none.
 //
-// xyz: from the common origin to the center; w: the origin's power |xyz|^2 - radius^2, lowered by
-// CULL_SPHERE_SLACK u |xyz|^2, or -CULL_SPHERE_LARGEST around the unbounded.
+// xyz: v, from the common origin to the center; w: the origin's power |v|^2 - radius^2, lowered by
+// CULL_SPHERE_SLACK u |v|^2. With v = 0, -CULL_SPHERE_LARGEST is never culled (unbounded, or out of float's
+// range) and +CULL_SPHERE_LARGEST always (an empty BVH).
 typedef struct {
     scalar4 center_power;
 } CullSphere;
 
 #define CULL_SPHERE_LARGEST 1e37f
 
-// The enlargement of cull spheres, in units of roundoff: of |xyz|^2, and of the ray's direction squared.
+// The enlargement of cull spheres, in units of roundoff: of |v|^2, and of the ray's direction squared.
 enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
 
 enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
@@ -232,12 +233,12 @@ typedef struct {
     // corners of a box around all points where a transparent object may touch an opaque one; low above high
     // where none does
     scalar4 contact_low, contact_high;
-    scalar4 sample;                      // x: width of a sample's share of a pixel, at distance 1
-    uint4 image;                         // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;                       // x: largest depth
-    uint4 cull_spheres;                  // x: number per common origin, 0: none
-    uint4 counts[KIND_QUARTETS];         // of each KIND_…, in that order
-    uint4 bounded_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
+    scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
+    uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;                   // x: largest depth
+    uint4 cull_spheres;              // x: number per common origin, 0: none
+    uint4 counts[KIND_QUARTETS];     // of each KIND_…, in that order
+    uint4 bvh_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
 } SceneHeader;
 
 #endif

@@ -1,5 +1,5 @@
 // Random scenes of every shape, light and kind of material: settings that must not change any bit of an image
-// or its AOVs (hard cases R6, R7, P7, M6). test_variants has a scene made by hand.
+// or its AOVs (hard cases R6, R7, P7, M6 of docs/verify.md). test_variants has a scene made by hand.
 // Sanitized in long tests only.
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"

@@ -249,7 +249,7 @@ static inline real real_complement_power(real s, real n)
 }
 
 // Where (1 - s)^n, at most e^(-n s), may be above 0.
-static inline mask real_complement_power_counts(real s, real n)
+static inline mask real_complement_power_is_nonzero(real s, real n)
 {
     return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));
 }

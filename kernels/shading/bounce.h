@@ -13,14 +13,14 @@ typedef struct {
     real travelled; // distance from the eye along the path
 } Bounce;
 
-static inline mask bounce_counts(const Bounce *bounce)
+static inline mask bounce_is_active(const Bounce *bounce)
 {
     return (bounce->weight.x > (real)(0)) | (bounce->weight.y > (real)(0)) | (bounce->weight.z > (real)(0));
 }
 
 static inline Ray bounce_ray(const Bounce *bounce)
 {
-    Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_counts(bounce));
+    Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_is_active(bounce));
     ray.travelled = bounce->travelled;
     return ray;
 }

@@ -52,7 +52,7 @@ static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye,
 {
     Vector difference = vector_subtract(reflected, to_eye);
     real s = (real)(0.5f) * vector_dot(difference, difference);
-    mask counts = real_complement_power_counts(s, shininess);
+    mask counts = real_complement_power_is_nonzero(s, shininess);
     real highlight = (real)(0);
     if (lanes_any(wanted & counts))
         highlight = lanes_select(
@@ -74,7 +74,7 @@ static inline Color3 phong_light(const Scene *scene, const Surface *surface, uin
     to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
         ray_set_common_origin(&to_light.shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
-    rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
+    ray_counter_add(scene, RAYS_SHADOW, to_light.shadow_ray.active);
     real passing = transmittance(scene, &to_light.shadow_ray);
     lit = lit & (passing > (real)(0));
     *shadowed = surface->found & !lit;

@@ -1,4 +1,5 @@
-// Cylinder and cone: |p x w| = R + k (p . w) for the axis w from the base, R and k in units of |w|.
+// Cylinder and cone: |p x w| = R + k (p . w) for the axis w from the base, with R = |w| times the radius
+// there and k the tangent of the half-angle.
 //
 // Along a ray p = f + t d, with q = d x w, m = f x w, g = R + k f . w and h = k d . w:
 //     a = q . q - h^2,   b = m . q - g h,   c = m . m - g^2,
@@ -260,9 +261,9 @@ static inline mask revolution_first_hit(uint flags, const Ray *ray, Roots side, 
         *t = ray_first(ray, near, far);
         return near <= far;
     }
-    mask seen = flags & ONLY_INSIDE ? mask_none() : mask_all();
-    mask near_counts = seen & (side.near > ray->tmin) & (side.near >= slab.near) & (side.near <= slab.far);
-    *t = lanes_select(near_counts, side.near, side.far);
+    mask seen = flags & IGNORES_FRONT_FACES ? mask_none() : mask_all();
+    mask near_valid = seen & (side.near > ray->tmin) & (side.near >= slab.near) & (side.near <= slab.far);
+    *t = lanes_select(near_valid, side.near, side.far);
     return (*t >= slab.near) & (*t <= slab.far);
 }
 

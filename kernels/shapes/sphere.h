@@ -98,7 +98,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         }
         hit = hit & hits;
     }
-    *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & ONLY_INSIDE);
+    *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & IGNORES_FRONT_FACES);
     return hit & (*t > ray->tmin);
 }
 

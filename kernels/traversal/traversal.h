@@ -9,7 +9,7 @@
 static OUT_OF_LINE Traversal scene_traverse(const Scene *scene, Ray *ray, Query query)
 {
     Traversal traversal = {query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
-    intersect_unbounded(&traversal, scene, ray);
+    intersect_outside_bvh(&traversal, scene, ray);
     if (HAS_BVH) {
         global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
         if (!cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0)
