@@ -41,8 +41,8 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
     vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);
     vector_store(refracted.origin, result + RESULT_REFRACTED_ORIGIN);
     vector_store(refracted.direction, result + RESULT_REFRACTED_DIRECTION);
-    result[RESULT_TRANSMISSION].all = refracted.weight.x;
-    result[RESULT_LIGHT].all = transmittance(scene, &ray);
+    result[RESULT_REFRACTED_WEIGHT].all = refracted.weight.x;
+    result[RESULT_TRANSMITTANCE].all = transmittance(scene, &ray);
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {
         size_t index = first + lane;

@@ -1,8 +1,9 @@
 // The flat structs that host and kernels share, one array per shape.
 //
 // In the kernels `scalar` is float or double, the kernel's own precision. The host writes double and narrows
-// each array on upload. That needs one rule: in every struct the scalar4 members come first, the uint4
-// members last (tests/test_layout.c checks each on the device).
+// each array on upload. So in every struct the scalar4 members come first, the uint4 members last: then no
+// member needs padding, and narrowing goes element by element (tests/test_layout.c checks each on the
+// device).
 //
 // Positions are relative to the eye. Axes and normals are the scene's own, scaled by a power of two to a
 // length in 1/2..1, so that they are exact and never overflow.
@@ -123,10 +124,11 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
     uint4 first[BVH_QUARTER]; // the child's node or first primitive
-    uint4 what[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits
+    uint4 what[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits, count <= 255
 } BvhNode;
 #endif
 
+// BVH_DEPTH_LARGEST: see host/compile/bvh.h.
 enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
@@ -193,7 +195,7 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 
 // Neighboring tiles along a row that a work-item of several lanes renders in turn. On a CPU each work-item is
 // a work-group of its own, which costs PoCL some hundred cycles to start.
-enum { ITEM_TILES_LARGEST = 8 };
+enum { TILES_PER_ITEM = 8 };
 
 // The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };
@@ -205,8 +207,8 @@ enum {
     RESULT_REFLECTED_DIRECTION = 10,
     RESULT_REFRACTED_ORIGIN = 13,
     RESULT_REFRACTED_DIRECTION = 16,
-    RESULT_TRANSMISSION = 19,
-    RESULT_LIGHT,
+    RESULT_REFRACTED_WEIGHT = 19,
+    RESULT_TRANSMITTANCE,
     RESULT_SCALARS
 };
 
@@ -219,7 +221,8 @@ typedef struct {
     scalar4 color;
     scalar4 position;  // from the eye; point and spot
     scalar4 direction; // unit, away from the light; directional and spot
-    // spot: x: 1 - cos(half-angle), y: 1 - cos(angle - penumbra), z: 1 / (x - y), 0 for a hard edge
+    // spot: x: 1 - cos(angle), from the axis to the edge; y: 1 - cos(angle - penumbra), which no kernel
+    // reads; z: 1 / (x - y), 0 for a hard edge
     scalar4 cone;
     uint4 kind; // x: LIGHT_KIND_…
 } Light;

@@ -31,8 +31,8 @@ static TraceHit hit_at(const void *scalars, size_t index, bool wide, uint32_t ob
 {
     TraceHit hit = {.object = object,
                     .t = scalar_at(scalars, index + RESULT_T, wide),
-                    .transmission = scalar_at(scalars, index + RESULT_TRANSMISSION, wide),
-                    .light = scalar_at(scalars, index + RESULT_LIGHT, wide)};
+                    .transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, wide),
+                    .light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, wide)};
     vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
     vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
     vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, wide, hit.reflected_origin);

@@ -23,8 +23,8 @@ static inline real spot_strength(const Light *light, Vector from_light)
     return light->cone.z == 0 ? hard : soft;
 }
 
-// The shadow ray to a point or spot light runs from 0 to 1, unnormalized, and ends a rounding before the
-// light.
+// The shadow ray to a point or spot light is not normalized: the light is at t = 1. It ends 32 u before, so
+// that a surface on which the light lies does not occlude it.
 static inline LightRay light_ray(const Light *light, const Surface *surface)
 {
     LightRay to_light;
@@ -52,11 +52,11 @@ static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye,
 {
     Vector difference = vector_subtract(reflected, to_eye);
     real s = (real)(0.5f) * vector_dot(difference, difference);
-    mask counts = real_complement_power_is_nonzero(s, shininess);
+    mask nonzero = real_complement_power_is_nonzero(s, shininess);
     real highlight = (real)(0);
-    if (lanes_any(wanted & counts))
+    if (lanes_any(wanted & nonzero))
         highlight = lanes_select(
-            counts, real_complement_power(lanes_select(counts, s, (real)(0.5f)), shininess), highlight);
+            nonzero, real_complement_power(lanes_select(nonzero, s, (real)(0.5f)), shininess), highlight);
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 

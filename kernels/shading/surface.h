@@ -18,6 +18,8 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
                     real_fma(weight.z, color.z, sum.z)};
 }
 
+// Color and `travelled` presume that the ray's direction is unit; of an explicit ray, which may have any
+// length, neither is used.
 typedef struct {
     mask found;
     Vector position;
@@ -162,7 +164,8 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
     surface->error =
-        (real)(UNIT_ROUNDOFF)*real_fma((real)(16), point->size, (real)(4) * vector_norm1(point->position));
+        (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
+                                       (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
     surface->behind = surface->error + surface->error;
 }
 

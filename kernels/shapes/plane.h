@@ -42,7 +42,7 @@ static inline SurfacePoint plane_crossing_point(Vector point, scalar4 normal, co
     Vector crossing = ray_point(ray, t), to_point = vector_subtract(point, crossing);
     SurfacePoint crossed = surface_point_make(vector_fma(unit, vector_dot(unit, to_point), crossing), unit,
                                               vector_norm1_along(unit, to_point));
-    if (IS_COMPENSATED) surface_point_move_to_ray(&crossed, ray, t, crossed.size);
+    if (IS_COMPENSATED) surface_point_move_to_ray(&crossed, ray, t, crossed.rounding_scale);
     return crossed;
 }
 

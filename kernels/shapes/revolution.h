@@ -325,7 +325,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
 
     real size = vector_norm1(p) + vector_norm1(base) + radius;
     SurfacePoint point = surface_point_make(vector_add(position, base), normal, size);
-    if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, point.size);
+    if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
         mask on_cap = revolution_on_cap(crossings.side, crossings.slab, t);

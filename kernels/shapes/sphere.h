@@ -126,7 +126,7 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
     Vector normal = sphere_normal(center, radius, ray, t);
     SurfacePoint point =
         surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_norm1(center));
-    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.size);
+    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
     return point;
 }
 

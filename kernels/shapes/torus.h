@@ -50,6 +50,14 @@ static inline real bracket_next(real low, real high, real s, real value, real sl
     return lanes_select(inside, newton, (real)(0.5f) * (low + high));
 }
 
+// Steps enough to find all bits where Newton's method fails and the bracket is halved. Turning points need
+// fewer: they only have to separate the distance's zeros.
+enum { TORUS_ZERO_STEPS = IS_DOUBLE ? 60 : 30, TORUS_TURNING_STEPS = IS_DOUBLE ? 40 : 20 };
+
+// The bounding sphere's squared radius is taken this much larger: the ends of the line in it lie outside the
+// torus whatever is rounded.
+#define TORUS_ENLARGEMENT 1.001f
+
 // The cubic's zero between low and high if its signs differ there; else the end where it is nearer to 0.
 static inline real torus_turning_point(real p, real q, real low, real high)
 {
@@ -59,7 +67,7 @@ static inline real torus_turning_point(real p, real q, real low, real high)
     mask rising = at_low < (real)(0);
     real end = lanes_select(fabs(at_low) < fabs(at_high), low, high);
     real s = (real)(0.5f) * (low + high);
-    for (uint i = 0; i < (IS_DOUBLE ? 40 : 20); i++) {
+    for (uint i = 0; i < TORUS_TURNING_STEPS; i++) {
         real value = torus_cubic(p, q, s, &slope);
         mask before = (value < (real)(0)) == rising;
         low = lanes_select(before, s, low);
@@ -73,7 +81,7 @@ static inline real torus_turning_point(real p, real q, real low, real high)
 static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
 {
     real s = (real)(0.5f) * (low + high);
-    for (uint i = 0; i < (IS_DOUBLE ? 60 : 30); i++) {
+    for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
         real slope;
         real value = torus_distance(line, s, &slope);
         mask before = (value > (real)(0)) == entering;
@@ -129,7 +137,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     Vector closest = torus_closest(torus, ray, &closest_t);
     real reach = major + minor;
     real squared_distance = vector_dot(closest, closest);
-    real half_chord_squared = real_fma(reach * (real)(1.001f), reach, -squared_distance);
+    real half_chord_squared = real_fma(reach * (real)(TORUS_ENLARGEMENT), reach, -squared_distance);
     mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
     if (!lanes_any(hit)) return hit;
 

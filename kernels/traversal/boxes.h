@@ -13,6 +13,10 @@
 #include "scene.h"
 #include "traversal/ray.h"
 
+// The slack, in u: of the distance to the farthest corner, for the hit (docs/adding-a-shape.md), and of the
+// coordinates, for the boxes and the products.
+enum { BOX_HIT_SLACK = 64, BOX_ROUNDING_SLACK = 8 };
+
 // Rays prepared for boxes: a ray is between the two planes of an enlarged box across an axis from
 // plane * inverse + to_near to plane * inverse + to_far.
 typedef struct {
@@ -26,21 +30,22 @@ typedef struct {
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
 {
     Vector center = vector_of(bounds);
-    real reach = vector_norm1(vector_subtract(ray->origin, center)) + (real)(bounds.w);
-    real coordinates = real_fma((real)(2), vector_norm1(center), reach);
-    real slack = real_fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
+    real farthest = vector_norm1(vector_subtract(ray->origin, center)) + (real)(bounds.w);
+    real max_norm1 = real_fma((real)(2), vector_norm1(center), farthest);
+    real slack = real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), farthest,
+                          (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
     const real huge = (real)(1 / SMALLEST_RATIO);
-    real largest = real_min(huge * real_inverse_power_of_two(coordinates), huge);
+    real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),
                       real_min(real_max(ray->inverse.y, -largest), largest),
                       real_min(real_max(ray->inverse.z, -largest), largest)};
     Vector to_plane = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
-    Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
+    Vector slack_t = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
     Vector d = ray->direction;
     BoxRays rays;
     rays.inverse = inverse;
-    rays.to_near = vector_subtract(to_plane, around);
-    rays.to_far = vector_add(to_plane, around);
+    rays.to_near = vector_subtract(to_plane, slack_t);
+    rays.to_far = vector_add(to_plane, slack_t);
     rays.tmin = ray->tmin;
     rays.slack = slack;
     rays.negative_x = lanes_bits(d.x < (real)(0));

@@ -15,7 +15,8 @@
 
 #if LANES > 1
 
-// Up to this many active lanes skip the bounds; up to twice as many in an octant are divergent.
+// Up to this many active lanes skip the bounds; up to twice as many in an octant are divergent. A quarter was
+// measured (docs/performance-notes.md).
 #define FEW_LANES (LANES >> 2)
 
 // Interval bounds for one axis, for rays from origins o in direction sign s, and a plane at p:
@@ -225,7 +226,7 @@ static inline void visit_node(TraversalStack *stack, const Scene *scene, global 
 // Traverses the BVH with a group; visits what any of its active lanes intersects.
 static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
 {
-    StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, (ushort)group->active, group->bounds.tmin};
+    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)group->active, group->bounds.tmin};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         uint lanes = next.lanes & group->active;
@@ -248,7 +249,7 @@ static inline void traverse_group(Traversal *traversal, const Scene *scene, cons
 static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
-    ray_make_frame(ray);
+    ray_prepare(ray);
     BoxRays rays = box_rays(ray, header->bounds);
     mask hits_bvh =
         box_rays_intersect(&rays, header->bounds_low, header->bounds_high, traversal_tmax(traversal));

@@ -60,7 +60,7 @@ static inline void intersect_outside_bvh(Traversal *traversal, const Scene *scen
     global const uint *bvh_counts = (global const uint *)scene->header->bvh_counts;
     uint box_count = HAS_BOXES ? counts[KIND_BOXES] - bvh_counts[KIND_BOXES] : 0;
     uint triangle_count = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bvh_counts[KIND_TRIANGLES] : 0;
-    if (box_count + triangle_count > 0) ray_make_frame(ray);
+    if (box_count + triangle_count > 0) ray_prepare(ray);
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
     if (cull_spheres) cull_spheres++; // the first is the BVH's
 #define INTERSECT_OUTSIDE_BVH(feature, Type, name, names)                                                    \

@@ -17,10 +17,11 @@ typedef struct {
     // compiler may rearrange how the direction was computed, within u of the origin
     uint common_origin;
     real cull_slack; // enlarges cull spheres by the rounding of the direction
-    // by ray_make_frame: 1 / direction, huge where the component is 0
+    // by ray_prepare: 1 / direction, huge where the component is 0
     Vector inverse;
-    // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
-    // along it, whose product with a point seen from the origin is the point's t
+    // for triangles: two vectors across the direction, of length O(1) since they are computed from a
+    // direction scaled by a power of two, and one along it, whose product with a point seen from the origin
+    // is the point's t
     Vector across_u, across_v, along;
 } Ray;
 
@@ -30,7 +31,7 @@ typedef struct {
 } Hit;
 
 // Compares the mask from memory with 0 anew: LLVM then sees that a lane is all ones or all zeros, and keeps
-// what derives from it in mask registers. Of a function's result it does not.
+// what derives from it in mask registers. It does not see this through a function call; hence a macro.
 #define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
 
 static inline mask hit_found(const Hit *hit)
@@ -86,8 +87,9 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     return ray;
 }
 
-// Computes what boxes, triangles and the BVH need, once rays reach the BVH or a box or triangle outside it.
-static inline void ray_make_frame(Ray *ray)
+// Computes what boxes, triangles and the BVH need. Lazy and idempotent: called before the BVH is traversed
+// and before boxes and triangles outside it are tested.
+static inline void ray_prepare(Ray *ray)
 {
     Vector d = ray->direction;
     ray->inverse = (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};

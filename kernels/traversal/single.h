@@ -25,12 +25,12 @@ static inline void visit_node(TraversalStack *stack, const Scene *scene, global 
 static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
-    ray_make_frame(ray);
+    ray_prepare(ray);
     BoxRays box_ray = box_rays(ray, header->bounds);
     scalar tmax = traversal_tmax(traversal);
     if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, tmax)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
-    StackEntry entries[STACK_LARGEST], next = {0, BVH_NODE, 1, box_ray.tmin};
+    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, 1, box_ray.tmin};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.entry <= tmax) {
