@@ -1,6 +1,6 @@
 // Differences between devices: at `strict` quotients and roots with the error that the specification permits
 // are repaired to the correctly rounded ones, and the fma of devices without one in hardware has fma's bits.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
