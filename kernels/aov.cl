@@ -26,7 +26,7 @@ static KERNEL_BODY void tile_aovs(const Scene *scene, const Tile *tile, const Hi
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
-    Surface surface = surface_seen(scene, &ray, &hit);
+    Surface surface = visible_surface(scene, &ray, &hit);
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     film_store_color(layers->ray, tile, ray.direction);
     film_store(layers->t, tile, 1, 0, hit_distance(&hit));
@@ -34,8 +34,7 @@ static KERNEL_BODY void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     film_store_color(layers->position, tile, vector_select(surface.found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
     for (uint i = 0; i < light_count; i++) {
-        mask shadowed;
-        phong_light(scene, &surface, i, &shadowed);
+        mask shadowed = surface.found & !light_visibility(scene, &surface, i).lit;
         film_store_integer(layers->shadow, tile, light_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }

@@ -28,7 +28,7 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
     Vector origin = vector_load(value + RAY_ORIGIN), direction = vector_load(value + RAY_DIRECTION);
     Ray ray = ray_make(origin, direction, value[RAY_TMIN].all, value[RAY_TMAX].all, mask_all());
     Hit hit = closest_hit(scene, &ray);
-    Surface surface = surface_at(scene, &ray, &hit);
+    Surface surface = surface_interaction(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce reflected = {origin, direction, black}, refracted = reflected;
     surface_bounce(&surface, vector_normalize(direction), white, true, &reflected, &refracted);

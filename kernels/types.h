@@ -123,8 +123,8 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #define BVH_QUARTER (BVH_WIDTH >> 2)
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
-    uint4 first[BVH_QUARTER]; // the child's node or first primitive
-    uint4 what[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits, count <= 255
+    uint4 child_index[BVH_QUARTER]; // the child's node or first primitive
+    uint4 child_kind[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits, count <= 255
 } BvhNode;
 #endif
 

@@ -82,13 +82,13 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
         total = surface_refract(surface, direction, &refracted->direction);
         real transmission = lanes_select(total, (real)(0), surface->transmission);
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
-        refracted->origin = surface_leave(surface, true);
+        refracted->origin = secondary_ray_origin(surface, true);
         refracted->weight = vector_scale(weight, transmission);
         total = total & transparent;
     }
     if (all || lanes_any(reflection > (real)(0))) {
         reflected->direction = surface_reflect(surface, direction);
-        reflected->origin = surface_leave(surface, false);
+        reflected->origin = secondary_ray_origin(surface, false);
         reflected->weight = vector_scale(weight, reflection);
     }
     reflected->travelled = refracted->travelled = surface->travelled;

@@ -11,10 +11,8 @@ static inline Color3 surface_color(const Scene *scene, const Surface *surface)
 {
     Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
     Color3 color = color_multiply(ambient, surface->color);
-    for (uint i = 0; i < scene->header->image.w; i++) {
-        mask shadowed;
-        color = vector_add(color, phong_light(scene, surface, i, &shadowed));
-    }
+    for (uint i = 0; i < scene->header->image.w; i++)
+        color = vector_add(color, phong_shade(scene, surface, i));
     return color;
 }
 
@@ -51,10 +49,11 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *pa
         Color3 seen = background;
         bool any_found = lanes_any(surface.found);
         if (any_found) {
-            surface = surface_seen(scene, &ray, &hit);
+            surface = visible_surface(scene, &ray, &hit);
             if (!COMPUTE_SIGNATURE)
                 seen = vector_select(surface.found, surface_color(scene, &surface), background);
         }
+        // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE)
                 *path = path_signature_add(*path, &ray, &hit, mask_none(), mask_none(), mask_none());
@@ -62,20 +61,22 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *pa
         }
         color = color_add_weighted(color, weight, vector_select(ray.active, seen, black));
 
-        Bounce next = {ray.origin, ray.direction, black, depth + 1, ray.travelled}, other = next;
+        Bounce reflected = {ray.origin, ray.direction, black, depth + 1, ray.travelled};
+        Bounce refracted = reflected;
         mask total = mask_none();
         if (any_found && depth < scene->header->bounces.x)
-            total = surface_bounce(&surface, vector_renormalize(ray.direction), weight, false, &next, &other);
+            total = surface_bounce(&surface, vector_renormalize(ray.direction), weight, false, &reflected,
+                                   &refracted);
         if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, &ray, &hit, bounce_is_active(&next), bounce_is_active(&other),
-                                       total);
-        ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&next));
-        ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&other));
-        if (!lanes_any(bounce_is_active(&next))) {
-            next = other;
-        } else if (HAS_TRANSMISSION && lanes_any(bounce_is_active(&other))) {
-            pending[pending_count++] = other;
-        }
+            *path = path_signature_add(*path, &ray, &hit, bounce_is_active(&reflected),
+                                       bounce_is_active(&refracted), total);
+        ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&reflected));
+        ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&refracted));
+        Bounce next = reflected;
+        if (!lanes_any(bounce_is_active(&reflected)))
+            next = refracted;
+        else if (HAS_TRANSMISSION && lanes_any(bounce_is_active(&refracted)))
+            pending[pending_count++] = refracted;
         if (!lanes_any(bounce_is_active(&next))) {
             if (pending_count == 0) return color;
             next = pending[--pending_count];

@@ -202,6 +202,8 @@ static inline void visit_node(TraversalStack *stack, const Scene *scene, global 
     RealLanes entry;
     IntegerLanes hit_by;
     uint children = 0;
+    // By ray or by child: the loop costs a test per ray or per child that passes the bounds; the shorter one
+    // runs.
     bool by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
     if (!by_ray) {
         children =
@@ -231,10 +233,10 @@ static inline void traverse_group(Traversal *traversal, const Scene *scene, cons
     for (;; next = entries[--stack.count]) {
         uint lanes = next.lanes & group->active;
         if (next.entry <= group->largest_tmax && lanes != 0) {
-            if (next.what == BVH_NODE) {
-                visit_node(&stack, scene, &scene->nodes[next.first], group, lanes);
+            if (next.child_kind == BVH_NODE) {
+                visit_node(&stack, scene, &scene->nodes[next.child_index], group, lanes);
             } else {
-                intersect_leaf(traversal, scene, ray, next.what, next.first);
+                intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
                 group->active = lanes_bits(traversal->active);
                 if (group->active == 0) return;
                 group->tmax = traversal_tmax(traversal);
@@ -243,6 +245,30 @@ static inline void traverse_group(Traversal *traversal, const Scene *scene, cons
         }
         if (stack.count == 0) return;
     }
+}
+
+// The next group: the remaining lanes of one octant, or, once none remain, the divergent ones.
+static inline RayGroup next_group(const BoxRays *rays, SpilledRays *spilled, const Ray *ray, real tmax,
+                                  uint *remaining, uint *divergent)
+{
+    RayGroup group = {.rays = rays, .spilled = spilled, .tmax = tmax};
+    while (*remaining != 0) {
+        group.active = box_rays_same_octant(rays, *remaining);
+        *remaining &= ~group.active;
+        if (popcount(group.active) > 2 * FEW_LANES) {
+            group.coherent = true;
+            group.bounds = group_bounds(rays, ray, group.active, tmax);
+            group.largest_tmax = group.bounds.tmax;
+            return group;
+        }
+        *divergent |= group.active;
+    }
+    group.active = *divergent;
+    *divergent = 0;
+    group.coherent = false;
+    group.bounds = group_unbounded(group.active, tmax);
+    group.largest_tmax = group.bounds.tmax;
+    return group;
 }
 
 // Traverses the BVH with the rays that are active and intersect its bounds, group by group.
@@ -257,23 +283,7 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     SpilledRays spilled;
     spilled.is_set = false;
     while ((remaining | divergent) != 0) {
-        RayGroup group = {.rays = &rays, .spilled = &spilled, .tmax = traversal_tmax(traversal)};
-        if (remaining != 0) {
-            group.active = box_rays_same_octant(&rays, remaining);
-            remaining &= ~group.active;
-            if (popcount(group.active) <= 2 * FEW_LANES) {
-                divergent |= group.active;
-                continue;
-            }
-            group.coherent = true;
-            group.bounds = group_bounds(&rays, ray, group.active, group.tmax);
-        } else {
-            group.active = divergent;
-            divergent = 0;
-            group.coherent = false;
-            group.bounds = group_unbounded(group.active, group.tmax);
-        }
-        group.largest_tmax = group.bounds.tmax;
+        RayGroup group = next_group(&rays, &spilled, ray, traversal_tmax(traversal), &remaining, &divergent);
         // Lanes of other groups are inactive meanwhile: optical depths add up, so that a primitive that
         // several groups test may count only once per lane.
         mask members = mask_of_bits(group.active), others = traversal->active & !members;

@@ -43,7 +43,7 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
     }
 SHAPE_LIST(INTERSECT_SHAPES)
 
-// A leaf is count << 8 | kind (BvhNode.what) and its first primitive.
+// A leaf is count << 8 | kind (BvhNode.child_kind) and its first primitive.
 static inline void intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint first)
 {

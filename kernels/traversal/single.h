@@ -34,10 +34,10 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.entry <= tmax) {
-            if (next.what == BVH_NODE) {
-                visit_node(&stack, scene, &scene->nodes[next.first], &box_ray, octant, tmax);
+            if (next.child_kind == BVH_NODE) {
+                visit_node(&stack, scene, &scene->nodes[next.child_index], &box_ray, octant, tmax);
             } else {
-                intersect_leaf(traversal, scene, ray, next.what, next.first);
+                intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
                 if (!traversal->active) return;
                 tmax = traversal_tmax(traversal);
             }

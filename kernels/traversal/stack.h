@@ -7,10 +7,10 @@
 
 // A pending child. Kept small: a GPU may reserve the whole stack for each thread.
 typedef struct {
-    uint first;   // the node, or the leaf's first primitive
-    ushort what;  // BVH_NODE, or a leaf
-    ushort lanes; // whose rays intersect its box, as bits
-    scalar entry; // its entry distance
+    uint child_index;  // the node, or the leaf's first primitive
+    ushort child_kind; // BVH_NODE, or a leaf
+    ushort lanes;      // whose rays intersect its box, as bits
+    scalar entry;      // its entry distance
 } StackEntry;
 
 // A visit replaces a node by at most BVH_WIDTH children.
@@ -25,14 +25,14 @@ typedef struct {
     bool farthest_first;
 } TraversalStack;
 
-static inline void entry_prefetch(const Scene *scene, uint first, uint what)
+static inline void entry_prefetch(const Scene *scene, uint child_index, uint child_kind)
 {
-    if (what == BVH_NODE)
-        memory_prefetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
-    else if (HAS_TRIANGLES && (what & 0xff) == KIND_TRIANGLES)
-        memory_prefetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
-    else if (HAS_SPHERES && (what & 0xff) == KIND_SPHERES)
-        memory_prefetch((global const char *)&scene->spheres[first], sizeof(Sphere));
+    if (child_kind == BVH_NODE)
+        memory_prefetch((global const char *)&scene->nodes[child_index], sizeof(BvhNode));
+    else if (HAS_TRIANGLES && (child_kind & 0xff) == KIND_TRIANGLES)
+        memory_prefetch((global const char *)&scene->triangles[child_index], 4 * sizeof(Triangle));
+    else if (HAS_SPHERES && (child_kind & 0xff) == KIND_SPHERES)
+        memory_prefetch((global const char *)&scene->spheres[child_index], sizeof(Sphere));
 }
 
 // Pushes a child of a node, keeping the node's children, which start at `bottom`, sorted by entry distance:
@@ -46,9 +46,10 @@ static inline void stack_push_child(TraversalStack *stack, uint bottom, const Sc
         if (stack->farthest_first ? below.entry <= entry : below.entry >= entry) break;
         stack->entries[slot] = below;
     }
-    uint first = ((global const uint *)node->first)[child], what = ((global const uint *)node->what)[child];
-    stack->entries[slot] = (StackEntry){first, (ushort)what, (ushort)lanes, entry};
-    entry_prefetch(scene, first, what);
+    uint child_index = ((global const uint *)node->child_index)[child];
+    uint child_kind = ((global const uint *)node->child_kind)[child];
+    stack->entries[slot] = (StackEntry){child_index, (ushort)child_kind, (ushort)lanes, entry};
+    entry_prefetch(scene, child_index, child_kind);
 }
 
 #endif
