@@ -1,12 +1,8 @@
-// Roots of a t^2 + 2 b t + c = 0 where the discriminant d = b^2 - a c is known by a better formula.
+// Interval of a t^2 + 2 b t + c = 0 where the discriminant d = b^2 - a c is known by a better formula.
 #ifndef QUADRATIC_H
 #define QUADRATIC_H
 
 #include "shapes/surface_point.h"
-
-typedef struct {
-    real near, far; // near <= far
-} Roots;
 
 // For a = ray->squared, the first root beyond the ray's start, or the far one if only_far. Without
 // cancellation: q = -(b + sign(b) sqrt d), roots c / q and q / a (Press et al., Numerical Recipes, 5.6; here

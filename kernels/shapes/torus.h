@@ -16,21 +16,21 @@
 
 // The line s -> closest + s direction, |direction| = 1, in the torus' frame.
 typedef struct {
-    Vector across, turn; // (closest x axis) + s (direction x axis) has the length rho
-    real height, rise;   // z = height + s rise
+    Vector closest_cross_axis, direction_cross_axis; // the first plus s times the second has the length rho
+    real height, rise;                               // z = height + s rise
     real major, minor;
 } TorusLine;
 
 // The signed distance to the tube's surface, negative inside, and its derivative along the line.
 static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
-    Vector radial = vector_fma(line->turn, s, line->across);
+    Vector radial = vector_fma(line->direction_cross_axis, s, line->closest_cross_axis);
     real rho = vector_norm(radial);
     real z = real_fma(line->rise, s, line->height);
-    real off = rho - line->major;
-    real from_circle = real_sqrt(real_fma(off, off, z * z));
-    real rho_slope = vector_dot(radial, line->turn) * real_inverse_or_zero(rho);
-    *slope = real_fma(off, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
+    real radial_offset = rho - line->major;
+    real from_circle = real_sqrt(real_fma(radial_offset, radial_offset, z * z));
+    real rho_slope = vector_dot(radial, line->direction_cross_axis) * real_inverse_or_zero(rho);
+    *slope = real_fma(radial_offset, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
     return from_circle - line->minor;
 }
 
@@ -120,7 +120,8 @@ static inline void torus_breaks(const TorusLine *line, real squared_distance, re
 {
     real k = real_fma(line->major, line->major, squared_distance) - line->minor * line->minor;
     real squared_major = line->major * line->major;
-    real p = real_fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
+    real p = real_fma((real)(-4) * squared_major,
+                      vector_dot(line->direction_cross_axis, line->direction_cross_axis), k + k);
     real q = (real)(8) * squared_major * line->height * line->rise;
     real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
     breaks[0] = -span;
@@ -135,9 +136,10 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
     real closest_t;
     Vector closest = torus_closest(torus, ray, &closest_t);
-    real reach = major + minor;
+    real bounding_radius = major + minor;
     real squared_distance = vector_dot(closest, closest);
-    real half_chord_squared = real_fma(reach * (real)(TORUS_ENLARGEMENT), reach, -squared_distance);
+    real half_chord_squared =
+        real_fma(bounding_radius * (real)(TORUS_ENLARGEMENT), bounding_radius, -squared_distance);
     mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
     if (!lanes_any(hit)) return hit;
 

@@ -8,6 +8,7 @@
 #ifndef TRIANGLE_H
 #define TRIANGLE_H
 
+#include "shapes/interval.h"
 #include "shapes/plane.h"
 
 // A triangle's three vertices, or their attributes. Lanes may have different triangles.
@@ -117,25 +118,20 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
 }
 
 // The interval of t between the vertices' least and largest coordinate on one axis, widened by the slack.
-static inline Roots triangle_slab(real a, real b, real c, real slack, real inverse)
+static inline Interval triangle_slab(real a, real b, real c, real slack, real inverse)
 {
     real low = (real_min(real_min(a, b), c) - slack) * inverse;
     real high = (real_max(real_max(a, b), c) + slack) * inverse;
-    return (Roots){real_min(low, high), real_max(low, high)};
+    return (Interval){real_min(low, high), real_max(low, high)};
 }
 
 // The largest |coordinate| on each axis.
-static inline Vector corners_reach(Corners corners)
+static inline Vector corners_max_abs(Corners corners)
 {
     Vector a = corners.a, b = corners.b, c = corners.c;
     return (Vector){real_max(real_max(fabs(a.x), fabs(b.x)), fabs(c.x)),
                     real_max(real_max(fabs(a.y), fabs(b.y)), fabs(c.y)),
                     real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
-}
-
-static inline real roots_clamp(Roots roots, real t)
-{
-    return real_min(real_max(t, roots.near), roots.far);
 }
 
 // The clamped step. Edge-on the error of t is unbounded, while the edge functions, which know nothing of t,
@@ -144,19 +140,20 @@ static inline real roots_clamp(Roots roots, real t)
 static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray, real accurate_t)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
-    Vector reach = corners_reach((Corners){a, b, c});
-    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(reach);
+    Vector max_abs = corners_max_abs((Corners){a, b, c});
+    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(max_abs);
     real t = accurate_t;
-    t = roots_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
-    t = roots_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
-    t = roots_clamp(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
+    t = interval_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
+    t = interval_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
+    t = interval_clamp(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
     // the vertices' t are off by a few roundings of the largest product in them
     Vector along = ray->along;
-    real off = (real)(4 * UNIT_ROUNDOFF) *
-               (reach.x * fabs(along.x) + reach.y * fabs(along.y) + reach.z * fabs(along.z));
+    real t_error = (real)(4 * UNIT_ROUNDOFF) *
+                   (max_abs.x * fabs(along.x) + max_abs.y * fabs(along.y) + max_abs.z * fabs(along.z));
     real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
-    return roots_clamp(
-        (Roots){real_min(real_min(a_t, b_t), c_t) - off, real_max(real_max(a_t, b_t), c_t) + off}, t);
+    return interval_clamp(
+        (Interval){real_min(real_min(a_t, b_t), c_t) - t_error, real_max(real_max(a_t, b_t), c_t) + t_error},
+        t);
 }
 
 // The second and the third step.
@@ -219,9 +216,9 @@ static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
 static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
                                                  const Ray *ray, real t)
 {
-    Vector unit = vector_normalize(normal), reach = corners_reach(corners);
+    Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners);
     SurfacePoint point =
-        surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, reach));
+        surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, max_abs));
     if (IS_COMPENSATED) {
         real magnitude =
             real_max(real_max(vector_norm1(corners.a), vector_norm1(corners.b)), vector_norm1(corners.c));

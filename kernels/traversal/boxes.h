@@ -11,6 +11,7 @@
 #define BOXES_H
 
 #include "scene.h"
+#include "shapes/interval.h"
 #include "traversal/ray.h"
 
 // The slack, in u: of the distance to the farthest corner, for the hit (docs/adding-a-shape.md), and of the
@@ -54,13 +55,9 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
     return rays;
 }
 
-typedef struct {
-    real enter, leave;
-} BoxInterval;
-
-static inline BoxInterval box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
+static inline Interval box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
 {
-    return (BoxInterval){
+    return (Interval){
         real_min(real_fma((real)(low), inverse, to_near), real_fma((real)(high), inverse, to_near)),
         real_max(real_fma((real)(low), inverse, to_far), real_fma((real)(high), inverse, to_far))};
 }
@@ -69,11 +66,11 @@ static inline BoxInterval box_rays_between(scalar low, scalar high, real inverse
 static inline mask box_rays_intersect(const BoxRays *rays, scalar4 low, scalar4 high, real tmax)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
-    BoxInterval x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
-    BoxInterval y = box_rays_between(low.y, high.y, inverse.y, to_near.y, to_far.y);
-    BoxInterval z = box_rays_between(low.z, high.z, inverse.z, to_near.z, to_far.z);
-    return real_max(real_max(x.enter, y.enter), real_max(z.enter, rays->tmin)) <=
-           real_min(real_min(x.leave, y.leave), real_min(z.leave, tmax));
+    Interval x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
+    Interval y = box_rays_between(low.y, high.y, inverse.y, to_near.y, to_far.y);
+    Interval z = box_rays_between(low.z, high.z, inverse.z, to_near.z, to_far.z);
+    return real_max(real_max(x.near, y.near), real_max(z.near, rays->tmin)) <=
+           real_min(real_min(x.far, y.far), real_min(z.far, tmax));
 }
 
 // Which of a node's planes rays of one octant enter and leave a box by.
