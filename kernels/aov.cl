@@ -20,33 +20,33 @@ typedef struct {
     HIT_AOV_LIST(LAYER_MEMBER)
 } HitLayers;
 
-static KERNEL_BODY void tile_describe(const Scene *scene, const Tile *tile, const HitLayers *layers,
-                                      uint shadow_count)
+// light_count: 0 without a shadow layer.
+static KERNEL_BODY void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
+                                  uint light_count)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
-    Surface surface = surface_seen(scene, &ray, &hit);
+    Surface surface = visible_surface(scene, &ray, &hit);
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     film_store_color(layers->ray, tile, ray.direction);
     film_store(layers->t, tile, 1, 0, hit_distance(&hit));
     film_store_color(layers->normal, tile, vector_select(surface.found, surface.shading_normal, zero));
     film_store_color(layers->position, tile, vector_select(surface.found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
-    for (uint i = 0; i < shadow_count; i++) {
-        mask shadowed;
-        phong_light(scene, &surface, i, &shadowed);
-        film_store_integer(layers->shadow, tile, shadow_count, i,
+    for (uint i = 0; i < light_count; i++) {
+        mask shadowed = surface.found & !light_visibility(scene, &surface, i).lit;
+        film_store_integer(layers->shadow, tile, light_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }
 }
 
-kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint shadow_count)
+kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint light_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     const HitLayers layers = {HIT_AOV_LIST(LAYER_VALUE)};
     for (uint i = 0; i < ITEM_TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_describe(&scene, &tile, &layers, shadow_count);
+        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &layers, light_count);
     }
 }

@@ -16,7 +16,7 @@ typedef struct {
 } Tile;
 
 // Tiles per work-item.
-#define ITEM_TILES (LANES == 1 ? 1 : ITEM_TILES_MAX)
+#define ITEM_TILES (LANES == 1 ? 1 : TILES_PER_ITEM)
 
 // The work-item's tile number `which`, from 0.
 static inline Tile band_tile(const Band *band, uint which)

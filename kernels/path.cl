@@ -1,9 +1,9 @@
 // The signature of the ray tree at each pixel's center.
-#define SIGNS_PATHS 1
+#define COMPUTE_SIGNATURE 1
 #include "film.h"
 #include "shading/path.h"
 
-static KERNEL_BODY void tile_sign(const Scene *scene, const Tile *tile, global int *paths)
+static KERNEL_BODY void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths)
 {
     unsigned_integer signature;
     ray_color(scene, camera_ray(scene->header, tile->pixels, 0, 0, tile->inside), &signature);
@@ -16,6 +16,6 @@ kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     for (uint i = 0; i < ITEM_TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_sign(&scene, &tile, paths);
+        if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths);
     }
 }

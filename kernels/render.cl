@@ -1,5 +1,5 @@
 // The image: each work-item renders its tiles of pixels in turn.
-#define SIGNS_PATHS 0
+#define COMPUTE_SIGNATURE 0
 #include "film.h"
 #include "shading/path.h"
 
@@ -19,7 +19,7 @@ static KERNEL_BODY void tile_render(const Scene *scene, const Tile *tile, global
     for (uint sample = first_sample; sample < last_sample; sample++) {
         Ray ray = camera_ray(scene->header, tile->pixels, offsets[2 * sample], offsets[2 * sample + 1],
                              tile->inside);
-        rays_count(scene, RAYS_CAMERA, ray.active);
+        ray_counter_add(scene, RAYS_CAMERA, ray.active);
         unsigned_integer path;
         Color3 color = vector_subtract(ray_color(scene, ray, &path), lost);
         Color3 next = vector_add(sum, color);

@@ -39,7 +39,7 @@ typedef struct {
     }
 
 // Adds the lanes in `rays` to a counter, in a counting build only.
-static inline void rays_count(const Scene *scene, uint counter, mask rays)
+static inline void ray_counter_add(const Scene *scene, uint counter, mask rays)
 {
     if (!IS_COUNTING) return;
     IntegerLanes counted = {rays};

@@ -13,7 +13,7 @@ static inline void vector_store(Vector vector, RealLanes *to)
     to[2].all = vector.z;
 }
 
-// rays: RAY_SCALARS per ray; near and far are its tmin and tmax. results: RESULT_SCALARS per ray: t,
+// rays: RAY_SCALARS per ray. results: RESULT_SCALARS per ray: t,
 // geometric normal facing the ray, position, origin and direction of the reflected and of the refracted ray,
 // transmitted fraction, and transmittance from tmin to tmax. On a miss only the last is valid.
 static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
@@ -26,9 +26,9 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
             value[i].each[lane] = rays[(size_t)index * RAY_SCALARS + i];
     }
     Vector origin = vector_load(value + RAY_ORIGIN), direction = vector_load(value + RAY_DIRECTION);
-    Ray ray = ray_make(origin, direction, value[RAY_NEAR].all, value[RAY_FAR].all, mask_all());
+    Ray ray = ray_make(origin, direction, value[RAY_TMIN].all, value[RAY_TMAX].all, mask_all());
     Hit hit = closest_hit(scene, &ray);
-    Surface surface = surface_at(scene, &ray, &hit);
+    Surface surface = surface_interaction(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce reflected = {origin, direction, black}, refracted = reflected;
     surface_bounce(&surface, vector_normalize(direction), white, true, &reflected, &refracted);
@@ -41,8 +41,8 @@ static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const 
     vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);
     vector_store(refracted.origin, result + RESULT_REFRACTED_ORIGIN);
     vector_store(refracted.direction, result + RESULT_REFRACTED_DIRECTION);
-    result[RESULT_TRANSMISSION].all = refracted.weight.x;
-    result[RESULT_LIGHT].all = transmittance(scene, &ray);
+    result[RESULT_REFRACTED_WEIGHT].all = refracted.weight.x;
+    result[RESULT_TRANSMITTANCE].all = transmittance(scene, &ray);
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {
         size_t index = first + lane;

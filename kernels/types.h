@@ -1,8 +1,9 @@
 // The flat structs that host and kernels share, one array per shape.
 //
 // In the kernels `scalar` is float or double, the kernel's own precision. The host writes double and narrows
-// each array on upload. That needs one rule: in every struct the scalar4 members come first, the uint4
-// members last (tests/test_layout.c checks each on the device).
+// each array on upload. So in every struct the scalar4 members come first, the uint4 members last: then no
+// member needs padding, and narrowing goes element by element (tests/test_layout.c checks each on the
+// device).
 //
 // Positions are relative to the eye. Axes and normals are the scene's own, scaled by a power of two to a
 // length in 1/2..1, so that they are exact and never overflow.
@@ -25,11 +26,11 @@ typedef struct {
 
 typedef struct {
     scalar4 center_radius; // xyz center, w radius
-    uint4 id;              // x: the object's id, y: ONLY_INSIDE
+    uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES
 } Sphere;
 
-// In a shape's id.y: rays from outside pass through its near side.
-enum { ONLY_INSIDE = 8 };
+// In a shape's id.y: front faces are ignored, only rays from inside hit. Never with REVOLUTION_CAPPED.
+enum { IGNORES_FRONT_FACES = 8 };
 
 typedef struct {
     scalar4 point;
@@ -50,18 +51,18 @@ typedef struct {
     uint4 id;
 } Box;
 
-// Cylinder and cone: the points with |p x axis| = radius + slope (p . axis), p from the base. Radius and
-// slope are in units of |axis|, so that the axis need not be unit.
+// Cylinder and cone: the points with |p x axis| = radius |axis| + slope (p . axis), p from the base, for an
+// axis of any length.
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
-    scalar4 axis_slope;  // xyz axis, w slope
+    scalar4 axis_slope;  // xyz axis, w slope: the tangent of the half-angle, 0 for a cylinder
     scalar4 range;       // x: p . axis runs from 0 to this where finite; y: |axis|; z: |axis|^2
-    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | ONLY_INSIDE
+    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | IGNORES_FRONT_FACES
 } Revolution;
 
 enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2 };
 
-typedef Revolution Cylinder; // slope 0
+typedef Revolution Cylinder;
 typedef Revolution Cone;
 
 typedef struct {
@@ -122,26 +123,28 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #define BVH_QUARTER (BVH_WIDTH >> 2)
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
-    uint4 first[BVH_QUARTER];     // the child's node or first primitive
-    uint4 leaf_info[BVH_QUARTER]; // BVH_NODE, or a leaf's count << 8 | kind; 16 bits
+    uint4 child_index[BVH_QUARTER]; // the child's node or first primitive
+    uint4 child_kind[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits, count <= 255
 } BvhNode;
 #endif
 
-enum { BVH_NODE = 0xff, BVH_DEPTH_MAX = 80 };
+// BVH_DEPTH_LARGEST: see host/compile/bvh.h.
+enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
 // a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
 // whole BVH, then one of each primitive outside it, kind by kind; planes have none.
 //
-// xyz: from the common origin to the center; w: the origin's power |xyz|^2 - radius^2, lowered by
-// CULL_SPHERE_SLACK u |xyz|^2, or -CULL_SPHERE_MAX around the unbounded.
+// xyz: v, from the common origin to the center; w: the origin's power |v|^2 - radius^2, lowered by
+// CULL_SPHERE_SLACK u |v|^2. With v = 0, -CULL_SPHERE_LARGEST is never culled (unbounded, or out of float's
+// range) and +CULL_SPHERE_LARGEST always (an empty BVH).
 typedef struct {
     scalar4 center_power;
 } CullSphere;
 
 #define CULL_SPHERE_MAX 1e37f
 
-// The enlargement of cull spheres, in units of roundoff: of |xyz|^2, and of the ray's direction squared.
+// The enlargement of cull spheres, in units of roundoff: of |v|^2, and of the ray's direction squared.
 enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
 
 enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
@@ -192,10 +195,10 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 
 // Neighboring tiles along a row that a work-item of several lanes renders in turn. On a CPU each work-item is
 // a work-group of its own, which costs PoCL some hundred cycles to start.
-enum { ITEM_TILES_MAX = 8 };
+enum { TILES_PER_ITEM = 8 };
 
 // The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
-enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_NEAR = 6, RAY_FAR, RAY_SCALARS };
+enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };
 enum {
     RESULT_T,
     RESULT_NORMAL,
@@ -204,8 +207,8 @@ enum {
     RESULT_REFLECTED_DIRECTION = 10,
     RESULT_REFRACTED_ORIGIN = 13,
     RESULT_REFRACTED_DIRECTION = 16,
-    RESULT_TRANSMISSION = 19,
-    RESULT_LIGHT,
+    RESULT_REFRACTED_WEIGHT = 19,
+    RESULT_TRANSMITTANCE,
     RESULT_SCALARS
 };
 
@@ -218,7 +221,8 @@ typedef struct {
     scalar4 color;
     scalar4 position;  // from the eye; point and spot
     scalar4 direction; // unit, away from the light; directional and spot
-    // spot: x: 1 - cos(half-angle), y: 1 - cos(angle - penumbra), z: 1 / (x - y), 0 for a hard edge
+    // spot: x: 1 - cos(angle), from the axis to the edge; y: 1 - cos(angle - penumbra), which no kernel
+    // reads; z: 1 / (x - y), 0 for a hard edge
     scalar4 cone;
     uint4 kind; // x: LIGHT_KIND_…
 } Light;
@@ -232,12 +236,12 @@ typedef struct {
     // corners of a box around all points where a transparent object may touch an opaque one; low above high
     // where none does
     scalar4 contact_low, contact_high;
-    scalar4 sample;                      // x: width of a sample's share of a pixel, at distance 1
-    uint4 image;                         // x: width, y: height, z: samples per pixel, w: number of lights
-    uint4 bounces;                       // x: largest depth
-    uint4 cull_spheres;                  // x: number per common origin, 0: none
-    uint4 counts[KIND_QUARTETS];         // of each KIND_…, in that order
-    uint4 bounded_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
+    scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
+    uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
+    uint4 bounces;                   // x: largest depth
+    uint4 cull_spheres;              // x: number per common origin, 0: none
+    uint4 counts[KIND_QUARTETS];     // of each KIND_…, in that order
+    uint4 bvh_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
 } SceneHeader;
 
 #endif

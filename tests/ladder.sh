@@ -7,6 +7,6 @@ build=${BUILD:-build}
 make=${MAKE:-make}
 check "the ladder builds" $make -s BUILD="$build" ladder
 for shape in sphere plane disc box cylinder cone triangle torus; do
-    check "$shape" "$build/tools/numerics/ladder" --rays 1500 --hold --shape $shape
+    check "$shape" "$build/tools/numerics/ladder" --rays 1500 --check --shape $shape
 done
 finish

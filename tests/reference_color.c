@@ -1,9 +1,9 @@
 #include "tests/reference_color.h"
 #include "host/compile/random_shape.h"
 
-// A shadow ray leaves out this part of its way at either end: far over the rounding of quadruple precision,
-// far under any gap that a scene's doubles can express at its own scale.
-#define END_PART ((Quad)1e-12L)
+// A shadow ray leaves out this fraction of its length at either end: far over the rounding of quadruple
+// precision, far under any gap that a scene's doubles can express at its own scale.
+#define SHADOW_MARGIN ((Quad)1e-12L)
 
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
                                   unsigned row)
@@ -82,20 +82,22 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
     const Material *material = surface->material;
     Color base = surface->base;
     bool directional = light->kind == LIGHT_DIRECTIONAL;
-    Quad3 way = directional ? quad3_scale(quad3(light->direction), -1)
-                            : quad3_subtract(quad3(light->position), surface->point);
-    Quad3 to_light = quad3_unit(way);
+    Quad3 to_light_unnormalized = directional ? quad3_scale(quad3(light->direction), -1)
+                                              : quad3_subtract(quad3(light->position), surface->point);
+    Quad3 to_light = quad3_unit(to_light_unnormalized);
     Quad facing = quad3_dot(surface->normal, to_light);
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
     if (facing <= 0) return;
 
-    Quad start = surface->start / quad3_length(way);
-    ReferenceRay shadow = {surface->point, way, start, directional ? (Quad)LDBL_MAX : 1 - END_PART};
-    Quad strength = light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(way, -1)) : 1;
+    Quad start = surface->start / quad3_length(to_light_unnormalized);
+    ReferenceRay shadow = {surface->point, to_light_unnormalized, start,
+                           directional ? (Quad)LDBL_MAX : 1 - SHADOW_MARGIN};
+    Quad strength =
+        light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         ReferenceHit blocker = reference_hit_object(object, &shadow);
-        // The surface lies against itself; `facing` says where it shadows itself.
+        // The surface itself always has margin 0; `facing` says where it shadows itself.
         if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
         if (blocker.found) strength *= scene->materials.items[object->material].transmission;
     }
@@ -128,7 +130,7 @@ static Surface surface_at(const Scene *scene, const ReferenceRay *ray, Reference
                        .object = object,
                        .material = material,
                        .base = material->color};
-    surface.start = END_PART * surface.scale;
+    surface.start = SHADOW_MARGIN * surface.scale;
     if (blur > 0) {
         Quad size =
             surface.scale + quad3_length(quad3_subtract(surface.point, quad3(scene->camera.position)));
@@ -171,8 +173,7 @@ static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted)
     return true;
 }
 
-// The opaque surface in the same place as a transparent one, that goes before it. As near as this counts, in
-// parts of the ray's way.
+// Tie rule: an opaque surface within CONTACT_PART * distance of a transparent one is the visible one.
 #define CONTACT_PART ((Quad)1e-9L)
 
 static void hit_take_opaque(const Scene *scene, const ReferenceRay *ray, ReferenceHit *hit)
@@ -212,16 +213,16 @@ static void add_path(const Scene *scene, const ReferenceRay *ray, double weight,
     Quad3 direction = quad3_scale(surface.to_eye, -1);
     const Material *material = surface.material;
     double reflection = material->reflection, transmission = material->transmission;
-    ReferenceRay passed = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, mirrored = passed;
+    ReferenceRay refracted = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, reflected = refracted;
     Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
-    if (transmission > 0 && !refract(direction, surface.normal, eta, &passed.direction)) {
+    if (transmission > 0 && !refract(direction, surface.normal, eta, &refracted.direction)) {
         reflection += transmission;
         transmission = 0;
     }
     Quad away = quad3_dot(direction, surface.normal);
-    mirrored.direction = quad3_subtract(direction, quad3_scale(surface.normal, 2 * away));
-    add_path(scene, &mirrored, weight * reflection, bounces_left - 1, blur, random, sum);
-    add_path(scene, &passed, weight * transmission, bounces_left - 1, blur, random, sum);
+    reflected.direction = quad3_subtract(direction, quad3_scale(surface.normal, 2 * away));
+    add_path(scene, &reflected, weight * reflection, bounces_left - 1, blur, random, sum);
+    add_path(scene, &refracted, weight * transmission, bounces_left - 1, blur, random, sum);
 }
 
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)

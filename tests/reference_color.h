@@ -4,7 +4,7 @@
 
 #include "host/verify/reference.h"
 
-// The ray through the center of a pixel, row 0 at the top, as DESIGN.md has the camera.
+// The ray through the center of a pixel, row 0 at the top (docs/scene-format.md).
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
                                   unsigned row);
 

@@ -9,12 +9,12 @@ from collections import namedtuple
 from glint import PLANET, ROOT, TestCase, main, need_device, read, run, skip_all, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
-NOTHING = 0xFFFFFFFF
+MISS = 0xFFFFFFFF
 SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
 GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
 SPHERES = f"{ROOT}/scenes/spheres16.yaml"
 BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
-Near = namedtuple("Near", "value relative absolute", defaults=(0, 0))
+Approx = namedtuple("Approx", "value relative absolute", defaults=(0, 0))
 
 
 def arrays_load(prefix, light_count):
@@ -62,15 +62,15 @@ def worst_candidates(wrong, edges):
     return candidates.any(axis=2) if candidates.ndim == 3 else candidates
 
 
-def extent(values, relative=1e-12):
-    return {"max": Near(float(values.max()), relative), "p99_9": Near(percentile_99_9(values), 1e-6)}
+def max_and_p99_9(values, relative=1e-12):
+    return {"max": Approx(float(values.max()), relative), "p99_9": Approx(percentile_99_9(values), 1e-6)}
 
 
 def shading_errors(difference):
     values = difference[np.isfinite(difference)]
     magnitude = float(np.mean(np.abs(values)))
-    return {"pixels": difference.shape[0], "rmse": Near(math.sqrt(np.mean(values**2)), 1e-9),
-            "bias": Near(float(np.mean(values)), absolute=1e-9 * magnitude)} | extent(np.abs(values))
+    return {"pixels": difference.shape[0], "rmse": Approx(math.sqrt(np.mean(values**2)), 1e-9),
+            "bias": Approx(float(np.mean(values)), absolute=1e-9 * magnitude)} | max_and_p99_9(np.abs(values))
 
 
 def image_errors(reference, variant):
@@ -78,11 +78,11 @@ def image_errors(reference, variant):
     squares = (variant - reference)[finite] ** 2
     distance = srgb8_distance(*(srgb_encode(a.astype(np.float32).astype(np.float64)) for a in (reference, variant)))
     flip_map, flip_mean = flip(srgb_encode(reference), srgb_encode(variant))
-    return {"rmse": Near(math.sqrt(np.mean(squares)), 1e-9), "psnr": Near(psnr(np.mean(squares)), 1e-9),
-            "rel_mse": Near(float(np.mean(squares / (reference[finite] ** 2 + 0.01))), 1e-9),
+    return {"rmse": Approx(math.sqrt(np.mean(squares)), 1e-9), "psnr": Approx(psnr(np.mean(squares)), 1e-9),
+            "rel_mse": Approx(float(np.mean(squares / (reference[finite] ** 2 + 0.01))), 1e-9),
             "off_by_1": int((distance == 1).sum()), "off_by_more": int((distance > 1).sum()),
-            "srgb_psnr": Near(psnr(np.mean(distance**2) / 255**2), 1e-9),
-            "flip_mean": Near(float(flip_mean), absolute=2e-5), "flip_max": Near(float(flip_map.max()), absolute=2e-4)}
+            "srgb_psnr": Approx(psnr(np.mean(distance**2) / 255**2), 1e-9),
+            "flip_mean": Approx(float(flip_mean), absolute=2e-5), "flip_max": Approx(float(flip_map.max()), absolute=2e-4)}
 
 
 def normal_angles(a, b):
@@ -98,20 +98,20 @@ def expected_variant(reference, variant, edges):
               for kind in wrong}
     errors["nonfinite"] = int((~np.isfinite(color)).any(axis=2).sum())
     errors["negative"] = int((color < 0).any(axis=2).sum())
-    surface = ~wrong["object"] & (reference["object"] != NOTHING)
+    surface = ~wrong["object"] & (reference["object"] != MISS)
     errors["shading"] = shading_errors((color - reference["color"])[surface & ~wrong["shadow"].any(axis=2) & ~wrong["path"]])
     t, expected_t = variant["t"][surface], reference["t"][surface]
     ulp = 2.0 ** (np.floor(np.log2(expected_t)) + 1 - variant["bits"])
-    errors["t"] = {"pixels": int(surface.sum()), "relative": extent(np.abs(t - expected_t) / expected_t),
-                   "ulps": extent(np.abs(t - expected_t) / ulp)}
+    errors["t"] = {"pixels": int(surface.sum()), "relative": max_and_p99_9(np.abs(t - expected_t) / expected_t),
+                   "ulps": max_and_p99_9(np.abs(t - expected_t) / ulp)}
     angle = normal_angles(variant["normal"][surface], reference["normal"][surface])
-    errors["normal"] = {"max": Near(float(angle.max()), 1e-6, 1e-15), "p99_9": Near(percentile_99_9(angle), 1e-6, 1e-15)}
+    errors["normal"] = {"max": Approx(float(angle.max()), 1e-6, 1e-15), "p99_9": Approx(percentile_99_9(angle), 1e-6, 1e-15)}
     errors["image"] = image_errors(reference["color"], color)
     worst = {}
     for kind in wrong:
         candidates = worst_candidates(wrong[kind], edges[kind])
         error = color_error(reference, variant)[candidates]
-        worst[kind] = {"error": Near(float(error.max()), 1e-12)} if error.size else None
+        worst[kind] = {"error": Approx(float(error.max()), 1e-12)} if error.size else None
     faults = errors["nonfinite"] + errors["negative"] + errors["object"]["away"] + errors["shadow"]["away"]
     return {"errors": errors, "worst": worst, "crossed_out": faults > 0}
 
@@ -136,8 +136,8 @@ def expected_judgement(scene):
     def on_front(i, kind):
         mine = plotted(variants[i], kind), times[i]
         others = [(plotted(variants[k], kind), times[k]) for k in sound if k != i]
-        beaten = any(error <= mine[0] and time <= mine[1] and (error, time) != mine for error, time in others)
-        return i in sound and not beaten and not any(times[k] < times[i] for k in references)
+        dominated = any(error <= mine[0] and time <= mine[1] and (error, time) != mine for error, time in others)
+        return i in sound and not dominated and not any(times[k] < times[i] for k in references)
 
     def pick(budget, measure):
         within = references + [i for i in sound if plotted(variants[i], measure) <= budget]
@@ -171,7 +171,7 @@ class Accuracy(TestCase):
             self.assertEqual(len(reported), len(expected), where)
             for index, value in enumerate(expected):
                 self.check(f"{where}[{index}]", reported[index], value)
-        elif not isinstance(expected, Near):
+        elif not isinstance(expected, Approx):
             self.assertEqual(reported, expected, where)
         elif not math.isfinite(expected.value):
             self.assertIsNone(reported, where)
@@ -205,7 +205,7 @@ class Accuracy(TestCase):
                 place = worst["y"], worst["x"]
                 self.assertTrue(worst_candidates(wrong, edges[kind])[place], f"{where}, {kind}")
                 error = float(color_error(reference, variant)[place])
-                self.check(where, worst["error"], Near(error, 1e-12))
+                self.check(where, worst["error"], Approx(error, 1e-12))
 
     def test_judgement(self):
         glass, spheres, far, balls = (scene["variants"] for scene in self.report["scenes"])

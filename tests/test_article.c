@@ -1,6 +1,6 @@
 // The faults of the article's own program. Each test writes out its formula, in float as its kernel has it,
 // shows that the answer is wrong by the reference, and holds glint to the right one on the same `.cfg` scene.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/import/load.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"

@@ -1,5 +1,5 @@
 // Reflection, refraction, total reflection and light through glass: small images against the reference.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"

@@ -1,6 +1,6 @@
 // The BVH: its invariants for any boxes, that no hit depends on it, and that closed meshes do not leak; with
 // GLINT_LONG_TESTS=1 a million rays in place of ten thousand.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/bvh_widen.h"

@@ -8,7 +8,7 @@ rusticl on llvmpipe (Mesa 22.3) has no fused multiply-add, and its compiler inli
 renders one kind of shape at a time under all lights, some 5 seconds each: spheres, triangles and tori; with
 GLINT_LONG_TESTS=1 all of them, and the whole scene at 1 lane, which takes the compiler 17 seconds and 1.8 GB.
 
-Sanitized in long tests only."""
+run_tests: sanitize-long-only"""
 import math
 import os
 import shutil

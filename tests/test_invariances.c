@@ -1,6 +1,6 @@
 // Random scenes of every shape, light and kind of material: settings that must not change any bit of an image
-// or its AOVs (hard cases R6, R7, P7, M6). test_variants has a scene made by hand.
-// Sanitized in long tests only.
+// or its AOVs (hard cases R6, R7, P7, M6 of docs/verify.md). test_variants has a scene made by hand.
+// run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/transform.h"
@@ -28,10 +28,11 @@ typedef struct {
     const char *name;
 } Case;
 
-static Vector3 random_place(Random *random, double least, double most)
+// A point at a distance of least .. most from the origin, in a random direction.
+static Vector3 random_point(Random *random, double least, double most)
 {
-    Vector3 way = vector_normalize(random_in_sphere(random));
-    return vector_scale(way, random_between(random, least, most));
+    Vector3 direction = vector_normalize(random_in_sphere(random));
+    return vector_scale(direction, random_between(random, least, most));
 }
 
 static Color random_color(Random *random)
@@ -93,17 +94,17 @@ static Scene random_scene(uint64_t seed)
     while (forms[plane].kind != SHAPE_PLANE)
         plane++;
     Vector3 up = vector_normalize(scene.objects.items[plane].as.plane.normal);
-    Vector3 position = vector_subtract(random_place(&random, 10, 13), vector_scale(up, 6));
+    Vector3 position = vector_subtract(random_point(&random, 10, 13), vector_scale(up, 6));
     scene.camera = (Camera){.position = position,
-                            .look_at = random_place(&random, 0, 2),
-                            .up = random_place(&random, 1, 1),
+                            .look_at = random_point(&random, 0, 2),
+                            .up = random_point(&random, 1, 1),
                             .half_tangent = random_between(&random, 0.4, 0.8)};
     for (int i = 0; i < 4; i++) {
         static const LightKind kinds[] = {LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT, LIGHT_POINT};
         Light light = {.kind = kinds[i], .color = random_color(&random)};
-        light.position = vector_subtract(random_place(&random, 5, 15), vector_scale(up, 8));
-        light.direction = vector_subtract(random_place(&random, 0, 3), light.position);
-        light.half_angle = random_between(&random, 15, 40);
+        light.position = vector_subtract(random_point(&random, 5, 15), vector_scale(up, 8));
+        light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
+        light.angle = random_between(&random, 15, 40);
         light.penumbra = random_between(&random, 0, 10);
         array_push(scene.lights, light);
     }
@@ -188,7 +189,7 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
     }
 }
 
-// Columns of so many bytes a pixel, from right to left.
+// Mirrors each row; `size` bytes per pixel.
 static void columns_flip(void *values, size_t size)
 {
     unsigned char *bytes = values, kept[4 * sizeof(double)];
@@ -234,7 +235,7 @@ static void mirror_flips_the_image(const Case *checkered, uint64_t seed)
     scene_free(&given);
 }
 
-// Ids are places in the list, and are taken back to the first list's.
+// Object ids are list indices; this maps them back to the original order.
 static void order_changes_ids_alone(const Case *c, uint64_t seed)
 {
     Random random = {seed};

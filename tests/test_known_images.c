@@ -1,6 +1,6 @@
 // Images whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard
 // cases.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/base/text.h"
 #include "host/compile/camera_basis.h"
 #include "host/import/load.h"

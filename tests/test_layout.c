@@ -37,8 +37,8 @@ typedef struct {
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, cull_spheres)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[KIND_QUARTETS - 1])   \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounded_counts[0])           \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounded_counts[KIND_QUARTETS - 1]) \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[0])               \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[KIND_QUARTETS - 1]) \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, b)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \

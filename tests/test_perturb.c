@@ -1,6 +1,6 @@
 // Differences between devices: at `strict` quotients and roots with the error that the specification permits
 // are repaired to the correctly rounded ones, and the fma of devices without one in hardware has fma's bits.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
@@ -32,7 +32,7 @@ static const char fma_text[] =
     "{\n"
     "    size_t i = get_global_id(0) * LANES;\n"
     "    RealLanes sum = {real_fma(real_load(a + i), real_load(b + i), real_load(c + i))};\n"
-    "    RealLanes error = {pair_product(real_load(a + i), real_load(b + i)).low};\n"
+    "    RealLanes error = {two_product(real_load(a + i), real_load(b + i)).low};\n"
     "    for (uint lane = 0; lane < LANES; lane++) {\n"
     "        sums[i + lane] = sum.each[lane];\n"
     "        errors[i + lane] = error.each[lane];\n"

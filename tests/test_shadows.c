@@ -1,5 +1,5 @@
 // Shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/reference_color.h"

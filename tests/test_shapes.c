@@ -1,5 +1,5 @@
 // Every shape at every precision against the reference: hit or miss, distance and normal.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/verify/reference.h"
 #include "tests/film.h"
 #include "tests/probe.h"

@@ -1,7 +1,7 @@
 // The rays of the Standard Procedural Databases, counted and compared with the published numbers (Haines,
 // Standard Procedural Databases 3.14, README, Database analysis): all classical ray tracers should be within
 // 10%. Skipped where the scenes are not there.
-// Sanitized in long tests only.
+// run_tests: sanitize-long-only
 #include "host/compile/flat_types.h"
 #include "tests/film.h"
 #include "tests/probe.h"

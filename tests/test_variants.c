@@ -280,8 +280,8 @@ static void runs_repeat(void **state)
     film_free(&first);
 }
 
-// HARDCASES R6: nothing in the kernels has a length of its own; beyond what its squares can take a scene is
-// scaled.
+// Hard case R6 (docs/verify.md): nothing in the kernels has a length of its own; beyond what its squares can
+// take a scene is scaled.
 static void scale_changes_nothing(void **state)
 {
     (void)state;
@@ -303,7 +303,7 @@ static void scale_changes_nothing(void **state)
     }
 }
 
-// HARDCASES R7.
+// Hard case R7.
 static void mirror_gives_the_mirrored_image(void **state)
 {
     (void)state;

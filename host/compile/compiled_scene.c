@@ -12,7 +12,7 @@
 #define LAYOUT_OF_REALS(Type) {sizeof(Type), sizeof(Type) / sizeof(scalar4), 0}
 
 static const FlatLayout layouts[FLAT_COUNT] = {
-    [FLAT_HEADER] = LAYOUT(SceneHeader, image, bounded_counts),
+    [FLAT_HEADER] = LAYOUT(SceneHeader, image, bvh_counts),
 #define SHAPE_LAYOUT(feature, Type, name, names) [FLAT_FIRST_SHAPE + KIND_##feature] = LAYOUT(Type, id, id),
     SHAPE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),

@@ -25,7 +25,7 @@ static TileShape tile_shape(uint32_t lanes)
 static TileShape item_shape(uint32_t lanes)
 {
     TileShape shape = tile_shape(lanes);
-    if (lanes > 1) shape.width *= ITEM_TILES_MAX;
+    if (lanes > 1) shape.width *= TILES_PER_ITEM;
     return shape;
 }
 

@@ -2,6 +2,15 @@
 //
 // Above this file code reads like the scalar algorithm, with a mask where that would branch. A mask is the
 // result of a comparison: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
+//
+// The host defines these macros before the text (prelude_write in host/render/renderer.c):
+//     LANES            1, 4, 8 or 16
+//     IS_FAST, IS_STRICT, IS_DOUBLE    the precision, one of them 1; all 0 at `single`
+//     REPAIRS_DIVIDE   1 at `strict` where the device's division and square root are inexact: numerics.h
+//     HAS_FMA          0 where the device emulates fma: pair.h
+//     IS_COUNTING      1: rays are counted
+//     PERTURB          1: errors are simulated, by PERTURB_SEED and PERTURB_SCALE: perturb.h
+//     HAS_<feature>    0 or 1 for each of features.h
 #ifndef LANES_H
 #define LANES_H
 
@@ -131,17 +140,17 @@ typedef union {
 #define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
 #endif
 
-// clang's reductions take few instructions on x86 and Arm; halving, written out, takes several times as many.
-// clang for SPIR may lack them.
+// clang for a CPU has reductions that take few instructions; halving, written out, takes several times as
+// many. clang for SPIR may lack them.
 #if defined(__x86_64__) || defined(__aarch64__)
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_min)
-#define REDUCES_LANES 1
+#define IS_CPU_CLANG 1
 #endif
 #endif
 #endif
-#ifndef REDUCES_LANES
-#define REDUCES_LANES 0
+#ifndef IS_CPU_CLANG
+#define IS_CPU_CLANG 0
 #endif
 
 #if LANES == 1
@@ -154,7 +163,7 @@ static inline scalar_integer lanes_smallest(integer value)
 {
     return value;
 }
-#elif REDUCES_LANES
+#elif IS_CPU_CLANG
 static inline bool lanes_any(mask condition)
 {
     return __builtin_reduce_or(condition != (mask)(0)) != 0;
@@ -216,7 +225,7 @@ static inline uint lanes_bits(mask condition)
     return condition != 0;
 #elif defined(MASK_BITS)
     return (uint)MASK_BITS(condition);
-#elif REDUCES_LANES
+#elif IS_CPU_CLANG
     return (uint)__builtin_reduce_or(lanes_select(condition, LANE_BIT, (integer)(0)));
 #else
     IntegerLanes lanes = {condition};
@@ -253,7 +262,7 @@ static inline real real_of_lane(const real *lanes, uint lane)
     return (real)(((const scalar *)lanes)[lane]);
 }
 
-// One instruction each, unlike fmin and fmax, whose treatment of NaN is not needed.
+// One instruction each, unlike fmin and fmax: if either operand is NaN, the second one is returned.
 static inline real real_min(real a, real b)
 {
     return lanes_select(a < b, a, b);
@@ -310,7 +319,7 @@ static inline scalar lanes_largest(mask members, real a)
 // Prefetches memory that will soon be read, by cache line. PoCL's own prefetch does nothing.
 static inline void memory_prefetch(global const char *from, uint size)
 {
-#if REDUCES_LANES
+#if IS_CPU_CLANG
 #pragma unroll
     for (uint at = 0; at < size; at += 64)
         __builtin_prefetch((global const void *)(from + at));

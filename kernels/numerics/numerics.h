@@ -14,27 +14,29 @@
 // floats): computed from the operands' mantissas alone, so that nothing overflows or underflows, brought
 // within an ulp by a Newton step, then chosen among three neighbors by exact comparisons. A Newton step alone
 // does not suffice: the root of 1 - 2^-24 lies 2^-27 ulp from the midpoint of two floats.
-#define EXPONENT_BITS ((integer)(0x7f800000))
-#define SIGN_BIT      ((integer)(~0x7fffffff))
-#define BITS_OF_ONE   ((integer)(0x3f800000))
+//
+// For floats alone: FLOAT_… and float_… know their bit patterns.
+#define FLOAT_EXPONENT_BITS ((integer)(0x7f800000))
+#define FLOAT_SIGN_BIT      ((integer)(~0x7fffffff))
+#define FLOAT_BITS_OF_ONE   ((integer)(0x3f800000))
 
-static inline mask real_is_normal(real a)
+static inline mask float_is_normal(real a)
 {
     return (fabs(a) >= (real)(0x1p-126f)) & (fabs(a) <= (real)(LARGEST));
 }
 
-static inline real real_power_of_two(integer exponent)
+static inline real float_power_of_two(integer exponent)
 {
-    return real_from_bits(BITS_OF_ONE + (exponent << 23));
+    return real_from_bits(FLOAT_BITS_OF_ONE + (exponent << 23));
 }
 
 // The neighbors of a > 0.
-static inline real real_above(real a)
+static inline real float_above(real a)
 {
     return real_from_bits(bits_from_real(a) + (integer)(1));
 }
 
-static inline real real_below(real a)
+static inline real float_below(real a)
 {
     return real_from_bits(bits_from_real(a) - (integer)(1));
 }
@@ -44,19 +46,19 @@ static inline real real_below(real a)
 static inline real repaired_quotient(real a, real b)
 {
     integer a_bits = bits_from_real(a), b_bits = bits_from_real(b);
-    a = real_from_bits((a_bits & MANTISSA) | BITS_OF_ONE);
-    b = real_from_bits((b_bits & MANTISSA) | BITS_OF_ONE);
+    a = real_from_bits((a_bits & MANTISSA) | FLOAT_BITS_OF_ONE);
+    b = real_from_bits((b_bits & MANTISSA) | FLOAT_BITS_OF_ONE);
     real quotient = device_divide(a, b);
     quotient = real_fma(real_fma(-quotient, b, a), device_divide((real)(1), b), quotient);
     real residual = real_fma(-quotient, b, a), half_b = (real)(0.5f) * b;
-    real up = real_above(quotient), down = real_below(quotient);
+    real up = float_above(quotient), down = float_below(quotient);
     mask rises = residual > (up - quotient) * half_b, falls = residual < (down - quotient) * half_b;
     quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
-    quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & SIGN_BIT));
+    quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & FLOAT_SIGN_BIT));
     // in two factors: one alone may overflow where the product does not
-    integer exponent = ((a_bits & EXPONENT_BITS) >> 23) - ((b_bits & EXPONENT_BITS) >> 23);
+    integer exponent = ((a_bits & FLOAT_EXPONENT_BITS) >> 23) - ((b_bits & FLOAT_EXPONENT_BITS) >> 23);
     integer half_exponent = exponent >> 1;
-    return quotient * real_power_of_two(half_exponent) * real_power_of_two(exponent - half_exponent);
+    return quotient * float_power_of_two(half_exponent) * float_power_of_two(exponent - half_exponent);
 }
 
 // By Tuckerman's test: root (root - ulp) < a <= root (root + ulp) (Agarwal, Cooley, Gustavson, Shearer,
@@ -64,13 +66,13 @@ static inline real repaired_quotient(real a, real b)
 // Research and Development 30(2), 1986).
 static inline real repaired_root(real a)
 {
-    integer half_exponent = (bits_from_real(a) - BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
+    integer half_exponent = (bits_from_real(a) - FLOAT_BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
     a = real_from_bits(bits_from_real(a) - (half_exponent << 24));
     real root = device_sqrt(a);
     root = real_fma(real_fma(-root, root, a), device_divide((real)(0.5f), root), root);
-    real up = real_above(root), down = real_below(root);
+    real up = float_above(root), down = float_below(root);
     mask rises = real_fma(-root, up, a) > (real)(0), falls = real_fma(-root, down, a) <= (real)(0);
-    return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
+    return lanes_select(rises, up, lanes_select(falls, down, root)) * float_power_of_two(half_exponent);
 }
 
 // Correctly rounded at `strict` on every device, except for subnormal numbers.
@@ -78,7 +80,7 @@ static inline real real_divide(real a, real b)
 {
     real quotient = device_divide(a, b);
     if (!REPAIRS_DIVIDE) return quotient;
-    mask ordinary = real_is_normal(a) & real_is_normal(b) & real_is_normal(quotient);
+    mask ordinary = float_is_normal(a) & float_is_normal(b) & float_is_normal(quotient);
     return lanes_select(ordinary, repaired_quotient(a, b), quotient);
 }
 
@@ -87,11 +89,11 @@ static inline real real_sqrt(real a)
 {
     real root = device_sqrt(a);
     if (!REPAIRS_DIVIDE) return root;
-    return lanes_select(real_is_normal(a), repaired_root(a), root);
+    return lanes_select(float_is_normal(a), repaired_root(a), root);
 }
 
 // The reciprocal of the largest power of two <= a, for a > 0; huge for 0.
-static inline real real_inverse_power(real a)
+static inline real real_inverse_power_of_two(real a)
 {
 #if IS_DOUBLE
     return real_from_bits((integer)(0x7fe0000000000000L) -
@@ -103,7 +105,7 @@ static inline real real_inverse_power(real a)
 
 // a b - c d within 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of Kahan's
 // algorithm for the accurate computation of 2x2 determinants, Math. Comp. 82, 2013).
-static inline real product_difference(real a, real b, real c, real d)
+static inline real difference_of_products(real a, real b, real c, real d)
 {
     real cd = c * d;
     real rest = real_fma(-c, d, cd);
@@ -118,7 +120,8 @@ static inline Pair pair_of(real value)
     return (Pair){value, (real)(0)};
 }
 
-static inline Pair pair_fast_sum(real larger, real smaller)
+// a + b without error, for |larger| >= |smaller| or larger = 0.
+static inline Pair fast_two_sum(real larger, real smaller)
 {
     real sum = larger + smaller;
     return (Pair){sum, smaller - (sum - larger)};
@@ -131,10 +134,10 @@ static inline Pair pair_negate(Pair a)
 
 static inline Pair pair_add(Pair a, Pair b)
 {
-    Pair high = pair_sum(a.high, b.high);
-    Pair low = pair_sum(a.low, b.low);
-    Pair sum = pair_fast_sum(high.high, high.low + low.high);
-    return pair_fast_sum(sum.high, low.low + sum.low);
+    Pair high = two_sum(a.high, b.high);
+    Pair low = two_sum(a.low, b.low);
+    Pair sum = fast_two_sum(high.high, high.low + low.high);
+    return fast_two_sum(sum.high, low.low + sum.low);
 }
 
 static inline Pair pair_subtract(Pair a, Pair b)
@@ -144,18 +147,18 @@ static inline Pair pair_subtract(Pair a, Pair b)
 
 static inline Pair pair_multiply(Pair a, Pair b)
 {
-    Pair product = pair_product(a.high, b.high);
-    return pair_fast_sum(product.high, product.low + real_fma(a.high, b.low, a.low * b.high));
+    Pair product = two_product(a.high, b.high);
+    return fast_two_sum(product.high, product.low + real_fma(a.high, b.low, a.low * b.high));
 }
 
 static inline Pair pair_scale(Pair a, real factor)
 {
-    Pair product = pair_product(a.high, factor);
-    return pair_fast_sum(product.high, real_fma(a.low, factor, product.low));
+    Pair product = two_product(a.high, factor);
+    return fast_two_sum(product.high, real_fma(a.low, factor, product.low));
 }
 
 // a b - c d in pairs.
-static inline Pair pair_product_difference(Pair a, Pair b, Pair c, Pair d)
+static inline Pair pair_difference_of_products(Pair a, Pair b, Pair c, Pair d)
 {
     return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
 }
@@ -246,7 +249,7 @@ static inline real real_complement_power(real s, real n)
 }
 
 // Where (1 - s)^n, at most e^(-n s), may be above 0.
-static inline mask real_complement_power_counts(real s, real n)
+static inline mask real_complement_power_is_nonzero(real s, real n)
 {
     return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));
 }

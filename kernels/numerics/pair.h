@@ -12,13 +12,14 @@
 
 #include "numerics/lanes.h"
 
-// The unevaluated sum high + low, |low| at most half an ulp of high: about 2 x 24 or 2 x 53 bits.
+// A double-word (double-double) number: the unevaluated sum high + low, |low| at most half an ulp of high,
+// about 2 x 24 or 2 x 53 bits.
 typedef struct {
     real high, low;
 } Pair;
 
 // a + b without error (Knuth, The Art of Computer Programming 2, 4.2.2, theorem B).
-static inline Pair pair_sum(real a, real b)
+static inline Pair two_sum(real a, real b)
 {
     real sum = a + b;
     real of_b = sum - a;
@@ -30,7 +31,7 @@ static inline Pair pair_sum(real a, real b)
 #define real_fma fma
 
 // a b without error.
-static inline Pair pair_product(real a, real b)
+static inline Pair two_product(real a, real b)
 {
     real product = a * b;
     return (Pair){product, real_fma(a, b, -product)};
@@ -40,7 +41,7 @@ static inline Pair pair_product(real a, real b)
 
 // a b without error, from parts of 12 bits, whose products are exact (Dekker, A floating-point technique for
 // extending the available precision, Numerische Mathematik 18, 1971).
-static inline Pair pair_product(real a, real b)
+static inline Pair two_product(real a, real b)
 {
     const integer high_bits = (integer)(~0xfff);
     real product = a * b;
@@ -52,7 +53,7 @@ static inline Pair pair_product(real a, real b)
 
 #if IS_FAST
 
-// May round twice: of all products only pair_product's are exact here.
+// May round twice: of all products only two_product's are exact here.
 #define real_fma mad
 
 #else
@@ -68,9 +69,9 @@ static inline real pair_round_to_odd(Pair sum)
 
 static inline real real_fma(real a, real b, real c)
 {
-    Pair product = pair_product(a, b);
-    Pair lower = pair_sum(c, product.low), upper = pair_sum(product.high, lower.high);
-    real rounded_once = upper.high + pair_round_to_odd(pair_sum(upper.low, lower.low));
+    Pair product = two_product(a, b);
+    Pair lower = two_sum(c, product.low), upper = two_sum(product.high, lower.high);
+    real rounded_once = upper.high + pair_round_to_odd(two_sum(upper.low, lower.low));
     // has the right sign if the sum is 0, and is right beyond the largest real
     real rounded_twice = product.high + c;
     mask finite = (fabs(rounded_twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));

@@ -71,12 +71,12 @@ static inline real device_sqrt(real a)
     return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
 }
 
-// Gives base^exponent, which kernels compute themselves except at `fast`, the error of a device's own power
-// function. Not at `strict`, whose bits are the same on every device.
-static inline real perturbed_power(real power, real base, real exponent)
+// Gives (1 - complement)^exponent, which kernels compute themselves except at `fast`, the error of a device's
+// own power function. Not at `strict`, whose bits are the same on every device.
+static inline real perturbed_power(real power, real complement, real exponent)
 {
     if (!PERTURB || IS_STRICT) return power;
-    return perturb(power, perturb_hash(PERTURBED_POWER, bits_from_real(base), bits_from_real(exponent)),
+    return perturb(power, perturb_hash(PERTURBED_POWER, bits_from_real(complement), bits_from_real(exponent)),
                    POWER_ERROR);
 }
 

@@ -53,21 +53,21 @@ static inline real vector_dot(Vector a, Vector b)
 
 // The dot product as if in twice the precision (Ogita, Rump, Oishi, Accurate sum and dot product, SIAM J.
 // Sci. Comput. 26(6), 2005, algorithm 5.3).
-static inline real vector_dot_exactly(Vector a, Vector b)
+static inline real vector_dot_compensated(Vector a, Vector b)
 {
-    Pair x = pair_product(a.x, b.x), y = pair_product(a.y, b.y), z = pair_product(a.z, b.z);
-    Pair two = pair_sum(x.high, y.high), three = pair_sum(two.high, z.high);
+    Pair x = two_product(a.x, b.x), y = two_product(a.y, b.y), z = two_product(a.z, b.z);
+    Pair two = two_sum(x.high, y.high), three = two_sum(two.high, z.high);
     return three.high + (((x.low + y.low) + z.low) + (two.low + three.low));
 }
 
 // Each component within 1.5 ulp.
 static inline Vector vector_cross(Vector a, Vector b)
 {
-    return (Vector){product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),
-                    product_difference(a.x, b.y, a.y, b.x)};
+    return (Vector){difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
+                    difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
-static inline real vector_length(Vector a)
+static inline real vector_norm(Vector a)
 {
     return real_sqrt(vector_dot(a, a));
 }
@@ -75,7 +75,7 @@ static inline real vector_length(Vector a)
 // Unit within 2.5 u. The zero vector stays zero.
 static inline Vector vector_normalize(Vector a)
 {
-    real norm = vector_length(a);
+    real norm = vector_norm(a);
     mask zero = norm == (real)(0);
     return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), norm)));
 }
@@ -87,15 +87,15 @@ static inline Vector vector_renormalize(Vector a)
     return vector_scale(a, real_fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
 }
 
-// |x| + |y| + |z|: error bounds are proportional to it.
-static inline real vector_magnitude(Vector a)
+// The 1-norm |x| + |y| + |z|: error bounds are proportional to it.
+static inline real vector_norm1(Vector a)
 {
     return fabs(a.x) + fabs(a.y) + fabs(a.z);
 }
 
-// The magnitude along a unit normal: how far errors proportional to coordinates move a point off a surface.
-// Errors along the surface do not.
-static inline real vector_magnitude_along(Vector unit, Vector a)
+// The 1-norm of the components along a unit normal: how far errors proportional to coordinates move a point
+// off a surface. Errors along the surface do not.
+static inline real vector_norm1_along(Vector unit, Vector a)
 {
     return real_fma(fabs(unit.x), fabs(a.x), real_fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
 }
@@ -107,7 +107,7 @@ typedef struct {
 
 static inline PairVector pair_vector_difference(Vector a, Vector b)
 {
-    return (PairVector){pair_sum(a.x, -b.x), pair_sum(a.y, -b.y), pair_sum(a.z, -b.z)};
+    return (PairVector){two_sum(a.x, -b.x), two_sum(a.y, -b.y), two_sum(a.z, -b.z)};
 }
 
 static inline PairVector pair_vector_of(Vector a)
@@ -138,12 +138,12 @@ static inline Vector pair_vector_high(PairVector a)
     return (Vector){a.x.high, a.y.high, a.z.high};
 }
 
-// a . b rounded about once, in a third of the operations of pairs: vector_dot_exactly of the high parts, plus
-// the low parts' product among the errors it sums.
+// a . b rounded about once, in a third of the operations of pairs: vector_dot_compensated of the high parts,
+// plus the low parts' product among the errors it sums.
 static inline real pair_vector_dot_once(PairVector a, Vector b)
 {
-    Pair x = pair_product(a.x.high, b.x), y = pair_product(a.y.high, b.y), z = pair_product(a.z.high, b.z);
-    Pair two = pair_sum(x.high, y.high), three = pair_sum(two.high, z.high);
+    Pair x = two_product(a.x.high, b.x), y = two_product(a.y.high, b.y), z = two_product(a.z.high, b.z);
+    Pair two = two_sum(x.high, y.high), three = two_sum(two.high, z.high);
     real low = real_fma(a.x.low, b.x, real_fma(a.y.low, b.y, a.z.low * b.z));
     return three.high + ((((x.low + y.low) + z.low) + (two.low + three.low)) + low);
 }

@@ -13,14 +13,14 @@ typedef struct {
     real travelled; // distance from the eye along the path
 } Bounce;
 
-static inline mask bounce_counts(const Bounce *bounce)
+static inline mask bounce_is_active(const Bounce *bounce)
 {
     return (bounce->weight.x > (real)(0)) | (bounce->weight.y > (real)(0)) | (bounce->weight.z > (real)(0));
 }
 
 static inline Ray bounce_ray(const Bounce *bounce)
 {
-    Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_counts(bounce));
+    Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_is_active(bounce));
     ray.travelled = bounce->travelled;
     return ray;
 }
@@ -40,7 +40,7 @@ static inline mask vector_refract(Vector direction, Vector normal, mask entering
     real scale = lanes_select(entering, (real)(1), ior);
     real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
     real scaled = scale * -vector_dot(direction, normal);
-    real squared = product_difference(scaled, scaled, above_one, ior + (real)(1));
+    real squared = difference_of_products(scaled, scaled, above_one, ior + (real)(1));
     mask total = squared < (real)(0);
     real cosine = real_sqrt(real_max(squared, (real)(0)));
     *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, scale)));
@@ -82,13 +82,13 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
         total = surface_refract(surface, direction, &refracted->direction);
         real transmission = lanes_select(total, (real)(0), surface->transmission);
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
-        refracted->origin = surface_leave(surface, true);
+        refracted->origin = secondary_ray_origin(surface, true);
         refracted->weight = vector_scale(weight, transmission);
         total = total & transparent;
     }
     if (all || lanes_any(reflection > (real)(0))) {
         reflected->direction = surface_reflect(surface, direction);
-        reflected->origin = surface_leave(surface, false);
+        reflected->origin = secondary_ray_origin(surface, false);
         reflected->weight = vector_scale(weight, reflection);
     }
     reflected->travelled = refracted->travelled = surface->travelled;

@@ -23,12 +23,12 @@ static inline real spot_strength(const Light *light, Vector from_light)
     return light->cone.z == 0 ? hard : soft;
 }
 
-// The shadow ray to a point or spot light runs from 0 to 1, unnormalized, and ends a rounding before the
-// light.
+// The shadow ray to a point or spot light is not normalized: the light is at t = 1. It ends 32 u before, so
+// that a surface on which the light lies does not occlude it.
 static inline LightRay light_ray(const Light *light, const Surface *surface)
 {
     LightRay to_light;
-    Vector start = surface_leave(surface, false);
+    Vector start = secondary_ray_origin(surface, false);
     to_light.strength = (real)(1);
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
@@ -52,45 +52,60 @@ static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye,
 {
     Vector difference = vector_subtract(reflected, to_eye);
     real s = (real)(0.5f) * vector_dot(difference, difference);
-    mask counts = real_complement_power_counts(s, shininess);
+    mask nonzero = real_complement_power_is_nonzero(s, shininess);
     real highlight = (real)(0);
-    if (lanes_any(wanted & counts))
+    if (lanes_any(wanted & nonzero))
         highlight = lanes_select(
-            counts, real_complement_power(lanes_select(counts, s, (real)(0.5f)), shininess), highlight);
+            nonzero, real_complement_power(lanes_select(nonzero, s, (real)(0.5f)), shininess), highlight);
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 
-// One light's contribution; black in *shadowed lanes, whose surface faces away from the light or is occluded.
-static inline Color3 phong_light(const Scene *scene, const Surface *surface, uint index, mask *shadowed)
+// How a light reaches the surface.
+typedef struct {
+    mask lit;         // lanes that it reaches: they face it and are not occluded
+    Vector direction; // from the surface to the light, unit
+    real facing;      // the cosine between the shading normal and that
+    real fraction;    // of the light's color that arrives
+} LightVisibility;
+
+static inline LightVisibility light_visibility(const Scene *scene, const Surface *surface, uint index)
 {
-    const Color3 black = {(real)(0), (real)(0), (real)(0)};
     Light light = scene->lights[index];
     LightRay to_light = light_ray(&light, surface);
-    real facing = vector_dot(surface->shading_normal, to_light.direction);
-    mask lit = surface->found & (facing > (real)(0)) & (to_light.strength > (real)(0));
-    *shadowed = surface->found & !lit;
-    if (!lanes_any(lit)) return black;
+    LightVisibility visibility;
+    visibility.direction = to_light.direction;
+    visibility.facing = vector_dot(surface->shading_normal, to_light.direction);
+    visibility.fraction = (real)(0);
+    visibility.lit = surface->found & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
+    if (!lanes_any(visibility.lit)) return visibility;
 
-    to_light.shadow_ray.active = to_light.shadow_ray.active & lit;
+    to_light.shadow_ray.active = to_light.shadow_ray.active & visibility.lit;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
         ray_set_common_origin(&to_light.shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
-    rays_count(scene, RAYS_SHADOW, to_light.shadow_ray.active);
+    ray_counter_add(scene, RAYS_SHADOW, to_light.shadow_ray.active);
     real passing = transmittance(scene, &to_light.shadow_ray);
-    lit = lit & (passing > (real)(0));
-    *shadowed = surface->found & !lit;
-    if (!lanes_any(lit)) return black;
+    visibility.lit = visibility.lit & (passing > (real)(0));
+    visibility.fraction = to_light.strength * passing;
+    return visibility;
+}
 
-    Color3 reached = vector_scale(vector_of(light.color), to_light.strength * passing);
-    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), facing);
-    mask glossy = lit & (surface->specular > (real)(0));
+// One light's contribution; black in lanes that it does not reach.
+static inline Color3 phong_shade(const Scene *scene, const Surface *surface, uint index)
+{
+    const Color3 black = {(real)(0), (real)(0), (real)(0)};
+    LightVisibility light = light_visibility(scene, surface, index);
+    if (!lanes_any(light.lit)) return black;
+    Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light.fraction);
+    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), light.facing);
+    mask glossy = light.lit & (surface->specular > (real)(0));
     if (lanes_any(glossy)) {
         Vector reflected =
-            vector_fma(surface->shading_normal, facing + facing, vector_negate(to_light.direction));
+            vector_fma(surface->shading_normal, light.facing + light.facing, vector_negate(light.direction));
         real highlight =
             surface->specular * phong_highlight(glossy, reflected, surface->to_eye, surface->shininess);
         color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
     }
-    return vector_select(lit, color_multiply(color, reached), black);
+    return vector_select(light.lit, color_multiply(color, arriving), black);
 }
 
 #endif

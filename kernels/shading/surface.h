@@ -18,6 +18,8 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
                     real_fma(weight.z, color.z, sum.z)};
 }
 
+// Color and `travelled` presume that the ray's direction is unit; of an explicit ray, which may have any
+// length, neither is used.
 typedef struct {
     mask found;
     Vector position;
@@ -25,7 +27,7 @@ typedef struct {
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
     real error;            // bound on the position's distance from the true surface
-    real behind;           // how far behind the surface a refracted ray starts
+    real refracted_offset; // how far behind the surface a refracted ray starts
     Color3 color, diffuse;
     real ambient, specular, shininess;
     real reflection, transmission, ior;
@@ -45,23 +47,23 @@ static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, ui
     return surface_point_make(ray->origin, ray->direction, (real)(0));
 }
 
-// Lanes that hit the same object, or triangles of the same material.
+// The surface points of the lanes that hit the same object, or triangles of the same material.
 typedef struct {
     mask lanes;
     SurfacePoint point;
     TextureCoordinates coordinates; // of triangles only
-} ObjectHit;
+} LaneSurfacePoints;
 
-// Lanes whose hit has been looked up.
+// Marks lanes that are done: larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
 
 // The triangles of one material among the objects hit. In a fine mesh each lane hits one of its own: vertices
 // are gathered triangle by triangle, then evaluated for all lanes at once.
-static OUT_OF_LINE ObjectHit triangles_hit(const Scene *scene, integer objects, uint material, const Ray *ray,
-                                           real t)
+static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
+                                                             uint material, const Ray *ray, real t)
 {
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
-    ObjectHit hit;
+    LaneSurfacePoints hit;
     hit.lanes = mask_none();
     Vector normal = zero;
     Corners corners = {zero, zero, zero}, normals = corners, uvs = corners;
@@ -122,7 +124,7 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
 
 // The object's color at the hit: plain, checkered or textured. `entry` is the object's kind_index_material.
 static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
-                                  const ObjectHit *hit, const Ray *ray, real travelled)
+                                  const LaneSurfacePoints *hit, const Ray *ray, real travelled)
 {
     Color3 color = vector_of(material->color);
     if (HAS_CHECKERS && material->grid.w != 0) {
@@ -161,13 +163,15 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     mask opposite = vector_dot(point->shading_normal, surface->normal) < (real)(0);
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
-    surface->error = (real)(UNIT_ROUNDOFF)*real_fma((real)(16), point->size,
-                                                    (real)(4) * vector_magnitude(point->position));
-    surface->behind = surface->error + surface->error;
+    surface->error =
+        (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
+                                       (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
+    surface->refracted_offset = surface->error + surface->error;
 }
 
-// Rays of a packet mostly hit one or two objects: each is looked up once, for all its lanes.
-static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *hit)
+// The surface at the closest hit. Rays of a packet mostly hit one or two objects: each is looked up once, for
+// all its lanes.
+static inline Surface surface_interaction(const Scene *scene, const Ray *ray, const Hit *hit)
 {
     Surface surface;
     surface.found = hit_found(hit);
@@ -184,9 +188,9 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
         scalar_integer object = lanes_smallest(pending);
         if (object == INT_MAX) break;
         uint4 entry = scene->objects[object].kind_index_material;
-        ObjectHit found;
+        LaneSurfacePoints found;
         if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
-            found = triangles_hit(scene, pending, entry.z, ray, hit->t);
+            found = triangles_surface_point(scene, pending, entry.z, ray, hit->t);
         } else {
             found.lanes = pending == (integer)(object);
             found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
@@ -204,56 +208,58 @@ static inline Surface surface_at(const Scene *scene, const Ray *ray, const Hit *
 // The origin of a secondary ray, on the side the ray came from or, if `through`, on the other. It lies off
 // the surface by twice the bound on the position's error: once for that error and once for the new ray's own
 // test of the surface.
-static inline Vector surface_leave(const Surface *surface, bool through)
+static inline Vector secondary_ray_origin(const Surface *surface, bool through)
 {
-    return vector_fma(surface->normal, through ? -surface->behind : surface->error + surface->error,
+    return vector_fma(surface->normal, through ? -surface->refracted_offset : surface->error + surface->error,
                       surface->position);
 }
 
 // Lanes where a transparent object may touch an opaque one.
-static inline mask position_may_touch(const Scene *scene, Vector position)
+static inline mask may_be_in_contact(const Scene *scene, Vector position)
 {
     Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
     return (position.x >= low.x) & (position.x <= high.x) & (position.y >= low.y) & (position.y <= high.y) &
            (position.z >= low.z) & (position.z <= high.z);
 }
 
-// Searches for opaque surfaces just behind transparent ones, up to a little beyond the origin of a refracted
-// ray. One within the surface's error coincides with it: it becomes the hit of the lanes returned. If it is
-// farther, the refracted ray starts halfway to it.
+// Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
+// errors: a refracted ray starts 2 behind, and t is off by up to 1. An opaque surface within the error
+// coincides with the transparent one: it becomes the hit of the lanes returned. If it is farther, the
+// refracted ray starts halfway to it.
 static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
 {
     mask transparent = surface->found & (surface->transmission > (real)(0));
-    transparent = transparent & position_may_touch(scene, surface->position);
+    transparent = transparent & may_be_in_contact(scene, surface->position);
     if (!lanes_any(transparent)) return mask_none();
-    real error = surface->error, before = error + error;
-    Ray inward = ray_make_unit(surface_leave(surface, false), vector_negate(surface->normal), transparent);
-    inward.near = error;
-    inward.far = before + (real)(3) * error;
+    real error = surface->error, offset = error + error;
+    Ray inward =
+        ray_make_unit(secondary_ray_origin(surface, false), vector_negate(surface->normal), transparent);
+    inward.tmin = error;
+    inward.tmax = offset + (real)(3) * error;
     Hit opaque = closest_opaque_hit(scene, &inward);
     mask found = hit_found(&opaque);
-    real gap = opaque.t - before;
+    real gap = opaque.t - offset;
     mask touches = found & (gap <= error);
-    surface->behind = lanes_select(found & !touches, (real)(0.5f) * gap, surface->behind);
+    surface->refracted_offset = lanes_select(found & !touches, (real)(0.5f) * gap, surface->refracted_offset);
     hit->object = lanes_select(touches, opaque.object, hit->object);
     return touches;
 }
 
 // The visible surface: where a transparent and an opaque one coincide, the opaque one, so that glass on a
 // floor shows the floor. Secondary rays start beyond both. The second round is for the lanes whose hit the
-// opaque surface replaced; a loop, since compilers would inline surface_at twice.
-static inline Surface surface_seen(const Scene *scene, const Ray *ray, Hit *hit)
+// opaque surface replaced; a loop, since compilers would inline surface_interaction twice.
+static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *hit)
 {
-    real transparent_error = (real)(0), transparent_behind = (real)(LARGEST);
+    real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);
     for (bool replaced = false;; replaced = true) {
-        Surface surface = surface_at(scene, ray, hit);
+        Surface surface = surface_interaction(scene, ray, hit);
         surface.error = real_max(surface.error, transparent_error);
-        surface.behind = real_min(surface.behind, transparent_behind);
+        surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
         if (!HAS_TRANSMISSION || replaced) return surface;
         mask touches = surface_find_opaque(scene, &surface, hit);
         if (!lanes_any(touches)) return surface;
         transparent_error = lanes_select(touches, surface.error, (real)(0));
-        transparent_behind = surface.behind;
+        transparent_offset = surface.refracted_offset;
     }
 }
 

@@ -39,7 +39,7 @@ typedef struct {
     real u, v; // in checker squares, or texture repeats
 } GridCoordinates;
 
-// The grid coordinates of a point of a plane or disc.
+// The grid coordinates of a point of a plane or disc; (0, 0) on other kinds, which take no image.
 static inline GridCoordinates grid_coordinates(const Scene *scene, uint kind, uint index, Vector position)
 {
     scalar4 grid_u = (scalar4)(0), grid_v = (scalar4)(0);
@@ -68,15 +68,15 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ki
 
 // From here on one lane at a time, since each reads texels of its own.
 
-// The fractional part of a; 0 if that is NaN.
-static inline scalar repeated(scalar a)
+// A texture coordinate of a repeated texture, in 0..1: the fractional part; 0 if that is NaN.
+static inline scalar wrap_unit(scalar a)
 {
     scalar part = a - floor(a);
     return part >= 0 && part <= 1 ? part : 0;
 }
 
-// Of a texel index from -1 to count: repeated, or clamped to the edge.
-static inline uint texel_repeated(scalar i, uint count)
+// Of a texel index from -1 to count: wrapped, or clamped to the edge.
+static inline uint texel_wrapped(scalar i, uint count)
 {
     return i < 0 ? count - 1 : i >= (scalar)count ? 0 : (uint)i;
 }
@@ -97,13 +97,13 @@ static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
 }
 
 // Bilinear between texel centers. `level`: x its first texel, y width, z height.
-static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, bool repeats_upward)
+static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, bool wraps_v)
 {
     scalar x = fma(u, (scalar)level.y, (scalar)(-0.5f)), y = fma(1 - v, (scalar)level.z, (scalar)(-0.5f));
     scalar left = floor(x), top = floor(y);
-    uint column_0 = texel_repeated(left, level.y), column_1 = texel_repeated(left + 1, level.y);
-    uint row_0 = repeats_upward ? texel_repeated(top, level.z) : texel_clamped(top, level.z);
-    uint row_1 = repeats_upward ? texel_repeated(top + 1, level.z) : texel_clamped(top + 1, level.z);
+    uint column_0 = texel_wrapped(left, level.y), column_1 = texel_wrapped(left + 1, level.y);
+    uint row_0 = wraps_v ? texel_wrapped(top, level.z) : texel_clamped(top, level.z);
+    uint row_1 = wraps_v ? texel_wrapped(top + 1, level.z) : texel_clamped(top + 1, level.z);
     uint start_0 = level.x + row_0 * level.y, start_1 = level.x + row_1 * level.y;
     scalar4 above = scalar4_between(texel_color(scene, start_0 + column_0),
                                     texel_color(scene, start_0 + column_1), x - left);
@@ -114,8 +114,8 @@ static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, sca
 
 // `footprint`: the pixel's width in texels of the full texture. Colors are linear in it between the levels
 // for 2^n and 2^(n + 1) texels.
-static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar u, scalar v,
-                                       scalar footprint, bool repeats_upward)
+static inline scalar4 texture_filtered(const Scene *scene, uint4 image, scalar u, scalar v, scalar footprint,
+                                       bool wraps_v)
 {
     uint level = texture.x - 1, last = level + texture.y - 1;
     scalar part = 0;
@@ -124,15 +124,15 @@ static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar
         part = 2 * frexp(min(footprint, (scalar)0x1p30f), &exponent) - 1;
         level += (uint)(exponent - 1);
     }
-    if (level >= last) return level_color(scene, scene->texture_levels[last].place, u, v, repeats_upward);
-    scalar4 color = level_color(scene, scene->texture_levels[level].place, u, v, repeats_upward);
+    if (level >= last) return level_color(scene, scene->texture_levels[last].place, u, v, wraps_v);
+    scalar4 color = level_color(scene, scene->texture_levels[level].place, u, v, wraps_v);
     if (part == 0) return color;
-    scalar4 coarser = level_color(scene, scene->texture_levels[level + 1].place, u, v, repeats_upward);
+    scalar4 coarser = level_color(scene, scene->texture_levels[level + 1].place, u, v, wraps_v);
     return scalar4_between(color, coarser, part);
 }
 
-// The texture's color for the lanes in `wanted`, at the distance `travelled` from the eye. At a grazing angle
-// the footprint grows by at most 2^10.
+// The texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance `travelled`
+// from the eye. At a grazing angle the footprint grows by at most 2^10.
 static inline Vector texture_color(const Scene *scene, uint kind, const Material *material,
                                    TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
                                    real travelled, mask wanted)
@@ -146,8 +146,8 @@ static inline Vector texture_color(const Scene *scene, uint kind, const Material
     for (uint lane = 0; lane < LANES; lane++) {
         if (lanes.each[lane] == 0) continue;
         bool is_sphere = kind == KIND_SPHERES;
-        scalar up = is_sphere ? v.each[lane] : repeated(v.each[lane]);
-        scalar4 color = texture_filtered(scene, material->texture, repeated(u.each[lane]), up,
+        scalar lane_v = is_sphere ? v.each[lane] : wrap_unit(v.each[lane]);
+        scalar4 color = texture_filtered(scene, material->image, wrap_unit(u.each[lane]), lane_v,
                                          footprint.each[lane], !is_sphere);
         red.each[lane] = color.x;
         green.each[lane] = color.y;

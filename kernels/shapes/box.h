@@ -2,11 +2,12 @@
 #ifndef BOX_H
 #define BOX_H
 
-#include "shapes/quadratic.h"
+#include "shapes/interval.h"
+#include "shapes/surface_point.h"
 
 // The interval of t where the ray is between low and high on one axis. A direction of exactly 0, of either
 // sign, is between them always or never: decided by comparison, since 0 times infinity is NaN.
-static inline Roots slab_crossings(real low, real high, real origin, real direction, real inverse)
+static inline Interval slab_crossings(real low, real high, real origin, real direction, real inverse)
 {
     mask parallel = direction == (real)(0);
     mask between = (origin >= low) & (origin <= high);
@@ -20,25 +21,25 @@ static inline Roots slab_crossings(real low, real high, real origin, real direct
         to_high = (high - origin) * inverse;
     }
     real always = lanes_select(between, (real)(LARGEST), (real)(-LARGEST));
-    return (Roots){lanes_select(parallel, -always, real_min(to_low, to_high)),
-                   lanes_select(parallel, always, real_max(to_low, to_high))};
+    return (Interval){lanes_select(parallel, -always, real_min(to_low, to_high)),
+                      lanes_select(parallel, always, real_max(to_low, to_high))};
 }
 
 static inline mask box_hit(const Box *box, const Ray *ray, real *t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
-    Roots x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
-    Roots y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
-    Roots z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
+    Interval x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
+    Interval y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
+    Interval z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
     real near = real_max(real_max(x.near, y.near), z.near);
     real far = real_min(real_min(x.far, y.far), z.far);
     *t = ray_first(ray, near, far);
-    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->near);
+    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
 }
 
 // |t - crossing| for the nearer of a slab's crossings, and whether that is its low face: a ray towards larger
 // coordinates enters there and leaves at the high one.
-static inline real slab_distance(Roots slab, real direction, real t, mask *low_face)
+static inline real slab_distance(Interval slab, real direction, real t, mask *low_face)
 {
     real to_near = fabs(t - slab.near), to_far = fabs(t - slab.far);
     mask entering = to_near <= to_far;
@@ -55,9 +56,9 @@ static inline real slab_clamp(real value, real low, real high)
 static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
-    Roots x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
-    Roots y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
-    Roots z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
+    Interval x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
+    Interval y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
+    Interval z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
     mask low_x, low_y, low_z;
     real to_x = slab_distance(x, ray->direction.x, t, &low_x);
     real to_y = slab_distance(y, ray->direction.y, t, &low_y);

@@ -4,7 +4,8 @@
 
 #include "shapes/plane.h"
 
-// t = height / along; across / along leads from the center to the crossing.
+// t = height / along; across / along leads from the center to the crossing, up to sign: only its square is
+// used.
 typedef struct {
     real height, along;
     Vector across;
@@ -17,7 +18,7 @@ static inline DiscCrossing disc_crossing(Vector center, Vector normal, const Ray
                           vector_cross(normal, vector_cross(f, ray->direction))};
 }
 
-static inline DiscCrossing disc_crossing_exactly(Vector center, Vector normal, const Ray *ray)
+static inline DiscCrossing disc_crossing_compensated(Vector center, Vector normal, const Ray *ray)
 {
     PairVector f = pair_vector_difference(ray->origin, center);
     return (DiscCrossing){
@@ -36,17 +37,17 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     Vector normal = vector_of(disc->normal);
     DiscCrossing crossing;
     if (IS_COMPENSATED) {
-        crossing = disc_crossing_exactly(center, normal, ray);
+        crossing = disc_crossing_compensated(center, normal, ray);
     } else {
         crossing = disc_crossing(center, normal, ray);
         real steepest_squared = vector_dot(normal, normal) * ray->squared;
         mask grazing =
             RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
         if (lanes_any(grazing)) {
-            DiscCrossing exact = disc_crossing_exactly(center, normal, ray);
-            crossing.height = lanes_select(grazing, exact.height, crossing.height);
-            crossing.along = lanes_select(grazing, exact.along, crossing.along);
-            crossing.across = vector_select(grazing, exact.across, crossing.across);
+            DiscCrossing compensated = disc_crossing_compensated(center, normal, ray);
+            crossing.height = lanes_select(grazing, compensated.height, crossing.height);
+            crossing.along = lanes_select(grazing, compensated.along, crossing.along);
+            crossing.across = vector_select(grazing, compensated.across, crossing.across);
         }
     }
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
@@ -57,8 +58,9 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
     real half_chord = radius * real_sqrt(ray->inverse_squared);
     *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
-    real reach = radius * crossing.along;
-    return hit & (vector_dot(crossing.across, crossing.across) <= reach * reach) & (*t > ray->near);
+    real scaled_radius = radius * crossing.along;
+    return hit & (vector_dot(crossing.across, crossing.across) <= scaled_radius * scaled_radius) &
+           (*t > ray->tmin);
 }
 
 static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, real t)

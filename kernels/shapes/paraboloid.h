@@ -8,23 +8,24 @@
 #ifndef PARABOLOID_H
 #define PARABOLOID_H
 
-#include "shapes/revolution.h"
+#include "shapes/ends.h"
+#include "shapes/surface_point.h"
 
 typedef struct {
-    Roots side; // the ray is inside the surface between them
-    Roots slab; // and on the apex' side of the end
+    Interval side; // the ray is inside the surface between them
+    Interval slab; // and on the apex' side of the end
     mask real_roots;
 } ParaboloidCrossings;
 
 // The interval of t where the ray is on the apex' side of the shape's end plane.
-static inline Roots paraboloid_slab(real end, Pair from, real towards)
+static inline Interval paraboloid_slab(real end, Pair from, real towards)
 {
     mask parallel = towards == (real)(0), leaving = towards > (real)(0);
     real gap = pair_subtract(pair_of(end), from).high;
     real t = real_divide(gap, lanes_select(parallel, (real)(1), towards));
     t = lanes_select(parallel, lanes_select(gap >= (real)(0), (real)(LARGEST), (real)(-LARGEST)), t);
-    return (Roots){lanes_select(leaving | parallel, (real)(-LARGEST), t),
-                   lanes_select(leaving | parallel, t, (real)(LARGEST))};
+    return (Interval){lanes_select(leaving | parallel, (real)(-LARGEST), t),
+                      lanes_select(leaving | parallel, t, (real)(LARGEST))};
 }
 
 static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, const Ray *ray)
@@ -37,11 +38,12 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     PairVector m = pair_vector_cross(f, axis), q = pair_vector_cross(d, axis);
     PairVector moment = pair_vector_cross(f, ray->direction);
     Pair height = pair_vector_dot_vector(f, axis), rise = pair_vector_dot_vector(d, axis);
-    Pair turn = pair_vector_dot_vector(moment, axis), bend = pair_scale(rise, half_k);
+    Pair moment_on_axis = pair_vector_dot_vector(moment, axis), bend = pair_scale(rise, half_k);
     real a = pair_vector_dot(q, q).high;
     real b = pair_subtract(pair_vector_dot(m, q), bend).high;
     real c = pair_subtract(pair_vector_dot(m, m), pair_scale(height, k)).high;
-    Pair off = pair_add(pair_scale(pair_vector_dot(moment, q), k), pair_multiply(turn, turn));
+    Pair off =
+        pair_add(pair_scale(pair_vector_dot(moment, q), k), pair_multiply(moment_on_axis, moment_on_axis));
     real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(squared_axis, off)).high;
 
     ParaboloidCrossings crossings;
@@ -55,8 +57,8 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     real far_root = lanes_select(within, real_divide(sum, lanes_select(within, a, (real)(1))),
                                  lanes_select(ahead, (real)(LARGEST), (real)(-LARGEST)));
     real near_root = lanes_select(zero, far_root, real_divide(c, lanes_select(zero, (real)(1), sum)));
-    crossings.side = (Roots){real_min(near_root, far_root), real_max(near_root, far_root)};
-    crossings.slab = (Roots){(real)(-LARGEST), (real)(LARGEST)};
+    crossings.side = (Interval){real_min(near_root, far_root), real_max(near_root, far_root)};
+    crossings.slab = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     if (shape->id.y & REVOLUTION_FINITE)
         crossings.slab = paraboloid_slab((real)(shape->axis_end.w), height, rise.high);
     return crossings;
@@ -66,8 +68,8 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
 {
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
     mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
-    hit = hit & revolution_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
-    return hit & (*t > ray->near) & (*t < (real)(LARGEST));
+    hit = hit & ends_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
+    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
 // On the cap the point is moved along the axis, on the side by two Newton steps along the gradient of
@@ -88,7 +90,7 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         position = vector_fma(gradient, -step, position);
         normal = gradient;
     }
-    real size = vector_magnitude(p) + vector_magnitude(apex);
+    real size = vector_norm1(p) + vector_norm1(apex);
     SurfacePoint point = surface_point_make(vector_add(position, apex), vector_normalize(normal), size);
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, size);
 
@@ -96,7 +98,7 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         real gap = real_divide((real)(shape->axis_end.w) - vector_dot(p, axis), squared_axis);
         Vector on_plane = vector_fma(axis, gap, p);
         SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
-        surface_point_replace(&point, revolution_on_cap(crossings.side, crossings.slab, t), &cap);
+        surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;
 }

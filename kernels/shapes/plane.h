@@ -8,11 +8,11 @@
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
     mask ahead = (height > (real)(0)) == (along > (real)(0));
-    mask hit = RAY_ACTIVE(ray) & (ahead | (ray->near < (real)(0))) &
+    mask hit = RAY_ACTIVE(ray) & (ahead | (ray->tmin < (real)(0))) &
                (fabs(height) * (real)(SMALLEST_RATIO) < fabs(along));
     if (!lanes_any(hit)) return hit;
     *t = real_divide(height, lanes_select(hit, along, (real)(1)));
-    return hit & (*t > ray->near);
+    return hit & (*t > ray->tmin);
 }
 
 // t = n . (p - o) / n . d, the difference first. Only n . d = 0 is no hit: a threshold would cut the horizon.
@@ -20,7 +20,7 @@ static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, r
 {
     real along, height;
     if (IS_COMPENSATED) {
-        along = vector_dot_exactly(normal, ray->direction);
+        along = vector_dot_compensated(normal, ray->direction);
         height = pair_vector_dot_once(pair_vector_difference(point, ray->origin), normal);
     } else {
         along = vector_dot(normal, ray->direction);
@@ -41,8 +41,8 @@ static inline SurfacePoint plane_crossing_point(Vector point, scalar4 normal, co
                                  : vector_scale(vector_of(normal), (real)(normal.w));
     Vector crossing = ray_point(ray, t), to_point = vector_subtract(point, crossing);
     SurfacePoint crossed = surface_point_make(vector_fma(unit, vector_dot(unit, to_point), crossing), unit,
-                                              vector_magnitude_along(unit, to_point));
-    if (IS_COMPENSATED) surface_point_move_to_ray(&crossed, ray, t, crossed.size);
+                                              vector_norm1_along(unit, to_point));
+    if (IS_COMPENSATED) surface_point_move_to_ray(&crossed, ray, t, crossed.rounding_scale);
     return crossed;
 }
 

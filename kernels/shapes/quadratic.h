@@ -1,12 +1,8 @@
-// Roots of a t^2 + 2 b t + c = 0 where the discriminant d = b^2 - a c is known by a better formula.
+// Interval of a t^2 + 2 b t + c = 0 where the discriminant d = b^2 - a c is known by a better formula.
 #ifndef QUADRATIC_H
 #define QUADRATIC_H
 
 #include "shapes/surface_point.h"
-
-typedef struct {
-    real near, far; // near <= far
-} Roots;
 
 // For a = ray->squared, the first root beyond the ray's start, or the far one if only_far. Without
 // cancellation: q = -(b + sign(b) sqrt d), roots c / q and q / a (Press et al., Numerical Recipes, 5.6; here
@@ -20,11 +16,11 @@ static inline real quadratic_first_root(const Ray *ray, real b, real c, real d, 
     mask zero = q == (real)(0); // b = d = 0: both roots are 0
     real t = lanes_select(zero, (real)(0), real_divide(c, lanes_select(zero, (real)(1), q)));
     // c / q is the nearer root if ahead, else the farther one
-    mask other = lanes_select(ahead, !(t > ray->near), ray->near < (real)(0));
+    mask other = lanes_select(ahead, !(t > ray->tmin), ray->tmin < (real)(0));
     if (only_far) other = ahead;
     if (lanes_any(other)) {
         real q_over_a = IS_COMPENSATED ? real_divide(q, ray->squared) : q * ray->inverse_squared;
-        t = lanes_select(other & (ahead | (q_over_a > ray->near)), q_over_a, t);
+        t = lanes_select(other & (ahead | (q_over_a > ray->tmin)), q_over_a, t);
     }
     return t;
 }

@@ -1,4 +1,5 @@
-// Cylinder and cone: |p x w| = R + k (p . w) for the axis w from the base, R and k in units of |w|.
+// Cylinder and cone: |p x w| = R + k (p . w) for the axis w from the base, with R = |w| times the radius
+// there and k the tangent of the half-angle.
 //
 // Along a ray p = f + t d, with q = d x w, m = f x w, g = R + k f . w and h = k d . w:
 //     a = q . q - h^2,   b = m . q - g h,   c = m . m - g^2,
@@ -8,16 +9,17 @@
 #define REVOLUTION_H
 
 #include "shapes/box.h"
+#include "shapes/ends.h"
 
 typedef struct {
     real a, b, c, discriminant;
     Vector q, m;
     real g, h;
-    mask exact; // all of these are rounded about once
+    mask compensated; // all of these are rounded about once
 } RevolutionQuadric;
 
-static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *shape, bool sloped,
-                                                           const Ray *ray)
+static inline RevolutionQuadric revolution_quadric_compensated(const Revolution *shape, bool sloped,
+                                                               const Ray *ray)
 {
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     Vector d = ray->direction;
@@ -31,56 +33,58 @@ static inline RevolutionQuadric revolution_quadric_exactly(const Revolution *sha
     if (sloped) {
         g = pair_add(g, pair_scale(pair_vector_dot_vector(f, axis), slope));
         h = pair_scale(pair_vector_dot_vector(pair_vector_of(d), axis), slope);
-        v = (PairVector){pair_product_difference(g, q.x, h, m.x), pair_product_difference(g, q.y, h, m.y),
-                         pair_product_difference(g, q.z, h, m.z)};
+        v = (PairVector){pair_difference_of_products(g, q.x, h, m.x),
+                         pair_difference_of_products(g, q.y, h, m.y),
+                         pair_difference_of_products(g, q.z, h, m.z)};
     } else {
         v = (PairVector){pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};
     }
-    Pair turn = pair_vector_dot_vector(moment, axis);
+    Pair moment_on_axis = pair_vector_dot_vector(moment, axis);
     Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
     RevolutionQuadric quadric;
     quadric.a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h)).high;
     quadric.b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h)).high;
     quadric.c = pair_subtract(pair_vector_dot(m, m), pair_multiply(g, g)).high;
     quadric.discriminant =
-        pair_subtract(pair_vector_dot(v, v), pair_multiply(squared_axis, pair_multiply(turn, turn))).high;
+        pair_subtract(pair_vector_dot(v, v),
+                      pair_multiply(squared_axis, pair_multiply(moment_on_axis, moment_on_axis)))
+            .high;
     quadric.q = pair_vector_high(q);
     quadric.m = pair_vector_high(m);
     quadric.g = g.high;
     quadric.h = h.high;
-    quadric.exact = mask_all();
+    quadric.compensated = mask_all();
     return quadric;
 }
 
-static inline RevolutionQuadric revolution_quadric_plainly(const Revolution *shape, bool sloped,
-                                                           const Ray *ray)
+static inline RevolutionQuadric revolution_quadric_plain(const Revolution *shape, bool sloped, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_slope), d = ray->direction;
     real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
     Vector f = vector_subtract(ray->origin, vector_of(shape->base_radius));
     Vector m = vector_cross(f, axis);
     Vector q = vector_cross(d, axis);
-    real g = radius, h = (real)(0), reach;
+    real g = radius, h = (real)(0), scaled_radius;
     if (sloped) {
         g = real_fma(slope, vector_dot(f, axis), radius);
         h = slope * vector_dot(d, axis);
-        Vector v = {product_difference(g, q.x, h, m.x), product_difference(g, q.y, h, m.y),
-                    product_difference(g, q.z, h, m.z)};
-        reach = vector_length(v);
+        Vector v = {difference_of_products(g, q.x, h, m.x), difference_of_products(g, q.y, h, m.y),
+                    difference_of_products(g, q.z, h, m.z)};
+        scaled_radius = vector_norm(v);
     } else {
-        reach = radius * vector_length(q);
+        scaled_radius = radius * vector_norm(q);
     }
-    real turn = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
+    real scaled_moment = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
     RevolutionQuadric quadric;
     quadric.a = real_fma(-h, h, vector_dot(q, q));
     quadric.b = real_fma(-g, h, vector_dot(m, q));
     quadric.c = real_fma(-g, g, vector_dot(m, m));
-    quadric.discriminant = (reach - turn) * (reach + turn);
+    quadric.discriminant = (scaled_radius - scaled_moment) * (scaled_radius + scaled_moment);
     quadric.q = q;
     quadric.m = m;
     quadric.g = g;
     quadric.h = h;
-    quadric.exact = mask_none();
+    quadric.compensated = mask_none();
     return quadric;
 }
 
@@ -95,33 +99,42 @@ static inline RevolutionQuadric revolution_quadric_select(mask condition, Revolu
                                vector_select(condition, yes.m, no.m),
                                lanes_select(condition, yes.g, no.g),
                                lanes_select(condition, yes.h, no.h),
-                               lanes_select(condition, yes.exact, no.exact)};
+                               lanes_select(condition, yes.compensated, no.compensated)};
 }
 
-// For lanes that start next to the side. Those that leave it outward have no crossing ahead and are rejected.
+// Lanes that start outside, at least their roundings off the side, and do not approach it: no crossing is
+// ahead. a > 0 and c must exceed their roundings, which grow with the slope; b may have any sign within its
+// own.
+static inline mask revolution_leaves_outward(const RevolutionQuadric *quadric, const Revolution *shape,
+                                             const Ray *ray)
+{
+    real base_distance = vector_norm(vector_subtract(ray->origin, vector_of(shape->base_radius)));
+    scalar steepness = 1 + fabs(shape->axis_slope.w);
+    real least_c =
+        (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * base_distance * vector_norm(quadric->m);
+    real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
+    return (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
+           (ray->tmin >= (real)(0));
+}
+
+// For lanes that start next to the side: rejects those that leave it, compensates the others.
 static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
                                                   bool sloped, const Ray *ray, mask near_side)
 {
-    // a > 0 and c well beyond their roundings, which grow with the slope; b may have any sign within its own
-    real reach = vector_length(vector_subtract(ray->origin, vector_of(shape->base_radius)));
-    scalar steepness = 1 + fabs(shape->axis_slope.w);
-    real least_c =
-        (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * reach * vector_length(quadric->m);
-    real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
-    mask leaves = near_side & (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
-                  (ray->near >= (real)(0));
+    mask leaves = near_side & revolution_leaves_outward(quadric, shape, ray);
     quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
     near_side = near_side & !leaves;
     if (!lanes_any(near_side)) return;
-    *quadric = revolution_quadric_select(near_side, revolution_quadric_exactly(shape, sloped, ray), *quadric);
+    *quadric =
+        revolution_quadric_select(near_side, revolution_quadric_compensated(shape, sloped, ray), *quadric);
 }
 
 // Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would break the horizon of
 // ground that is a cylinder: pairs there at any precision.
 static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
 {
-    if (IS_COMPENSATED) return revolution_quadric_exactly(shape, sloped, ray);
-    RevolutionQuadric quadric = revolution_quadric_plainly(shape, sloped, ray);
+    if (IS_COMPENSATED) return revolution_quadric_compensated(shape, sloped, ray);
+    RevolutionQuadric quadric = revolution_quadric_plain(shape, sloped, ray);
     real size = vector_dot(quadric.m, quadric.m);
     mask near_side = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
     if (RARELY(lanes_any(near_side))) {
@@ -139,7 +152,7 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
     for (uint i = 0; i < 2; i++) {
         Vector across = vector_fma(quadric->q, t, quadric->m);
         real radius = real_fma(quadric->h, t, quadric->g);
-        real norm = vector_length(across);
+        real norm = vector_norm(across);
         real excess = (norm - fabs(radius)) * (norm + fabs(radius));
         real steepness = (real)(2) * real_fma(-radius, quadric->h, vector_dot(across, quadric->q));
         mask steep = (fabs(excess) * (real)(SMALLEST_RATIO) < fabs(steepness)) & (fabs(t) < (real)(LARGEST));
@@ -150,15 +163,15 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 }
 
 typedef struct {
-    Roots side; // the ray is inside the unbounded surface between these; if `outer`, outside them
+    Interval side; // the ray is inside the unbounded surface between these; if `outer`, outside them
     mask outer;
     mask real_roots;
-    Roots slab;  // the ray is between the ends
-    Vector m, q; // at t the point is |m + t q| / |w| from the axis
+    Interval slab; // the ray is between the ends
+    Vector m, q;   // at t the point is |m + t q| / |w| from the axis
 } RevolutionCrossings;
 
 // The interval of t between the planes of a finite shape's ends.
-static inline Roots revolution_slab(const Revolution *shape, const Ray *ray)
+static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_slope);
     real from, towards;
@@ -176,9 +189,9 @@ static inline Roots revolution_slab(const Revolution *shape, const Ray *ray)
 // Restricts `outer` lanes to the nappe that the ends bound: the one towards which the radius grows.
 static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask growing)
 {
-    Roots side = crossings->side;
-    Roots nappe = {lanes_select(growing, side.far, (real)(-LARGEST)),
-                   lanes_select(growing, (real)(LARGEST), side.near)};
+    Interval side = crossings->side;
+    Interval nappe = {lanes_select(growing, side.far, (real)(-LARGEST)),
+                      lanes_select(growing, (real)(LARGEST), side.near)};
     crossings->side.near = lanes_select(crossings->outer, nappe.near, side.near);
     crossings->side.far = lanes_select(crossings->outer, nappe.far, side.far);
 }
@@ -190,47 +203,55 @@ static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
     return (quadric->discriminant >= (real)(0)) | (quadric->a <= (real)(0));
 }
 
-// q / a is a root only where it is finite; a = 0 is a ray along the side, with one root, c / q, and one at
-// infinity.
-static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray,
-                                                       const RevolutionQuadric *quadric)
+// The interval between the roots c / q and q / a. q / a is a root only where it is finite; a = 0 is a ray
+// along the side, with one root, c / q, and one at infinity. *zero: q = 0.
+static inline Interval revolution_roots(const RevolutionQuadric *quadric, bool sloped, mask *zero)
 {
-    RevolutionCrossings crossings;
-    crossings.m = quadric->m;
-    crossings.q = quadric->q;
-
     real root = real_sqrt(real_max(quadric->discriminant, (real)(0)));
     mask ahead = quadric->b < (real)(0);
     real q = lanes_select(ahead, root - quadric->b, -(root + quadric->b));
-    mask zero = q == (real)(0);
+    *zero = q == (real)(0);
     mask within = fabs(q) * (real)(SMALLEST_RATIO) < fabs(quadric->a);
     mask positive_ratio = (q > (real)(0)) == (quadric->a >= (real)(0));
     real q_over_a = lanes_select(within, real_divide(q, lanes_select(within, quadric->a, (real)(1))),
                                  lanes_select(positive_ratio, (real)(LARGEST), (real)(-LARGEST)));
-    real c_over_q = lanes_select(zero, q_over_a, real_divide(quadric->c, lanes_select(zero, (real)(1), q)));
+    real c_over_q = lanes_select(*zero, q_over_a, real_divide(quadric->c, lanes_select(*zero, (real)(1), q)));
     if (sloped && !IS_COMPENSATED) {
-        c_over_q = lanes_select(quadric->exact, c_over_q, revolution_polish(quadric, c_over_q));
+        c_over_q = lanes_select(quadric->compensated, c_over_q, revolution_polish(quadric, c_over_q));
         // with a near 0 a step may pass through infinity, which would swap inside and outside
         real polished = revolution_polish(quadric, q_over_a);
         mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
-        q_over_a = lanes_select(same_side & !quadric->exact, polished, q_over_a);
+        q_over_a = lanes_select(same_side & !quadric->compensated, polished, q_over_a);
     }
-    crossings.side = (Roots){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
+    return (Interval){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
+}
+
+// Lanes along a cylinder's axis, or along a cone's through its apex, are inside everywhere or nowhere.
+static inline void revolution_along_axis(RevolutionCrossings *crossings, const RevolutionQuadric *quadric,
+                                         mask along)
+{
+    mask inside = along & (quadric->c <= (real)(0));
+    crossings->side.near = lanes_select(along, (real)(-LARGEST), crossings->side.near);
+    crossings->side.far = lanes_select(along, (real)(LARGEST), crossings->side.far);
+    crossings->real_roots = (crossings->real_roots & !along) | inside;
+}
+
+static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray,
+                                                       const RevolutionQuadric *quadric)
+{
+    RevolutionCrossings crossings;
+    mask zero;
+    crossings.side = revolution_roots(quadric, sloped, &zero);
     crossings.outer = quadric->a < (real)(0);
     crossings.real_roots = (quadric->discriminant >= (real)(0)) | crossings.outer;
-
-    // along a cylinder's axis, or along a cone's through its apex: inside everywhere or nowhere
-    mask along = (quadric->a == (real)(0)) & zero;
-    mask inside = along & (quadric->c <= (real)(0));
-    crossings.side.near = lanes_select(along, (real)(-LARGEST), crossings.side.near);
-    crossings.side.far = lanes_select(along, (real)(LARGEST), crossings.side.far);
-    crossings.real_roots = (crossings.real_roots & !along) | inside;
-
-    crossings.slab = (Roots){(real)(-LARGEST), (real)(LARGEST)};
+    revolution_along_axis(&crossings, quadric, (quadric->a == (real)(0)) & zero);
+    crossings.slab = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     if (shape->id.y & REVOLUTION_FINITE) {
         crossings.slab = revolution_slab(shape, ray);
         revolution_keep_nappe(&crossings, quadric->h > (real)(0));
     }
+    crossings.m = quadric->m;
+    crossings.q = quadric->q;
     return crossings;
 }
 
@@ -243,35 +264,10 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
     scalar first = shape->base_radius.w;
     scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
     Vector offset = vector_scale(ray->direction, t);
-    real size = vector_magnitude(vector_subtract(ray->origin, vector_of(shape->base_radius))) +
-                vector_magnitude(offset);
+    real size =
+        vector_norm1(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_norm1(offset);
     real error = (real)(8 * UNIT_ROUNDOFF * shape->range.y) * size;
-    return vector_length(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
-}
-
-// The first hit of a surface of revolution, of which the ray is inside the side between two roots and between
-// the ends within the slab. A capped solid is the intersection of both: one comparison decides both, so that
-// no ray passes between side and cap. An open or unbounded one is hit at a root between the ends.
-static inline mask revolution_first_hit(uint flags, const Ray *ray, Roots side, Roots slab, real *t)
-{
-    if (flags & REVOLUTION_CAPPED) {
-        real near = real_max(side.near, slab.near);
-        real far = real_min(side.far, slab.far);
-        *t = ray_first(ray, near, far);
-        return near <= far;
-    }
-    mask seen = flags & ONLY_INSIDE ? mask_none() : mask_all();
-    mask near_counts = seen & (side.near > ray->near) & (side.near >= slab.near) & (side.near <= slab.far);
-    *t = lanes_select(near_counts, side.near, side.far);
-    return (*t >= slab.near) & (*t <= slab.far);
-}
-
-// Whether the hit at t is on a cap: the surface whose crossing is nearer to t; at the rim the side.
-static inline mask revolution_on_cap(Roots side, Roots slab, real t)
-{
-    real to_slab = real_min(fabs(t - slab.near), fabs(t - slab.far));
-    real to_side = real_min(fabs(t - side.near), fabs(t - side.far));
-    return to_slab < to_side;
+    return vector_norm(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
 }
 
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
@@ -281,26 +277,21 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     if (!lanes_any(hit)) return hit;
     RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     hit = hit & crossings.real_roots;
-    hit = hit & revolution_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
+    hit = hit & ends_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
     if (sloped && (shape->id.y & REVOLUTION_FINITE))
         hit = hit & revolution_reaches(shape, &crossings, ray, *t);
-    return hit & (*t > ray->near) & (*t < (real)(LARGEST));
+    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
-// The position is moved onto the cap's plane, or else onto the side, along its normal.
-static inline SurfacePoint revolution_surface_point(const Revolution *shape, bool sloped, const Ray *ray,
-                                                    real t)
+// The point of the side next to p, which is relative to the base; height is p . axis.
+static inline SurfacePoint revolution_side_point(const Revolution *shape, bool sloped, Vector p, real height)
 {
-    RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
-    RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     real axis_length = (real)(shape->range.y), squared_axis = (real)(shape->range.z);
-    Vector p = ray_point_from(ray, base, t);
-    real height = vector_dot(p, axis);
 
     // outward from the axis: p minus its part along the axis
     Vector across = vector_fma(axis, -real_divide(height, squared_axis), p);
-    real axis_distance = vector_length(across);
+    real axis_distance = vector_norm(across);
     Vector radial = vector_normalize(across);
     real radius = real_divide((real)(shape->base_radius.w), axis_length);
     Vector normal = radial, position;
@@ -309,33 +300,50 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
         real slope = (real)(shape->axis_slope.w);
         real signed_radius = real_fma(slope, height, (real)(shape->base_radius.w));
         mask mirrored = signed_radius < (real)(0);
-        real turn = lanes_select(mirrored, -slope, slope);
-        Vector gradient = vector_fma(axis, -turn, vector_scale(radial, axis_length));
+        real signed_slope = lanes_select(mirrored, -slope, slope);
+        Vector gradient = vector_fma(axis, -signed_slope, vector_scale(radial, axis_length));
         // the apex has no normal: use the axis, the normal that an eye on it would expect
         mask apex = axis_distance == (real)(0);
         normal = vector_normalize(vector_select(apex, axis, gradient));
         real excess = axis_distance - real_divide(fabs(signed_radius), axis_length);
-        // along the normal: times the cosine of the half-angle, whose tangent is the slope
-        real lean = real_divide((real)(1), real_sqrt(real_fma(slope, slope, (real)(1))));
-        position = vector_fma(normal, -excess * lean, p);
+        real cos_half_angle = real_divide((real)(1), real_sqrt(real_fma(slope, slope, (real)(1))));
+        position = vector_fma(normal, -excess * cos_half_angle, p);
     } else {
         position = vector_fma(radial, radius - axis_distance, p);
     }
+    return surface_point_make(vector_add(position, base), normal,
+                              vector_norm1(p) + vector_norm1(base) + radius);
+}
 
-    real size = vector_magnitude(p) + vector_magnitude(base) + radius;
-    SurfacePoint point = surface_point_make(vector_add(position, base), normal, size);
-    if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, point.size);
+// Likewise of the cap next to p.
+static inline SurfacePoint revolution_cap_point(const Revolution *shape, Vector p, real height,
+                                                real rounding_scale)
+{
+    Vector axis = vector_of(shape->axis_slope);
+    real end = (real)(shape->range.x);
+    real target = lanes_select(height * (real)(2) < end, (real)(0), end);
+    Vector on_plane = vector_fma(axis, real_divide(target - height, (real)(shape->range.z)), p);
+    Vector end_normal = vector_normalize(axis);
+    mask at_base = target == (real)(0);
+    end_normal = vector_select(at_base, vector_negate(end_normal), end_normal);
+    return surface_point_make(vector_add(on_plane, vector_of(shape->base_radius)), end_normal,
+                              rounding_scale);
+}
 
+// The position is moved onto the cap's plane, or else onto the side, along its normal.
+static inline SurfacePoint revolution_surface_point(const Revolution *shape, bool sloped, const Ray *ray,
+                                                    real t)
+{
+    Vector p = ray_point_from(ray, vector_of(shape->base_radius), t);
+    real height = vector_dot(p, vector_of(shape->axis_slope));
+    SurfacePoint point = revolution_side_point(shape, sloped, p, height);
+    real rounding_scale = point.rounding_scale;
+    if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, rounding_scale);
     if (shape->id.y & REVOLUTION_CAPPED) {
-        mask on_cap = revolution_on_cap(crossings.side, crossings.slab, t);
-        real end = (real)(shape->range.x);
-        real target = lanes_select(height * (real)(2) < end, (real)(0), end);
-        Vector on_plane = vector_fma(axis, real_divide(target - height, squared_axis), p);
-        Vector end_normal = vector_normalize(axis);
-        mask at_base = target == (real)(0);
-        end_normal = vector_select(at_base, vector_negate(end_normal), end_normal);
-        SurfacePoint cap = surface_point_make(vector_add(on_plane, base), end_normal, size);
-        surface_point_replace(&point, on_cap, &cap);
+        RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
+        RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
+        SurfacePoint cap = revolution_cap_point(shape, p, height, rounding_scale);
+        surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;
 }

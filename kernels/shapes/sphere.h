@@ -12,10 +12,10 @@ typedef struct {
 static inline SphereCoefficients sphere_coefficients(PairVector to_center, real radius, const Ray *ray)
 {
     real x = to_center.x.high, y = to_center.y.high, z = to_center.z.high;
-    Pair rr = pair_product(radius, radius);
-    Pair xx = pair_product(x, x), yy = pair_product(y, y), zz = pair_product(z, z);
-    Pair one = pair_sum(xx.high, -rr.high), two = pair_sum(one.high, yy.high),
-         three = pair_sum(two.high, zz.high);
+    Pair rr = two_product(radius, radius);
+    Pair xx = two_product(x, x), yy = two_product(y, y), zz = two_product(z, z);
+    Pair one = two_sum(xx.high, -rr.high), two = two_sum(one.high, yy.high),
+         three = two_sum(two.high, zz.high);
     real twice_low = real_fma(x, to_center.x.low, real_fma(y, to_center.y.low, z * to_center.z.low));
     real low = ((one.low + two.low) + three.low) + ((xx.low + yy.low) + (zz.low - rr.low));
     return (SphereCoefficients){-pair_vector_dot_once(to_center, ray->direction),
@@ -23,9 +23,9 @@ static inline SphereCoefficients sphere_coefficients(PairVector to_center, real 
 }
 
 // From rounded b and c, off by 2 u (b^2 + |a c|): for rays that start near the closest approach.
-static inline real sphere_discriminant_near(SphereCoefficients exact, const Ray *ray)
+static inline real sphere_discriminant_near(SphereCoefficients compensated, const Ray *ray)
 {
-    return product_difference(exact.b, exact.b, ray->squared, exact.c);
+    return difference_of_products(compensated.b, compensated.b, ray->squared, compensated.c);
 }
 
 // a r^2 - |E|^2 for the line's moment E = f x d (Lagrange's identity): off by some 10 u a r^2 at any
@@ -36,12 +36,13 @@ static inline real sphere_discriminant_far(Vector moment, real radius, const Ray
 }
 
 // The more accurate of the two.
-static inline real sphere_discriminant(SphereCoefficients exact, Vector moment, real radius, const Ray *ray)
+static inline real sphere_discriminant(SphereCoefficients compensated, Vector moment, real radius,
+                                       const Ray *ray)
 {
     real discriminant = sphere_discriminant_far(moment, radius, ray);
-    mask near_surface = exact.b * exact.b < ray->squared * radius * radius;
+    mask near_surface = compensated.b * compensated.b < ray->squared * radius * radius;
     if (lanes_any(near_surface))
-        discriminant = lanes_select(near_surface, sphere_discriminant_near(exact, ray), discriminant);
+        discriminant = lanes_select(near_surface, sphere_discriminant_near(compensated, ray), discriminant);
     return discriminant;
 }
 
@@ -68,17 +69,17 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 
     real c = squared_distance - squared_radius;
     mask outside = c > (real)(32 * UNIT_ROUNDOFF) * squared_radius;
-    hit = hit & !(outside & (b > (real)(0)) & (ray->near >= (real)(0)));
+    hit = hit & !(outside & (b > (real)(0)) & (ray->tmin >= (real)(0)));
     if (!lanes_any(hit)) return mask_none();
 
     real discriminant;
     if (IS_COMPENSATED) {
         PairVector to_center = pair_vector_difference(center, ray->origin);
-        SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
+        SphereCoefficients compensated = sphere_coefficients(to_center, radius, ray);
         Vector moment = pair_vector_cross_once(to_center, ray->direction);
-        discriminant = sphere_discriminant(exact, moment, radius, ray);
-        b = exact.b;
-        c = exact.c;
+        discriminant = sphere_discriminant(compensated, moment, radius, ray);
+        b = compensated.b;
+        c = compensated.c;
         hit = hit & (discriminant >= (real)(0));
     } else {
         Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
@@ -88,16 +89,17 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
              near_surface = hit & (fabs(c) < (real)(0.5f) * squared_distance);
         if (RARELY(lanes_any(near_surface))) {
             PairVector to_center = pair_vector_difference(center, ray->origin);
-            SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
-            b = lanes_select(near_surface, exact.b, b);
-            c = lanes_select(near_surface, exact.c, c);
-            discriminant = lanes_select(near_surface, sphere_discriminant_near(exact, ray), discriminant);
+            SphereCoefficients compensated = sphere_coefficients(to_center, radius, ray);
+            b = lanes_select(near_surface, compensated.b, b);
+            c = lanes_select(near_surface, compensated.c, c);
+            discriminant =
+                lanes_select(near_surface, sphere_discriminant_near(compensated, ray), discriminant);
             hits = lanes_select(near_surface, discriminant >= (real)(0), hits);
         }
         hit = hit & hits;
     }
-    *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & ONLY_INSIDE);
-    return hit & (*t > ray->near);
+    *t = quadratic_first_root(ray, b, c, discriminant, sphere->id.y & IGNORES_FRONT_FACES);
+    return hit & (*t > ray->tmin);
 }
 
 // The point seen from the center; compensated n = (l -+ h d) / r with l = d x E / a and h the root of the
@@ -106,25 +108,25 @@ static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, r
 {
     if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, center, t));
     PairVector to_center = pair_vector_difference(center, ray->origin);
-    SphereCoefficients exact = sphere_coefficients(to_center, radius, ray);
+    SphereCoefficients compensated = sphere_coefficients(to_center, radius, ray);
     Vector moment = pair_vector_cross_once(to_center, ray->direction);
-    real discriminant = real_max(sphere_discriminant(exact, moment, radius, ray), (real)(0));
+    real discriminant = real_max(sphere_discriminant(compensated, moment, radius, ray), (real)(0));
     real inverse = real_divide((real)(1), ray->squared);
     Vector l = vector_scale(vector_cross(moment, ray->direction), inverse);
     real h = real_sqrt(discriminant) * inverse;
-    mask far_side = real_fma(ray->squared, t, exact.b) > (real)(0);
+    mask far_side = real_fma(ray->squared, t, compensated.b) > (real)(0);
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 
-// Not at `fast`: a compiler that rearranges loses the exact c, and with it t next to the surface.
+// Not at `fast`: a compiler that rearranges loses the compensated c, and with it t next to the surface.
 static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);
     real radius = (real)(sphere->center_radius.w);
     Vector normal = sphere_normal(center, radius, ray, t);
     SurfacePoint point =
-        surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_magnitude(center));
-    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.size);
+        surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_norm1(center));
+    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
     return point;
 }
 

@@ -4,33 +4,36 @@
 
 #include "traversal/ray.h"
 
-// `size` is the magnitude of the numbers that the position was computed from: its distance from the true
-// surface is below 16 u size + 4 u |position|.
+// `rounding_scale` is the magnitude of the numbers that the position was computed from. The position is off
+// the true surface by less than POINT_SCALE_ERROR u rounding_scale + POINT_POSITION_ERROR u |position|.
+enum { POINT_SCALE_ERROR = 16, POINT_POSITION_ERROR = 4 };
+
 typedef struct {
     Vector position;
     Vector normal;         // geometric, unit, to either side
     Vector shading_normal; // unit; differs on smooth triangles
-    real size;
+    real rounding_scale;
 } SurfacePoint;
 
-static inline SurfacePoint surface_point_make(Vector position, Vector normal, real size)
+static inline SurfacePoint surface_point_make(Vector position, Vector normal, real rounding_scale)
 {
-    return (SurfacePoint){position, normal, normal, size};
+    return (SurfacePoint){position, normal, normal, rounding_scale};
 }
 
-// Replaces the position by the ray's own point at t where the ray's origin and length are far smaller than
-// the shape's numbers, of that magnitude, whose rounding would dominate: on a planet, meters. For shapes
-// whose t is accurate enough: along the normal off by at most 13 u of the ray's origin and length (a sphere
-// at `single` with a device's worst quotients and roots; 3 u without) plus, from what sums of exact products
-// still lose, 6 u^2 of the size.
-static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray, real t, real magnitude)
+// Replaces the position by the ray's own point at t where the ray's origin and its path to the hit are below
+// 1/16 of `shape_scale`, the magnitude of the shape's numbers. There their rounding would dominate: on a
+// planet, meters. The shape's t must be accurate: along the normal off by at most 13 u of the ray's origin
+// and path (a sphere at `single` with a device's worst quotients and roots; 3 u without), plus the 6 u^2 of
+// the shape's numbers that sums of exact products lose.
+static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray, real t, real shape_scale)
 {
-    real path_length = vector_magnitude(ray->direction) * fabs(t), limit = magnitude * (real)(0x1p-4f);
+    real path_length = vector_norm1(ray->direction) * fabs(t), limit = shape_scale * (real)(0x1p-4f);
     if (RARELY(lanes_any(path_length < limit))) {
-        real reach = vector_magnitude(ray->origin) + path_length;
-        mask close = reach < limit;
+        real ray_scale = vector_norm1(ray->origin) + path_length;
+        mask close = ray_scale < limit;
         point->position = vector_select(close, ray_point(ray, t), point->position);
-        point->size = lanes_select(close, real_fma((real)(UNIT_ROUNDOFF), magnitude, reach), point->size);
+        point->rounding_scale = lanes_select(close, real_fma((real)(UNIT_ROUNDOFF), shape_scale, ray_scale),
+                                             point->rounding_scale);
     }
 }
 
@@ -39,7 +42,7 @@ static inline void surface_point_replace(SurfacePoint *point, mask where, const 
     point->position = vector_select(where, other->position, point->position);
     point->normal = vector_select(where, other->normal, point->normal);
     point->shading_normal = vector_select(where, other->shading_normal, point->shading_normal);
-    point->size = lanes_select(where, other->size, point->size);
+    point->rounding_scale = lanes_select(where, other->rounding_scale, point->rounding_scale);
 }
 
 #endif

@@ -16,21 +16,21 @@
 
 // The line s -> closest + s direction, |direction| = 1, in the torus' frame.
 typedef struct {
-    Vector across, turn; // (closest x axis) + s (direction x axis) has the length rho
-    real height, rise;   // z = height + s rise
+    Vector closest_cross_axis, direction_cross_axis; // the first plus s times the second has the length rho
+    real height, rise;                               // z = height + s rise
     real major, minor;
 } TorusLine;
 
 // The signed distance to the tube's surface, negative inside, and its derivative along the line.
 static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
-    Vector radial = vector_fma(line->turn, s, line->across);
-    real rho = vector_length(radial);
+    Vector radial = vector_fma(line->direction_cross_axis, s, line->closest_cross_axis);
+    real rho = vector_norm(radial);
     real z = real_fma(line->rise, s, line->height);
-    real off = rho - line->major;
-    real from_circle = real_sqrt(real_fma(off, off, z * z));
-    real rho_slope = vector_dot(radial, line->turn) * real_inverse_or_zero(rho);
-    *slope = real_fma(off, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
+    real radial_offset = rho - line->major;
+    real from_circle = real_sqrt(real_fma(radial_offset, radial_offset, z * z));
+    real rho_slope = vector_dot(radial, line->direction_cross_axis) * real_inverse_or_zero(rho);
+    *slope = real_fma(radial_offset, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
     return from_circle - line->minor;
 }
 
@@ -50,6 +50,14 @@ static inline real bracket_next(real low, real high, real s, real value, real sl
     return lanes_select(inside, newton, (real)(0.5f) * (low + high));
 }
 
+// Steps enough to find all bits where Newton's method fails and the bracket is halved. Turning points need
+// fewer: they only have to separate the distance's zeros.
+enum { TORUS_ZERO_STEPS = IS_DOUBLE ? 60 : 30, TORUS_TURNING_STEPS = IS_DOUBLE ? 40 : 20 };
+
+// The bounding sphere's squared radius is taken this much larger: the ends of the line in it lie outside the
+// torus whatever is rounded.
+#define TORUS_ENLARGEMENT 1.001f
+
 // The cubic's zero between low and high if its signs differ there; else the end where it is nearer to 0.
 static inline real torus_turning_point(real p, real q, real low, real high)
 {
@@ -59,7 +67,7 @@ static inline real torus_turning_point(real p, real q, real low, real high)
     mask rising = at_low < (real)(0);
     real end = lanes_select(fabs(at_low) < fabs(at_high), low, high);
     real s = (real)(0.5f) * (low + high);
-    for (uint i = 0; i < (IS_DOUBLE ? 40 : 20); i++) {
+    for (uint i = 0; i < TORUS_TURNING_STEPS; i++) {
         real value = torus_cubic(p, q, s, &slope);
         mask before = (value < (real)(0)) == rising;
         low = lanes_select(before, s, low);
@@ -73,7 +81,7 @@ static inline real torus_turning_point(real p, real q, real low, real high)
 static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
 {
     real s = (real)(0.5f) * (low + high);
-    for (uint i = 0; i < (IS_DOUBLE ? 60 : 30); i++) {
+    for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
         real slope;
         real value = torus_distance(line, s, &slope);
         mask before = (value > (real)(0)) == entering;
@@ -112,7 +120,8 @@ static inline void torus_breaks(const TorusLine *line, real squared_distance, re
 {
     real k = real_fma(line->major, line->major, squared_distance) - line->minor * line->minor;
     real squared_major = line->major * line->major;
-    real p = real_fma((real)(-4) * squared_major, vector_dot(line->turn, line->turn), k + k);
+    real p = real_fma((real)(-4) * squared_major,
+                      vector_dot(line->direction_cross_axis, line->direction_cross_axis), k + k);
     real q = (real)(8) * squared_major * line->height * line->rise;
     real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
     breaks[0] = -span;
@@ -127,9 +136,10 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
     real closest_t;
     Vector closest = torus_closest(torus, ray, &closest_t);
-    real reach = major + minor;
+    real bounding_radius = major + minor;
     real squared_distance = vector_dot(closest, closest);
-    real half_chord_squared = real_fma(reach * (real)(1.001f), reach, -squared_distance);
+    real half_chord_squared =
+        real_fma(bounding_radius * (real)(TORUS_ENLARGEMENT), bounding_radius, -squared_distance);
     mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
     if (!lanes_any(hit)) return hit;
 
@@ -145,7 +155,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     real breaks[TORUS_BREAKS];
     torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
 
-    real start = (ray->near - closest_t) * real_sqrt(ray->squared); // of the ray, as s
+    real start = (ray->tmin - closest_t) * real_sqrt(ray->squared); // of the ray, as s
     real slope, found_s = (real)(LARGEST);
     real before = torus_distance(&line, breaks[0], &slope);
     mask found = mask_none();
@@ -155,7 +165,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
         mask crosses = hit & !found & (entering != (after > (real)(0))) & (breaks[i + 1] > start);
         if (lanes_any(crosses)) {
             real s = torus_zero(&line, breaks[i], breaks[i + 1], entering);
-            mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->near);
+            mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->tmin);
             found_s = lanes_select(first, s, found_s);
             found = found | first;
         }
@@ -175,7 +185,7 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
     Vector from_circle = vector_fma(radial, -major, p); // from the nearest point of the circle
     Vector normal = vector_normalize(from_circle);
     Vector position = vector_fma(normal, minor, vector_fma(radial, major, center));
-    return surface_point_make(position, normal, major + minor + vector_magnitude(center));
+    return surface_point_make(position, normal, major + minor + vector_norm1(center));
 }
 
 #endif

@@ -2,12 +2,13 @@
 //
 // Vertices relative to the ray's start are rotated into a frame whose third axis is the ray; a shared vertex
 // gives the same numbers in every triangle. There the signs of three edge functions decide, and
-// product_difference has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
+// difference_of_products has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
 // JCGT 2(1), 2013; they shear along the direction's largest axis and fall back to double precision where an
 // edge function is 0).
 #ifndef TRIANGLE_H
 #define TRIANGLE_H
 
+#include "shapes/interval.h"
 #include "shapes/plane.h"
 
 // A triangle's three vertices, or their attributes. Lanes may have different triangles.
@@ -41,9 +42,9 @@ static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
     real bx = vector_dot(b, ray->across_u), by = vector_dot(b, ray->across_v);
     real cx = vector_dot(c, ray->across_u), cy = vector_dot(c, ray->across_v);
     TriangleEdges edges;
-    edges.u = product_difference(cx, by, cy, bx);
-    edges.v = product_difference(ax, cy, ay, cx);
-    edges.w = product_difference(bx, ay, by, ax);
+    edges.u = difference_of_products(cx, by, cy, bx);
+    edges.v = difference_of_products(ax, cy, ay, cx);
+    edges.w = difference_of_products(bx, ay, by, ax);
     edges.determinant = edges.u + edges.v + edges.w;
     edges.a = a;
     edges.b = b;
@@ -102,40 +103,35 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
     if (IS_COMPENSATED) {
         PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
         PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
-        PairVector normal = {pair_product_difference(ab.y, ac.z, ab.z, ac.y),
-                             pair_product_difference(ab.z, ac.x, ab.x, ac.z),
-                             pair_product_difference(ab.x, ac.y, ab.y, ac.x)};
+        PairVector normal = {pair_difference_of_products(ab.y, ac.z, ab.z, ac.y),
+                             pair_difference_of_products(ab.z, ac.x, ab.x, ac.z),
+                             pair_difference_of_products(ab.x, ac.y, ab.y, ac.x)};
         along = pair_vector_dot_vector(normal, ray->direction).high;
         height = pair_vector_dot(pair_vector_difference(a, ray->origin), normal).high;
     } else {
         Vector normal = triangle_normal(triangle);
-        along = vector_dot_exactly(normal, ray->direction);
-        height = vector_dot_exactly(normal, vector_subtract(a, ray->origin));
+        along = vector_dot_compensated(normal, ray->direction);
+        height = vector_dot_compensated(normal, vector_subtract(a, ray->origin));
     }
     mask crosses = fabs(height) * (real)(SMALLEST_RATIO) < fabs(along);
     return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), in_plane);
 }
 
 // The interval of t between the vertices' least and largest coordinate on one axis, widened by the slack.
-static inline Roots triangle_slab(real a, real b, real c, real slack, real inverse)
+static inline Interval triangle_slab(real a, real b, real c, real slack, real inverse)
 {
     real low = (real_min(real_min(a, b), c) - slack) * inverse;
     real high = (real_max(real_max(a, b), c) + slack) * inverse;
-    return (Roots){real_min(low, high), real_max(low, high)};
+    return (Interval){real_min(low, high), real_max(low, high)};
 }
 
 // The largest |coordinate| on each axis.
-static inline Vector corners_reach(Corners corners)
+static inline Vector corners_max_abs(Corners corners)
 {
     Vector a = corners.a, b = corners.b, c = corners.c;
     return (Vector){real_max(real_max(fabs(a.x), fabs(b.x)), fabs(c.x)),
                     real_max(real_max(fabs(a.y), fabs(b.y)), fabs(c.y)),
                     real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
-}
-
-static inline real roots_clamp(Roots roots, real t)
-{
-    return real_min(real_max(t, roots.near), roots.far);
 }
 
 // The clamped step. Edge-on the error of t is unbounded, while the edge functions, which know nothing of t,
@@ -144,19 +140,20 @@ static inline real roots_clamp(Roots roots, real t)
 static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray, real accurate_t)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
-    Vector reach = corners_reach((Corners){a, b, c});
-    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_magnitude(reach);
+    Vector max_abs = corners_max_abs((Corners){a, b, c});
+    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(max_abs);
     real t = accurate_t;
-    t = roots_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
-    t = roots_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
-    t = roots_clamp(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
+    t = interval_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
+    t = interval_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
+    t = interval_clamp(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
     // the vertices' t are off by a few roundings of the largest product in them
     Vector along = ray->along;
-    real off = (real)(4 * UNIT_ROUNDOFF) *
-               (reach.x * fabs(along.x) + reach.y * fabs(along.y) + reach.z * fabs(along.z));
+    real t_error = (real)(4 * UNIT_ROUNDOFF) *
+                   (max_abs.x * fabs(along.x) + max_abs.y * fabs(along.y) + max_abs.z * fabs(along.z));
     real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
-    return roots_clamp(
-        (Roots){real_min(real_min(a_t, b_t), c_t) - off, real_max(real_max(a_t, b_t), c_t) + off}, t);
+    return interval_clamp(
+        (Interval){real_min(real_min(a_t, b_t), c_t) - t_error, real_max(real_max(a_t, b_t), c_t) + t_error},
+        t);
 }
 
 // The second and the third step.
@@ -186,14 +183,14 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     mask remaining = hit;
     if (!IS_COMPENSATED) {
         TrianglePlane plane = triangle_plane(triangle, edges.a, ray);
-        hit = hit & !(plane.behind & (ray->near >= zero));
+        hit = hit & !(plane.behind & (ray->tmin >= zero));
         if (!lanes_any(hit)) return hit;
         remaining = hit & !plane.well_conditioned;
         *t = real_divide(plane.height, lanes_select(plane.well_conditioned, plane.along, (real)(1)));
     }
     if (lanes_any(remaining))
         *t = lanes_select(remaining, triangle_t_robust(triangle, &edges, ray, remaining), *t);
-    return hit & (*t > ray->near);
+    return hit & (*t > ray->tmin);
 }
 
 // Barycentric coordinates of the hit point.
@@ -219,12 +216,12 @@ static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
 static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
                                                  const Ray *ray, real t)
 {
-    Vector unit = vector_normalize(normal), reach = corners_reach(corners);
+    Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners);
     SurfacePoint point =
-        surface_point_make(triangle_blend(weights, corners), unit, vector_magnitude_along(unit, reach));
+        surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, max_abs));
     if (IS_COMPENSATED) {
-        real magnitude = real_max(real_max(vector_magnitude(corners.a), vector_magnitude(corners.b)),
-                                  vector_magnitude(corners.c));
+        real magnitude =
+            real_max(real_max(vector_norm1(corners.a), vector_norm1(corners.b)), vector_norm1(corners.c));
         surface_point_move_to_ray(&point, ray, t, magnitude);
     }
     return point;

@@ -11,14 +11,19 @@
 #define BOXES_H
 
 #include "scene.h"
+#include "shapes/interval.h"
 #include "traversal/ray.h"
+
+// The slack, in u: of the distance to the farthest corner, for the hit (docs/adding-a-shape.md), and of the
+// coordinates, for the boxes and the products.
+enum { BOX_HIT_SLACK = 64, BOX_ROUNDING_SLACK = 8 };
 
 // Rays prepared for boxes: a ray is between the two planes of an enlarged box across an axis from
 // plane * inverse + to_near to plane * inverse + to_far.
 typedef struct {
     Vector inverse; // 1 / direction, bounded
     Vector to_near, to_far;
-    real near;
+    real tmin;
     real slack;
     uint negative_x, negative_y, negative_z; // the lanes whose direction is negative, as bits
 } BoxRays;
@@ -26,22 +31,23 @@ typedef struct {
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
 {
     Vector center = vector_of(bounds);
-    real reach = vector_magnitude(vector_subtract(ray->origin, center)) + (real)(bounds.w);
-    real coordinates = real_fma((real)(2), vector_magnitude(center), reach);
-    real slack = real_fma((real)(64 * UNIT_ROUNDOFF), reach, (real)(8 * UNIT_ROUNDOFF) * coordinates);
+    real farthest = vector_norm1(vector_subtract(ray->origin, center)) + (real)(bounds.w);
+    real max_norm1 = real_fma((real)(2), vector_norm1(center), farthest);
+    real slack = real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), farthest,
+                          (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
     const real huge = (real)(1 / SMALLEST_RATIO);
-    real largest = real_min(huge * real_inverse_power(coordinates), huge);
+    real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),
                       real_min(real_max(ray->inverse.y, -largest), largest),
                       real_min(real_max(ray->inverse.z, -largest), largest)};
     Vector to_plane = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
-    Vector around = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
+    Vector slack_t = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
     Vector d = ray->direction;
     BoxRays rays;
     rays.inverse = inverse;
-    rays.to_near = vector_subtract(to_plane, around);
-    rays.to_far = vector_add(to_plane, around);
-    rays.near = ray->near;
+    rays.to_near = vector_subtract(to_plane, slack_t);
+    rays.to_far = vector_add(to_plane, slack_t);
+    rays.tmin = ray->tmin;
     rays.slack = slack;
     rays.negative_x = lanes_bits(d.x < (real)(0));
     rays.negative_y = lanes_bits(d.y < (real)(0));
@@ -49,26 +55,22 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
     return rays;
 }
 
-typedef struct {
-    real enter, leave;
-} BoxInterval;
-
-static inline BoxInterval box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
+static inline Interval box_rays_between(scalar low, scalar high, real inverse, real to_near, real to_far)
 {
-    return (BoxInterval){
+    return (Interval){
         real_min(real_fma((real)(low), inverse, to_near), real_fma((real)(high), inverse, to_near)),
         real_max(real_fma((real)(low), inverse, to_far), real_fma((real)(high), inverse, to_far))};
 }
 
-// The rays, in any octant, that intersect a box between near and limit.
-static inline mask box_rays_intersect(const BoxRays *rays, scalar4 low, scalar4 high, real limit)
+// The rays, in any octant, that intersect a box between tmin and tmax.
+static inline mask box_rays_intersect(const BoxRays *rays, scalar4 low, scalar4 high, real tmax)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
-    BoxInterval x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
-    BoxInterval y = box_rays_between(low.y, high.y, inverse.y, to_near.y, to_far.y);
-    BoxInterval z = box_rays_between(low.z, high.z, inverse.z, to_near.z, to_far.z);
-    return real_max(real_max(x.enter, y.enter), real_max(z.enter, rays->near)) <=
-           real_min(real_min(x.leave, y.leave), real_min(z.leave, limit));
+    Interval x = box_rays_between(low.x, high.x, inverse.x, to_near.x, to_far.x);
+    Interval y = box_rays_between(low.y, high.y, inverse.y, to_near.y, to_far.y);
+    Interval z = box_rays_between(low.z, high.z, inverse.z, to_near.z, to_far.z);
+    return real_max(real_max(x.near, y.near), real_max(z.near, rays->tmin)) <=
+           real_min(real_min(x.far, y.far), real_min(z.far, tmax));
 }
 
 // Which of a node's planes rays of one octant enter and leave a box by.
@@ -102,20 +104,20 @@ static inline real box_plane(global const scalar *box, uint plane)
     return (real)(box[plane * BVH_WIDTH]);
 }
 
-// The rays, all of one octant, that intersect a child's box between near and limit; *near is where. `box`:
+// The rays, all of one octant, that intersect a child's box between tmin and tmax; *entry is where. `box`:
 // the child's scalar in the node's first plane.
 static inline mask box_rays_intersect_child(const BoxRays *rays, Octant octant, global const scalar *box,
-                                            real limit, real *near)
+                                            real tmax, real *entry)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
-    real near_x = real_fma(box_plane(box, octant.near_x), inverse.x, to_near.x);
-    real near_y = real_fma(box_plane(box, octant.near_y), inverse.y, to_near.y);
-    real near_z = real_fma(box_plane(box, octant.near_z), inverse.z, to_near.z);
-    real far_x = real_fma(box_plane(box, octant.far_x), inverse.x, to_far.x);
-    real far_y = real_fma(box_plane(box, octant.far_y), inverse.y, to_far.y);
-    real far_z = real_fma(box_plane(box, octant.far_z), inverse.z, to_far.z);
-    *near = real_max(real_max(near_x, near_y), real_max(near_z, rays->near));
-    return *near <= real_min(real_min(far_x, far_y), real_min(far_z, limit));
+    real entry_x = real_fma(box_plane(box, octant.near_x), inverse.x, to_near.x);
+    real entry_y = real_fma(box_plane(box, octant.near_y), inverse.y, to_near.y);
+    real entry_z = real_fma(box_plane(box, octant.near_z), inverse.z, to_near.z);
+    real exit_x = real_fma(box_plane(box, octant.far_x), inverse.x, to_far.x);
+    real exit_y = real_fma(box_plane(box, octant.far_y), inverse.y, to_far.y);
+    real exit_z = real_fma(box_plane(box, octant.far_z), inverse.z, to_far.z);
+    *entry = real_max(real_max(entry_x, entry_y), real_max(entry_z, rays->tmin));
+    return *entry <= real_min(real_min(exit_x, exit_y), real_min(exit_z, tmax));
 }
 
 #endif

@@ -8,8 +8,9 @@
 // The lanes whose lines certainly miss the sphere. A line along d through a common origin misses a sphere
 // around v, seen from there, if (v . d)^2 < p d^2 for the origin's power p = v^2 - r^2. The sphere is
 // enlarged by 64 u (|v| + |d|), for the error of the shape's own test, the roundings here and the line's
-// distance from the common origin. That is less than 256 u v^2, which p is lowered by, plus 128 u d^2, the
-// cull slack; rays from the eye start there and need only the former.
+// distance from the common origin: p is lowered by 256 u v^2, on the host, and by 128 u d^2, which times d^2
+// is the ray's cull slack. A shadow ray's |d| is the distance to the light; rays from the eye start there and
+// need only the former.
 static inline mask ray_misses_cull_sphere(const Ray *ray, global const CullSphere *sphere)
 {
     global const scalar *center_power = (global const scalar *)sphere;

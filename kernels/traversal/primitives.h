@@ -31,7 +31,7 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
             if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
             if (i == last) break;                                                                            \
             Type shape = scene->names[i];                                                                    \
-            real t = ray->far;                                                                               \
+            real t = ray->tmax;                                                                              \
             mask found = name##_hit(&shape, ray, &t);                                                        \
             if (!lanes_any(found)) continue;                                                                 \
             traversal_record(traversal, scene, found, t, shape.id.x);                                        \
@@ -43,7 +43,7 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
     }
 SHAPE_LIST(INTERSECT_SHAPES)
 
-// A leaf is count << 8 | kind (BvhNode.leaf_info) and its first primitive.
+// A leaf is count << 8 | kind (BvhNode.child_kind) and its first primitive.
 static inline void intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint first)
 {
@@ -53,24 +53,24 @@ static inline void intersect_leaf(Traversal *traversal, const Scene *scene, cons
     SHAPE_LIST(INTERSECT_LEAF)
 }
 
-// Intersects all primitives outside the BVH: the unbounded ones, or every one in a scene without a BVH.
-static inline void intersect_unbounded(Traversal *traversal, const Scene *scene, Ray *ray)
+// Intersects all primitives outside the BVH: the unbounded ones, or all in a scene without a BVH.
+static inline void intersect_outside_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
-    global const uint *bounded_counts = (global const uint *)scene->header->bounded_counts;
-    uint boxes = HAS_BOXES ? counts[KIND_BOXES] - bounded_counts[KIND_BOXES] : 0;
-    uint triangles = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bounded_counts[KIND_TRIANGLES] : 0;
-    if (boxes + triangles > 0) ray_make_frame(ray);
+    global const uint *bvh_counts = (global const uint *)scene->header->bvh_counts;
+    uint box_count = HAS_BOXES ? counts[KIND_BOXES] - bvh_counts[KIND_BOXES] : 0;
+    uint triangle_count = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bvh_counts[KIND_TRIANGLES] : 0;
+    if (box_count + triangle_count > 0) ray_prepare(ray);
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
     if (cull_spheres) cull_spheres++; // the first is the BVH's
-#define INTERSECT_UNBOUNDED(feature, Type, name, names)                                                      \
+#define INTERSECT_OUTSIDE_BVH(feature, Type, name, names)                                                    \
     if (HAS_##feature && lanes_any(traversal->active)) {                                                     \
-        uint first = bounded_counts[KIND_##feature], last = counts[KIND_##feature];                          \
+        uint first = bvh_counts[KIND_##feature], last = counts[KIND_##feature];                              \
         bool has_cull_spheres = cull_spheres && KIND_##feature != KIND_PLANES;                               \
         intersect_##names(traversal, scene, ray, first, last, has_cull_spheres ? cull_spheres : 0);          \
         if (has_cull_spheres) cull_spheres += last - first;                                                  \
     }
-    SHAPE_LIST(INTERSECT_UNBOUNDED)
+    SHAPE_LIST(INTERSECT_OUTSIDE_BVH)
 }
 
 #endif

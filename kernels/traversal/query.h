@@ -60,7 +60,8 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
 }
 
 // Records crossings in the lanes `found`. Of equally near ones the lowest id counts, so that the image does
-// not depend on the order of objects.
+// not depend on the order of objects. Occlusion counts for active lanes alone. A closest hit is recorded for
+// any lane that carries a ray: outside the group it is still a hit, and recording it twice changes nothing.
 static inline void traversal_record(Traversal *traversal, const Scene *scene, mask found, real t, uint id)
 {
     Hit *hit = &traversal->hit;
@@ -76,8 +77,9 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
     hit->object = lanes_select(closer, object, hit->object);
 }
 
-// Per-lane far limit, below LARGEST; -LARGEST for lanes that are done.
-static inline real traversal_limit(const Traversal *traversal)
+// Per-lane tmax, below LARGEST, the entry distance of a child that no ray hits; -LARGEST for lanes that are
+// done.
+static inline real traversal_tmax(const Traversal *traversal)
 {
     return lanes_select(traversal->active, real_min(traversal->hit.t, (real)(LARGEST / 2)), (real)(-LARGEST));
 }

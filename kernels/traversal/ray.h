@@ -10,17 +10,18 @@ typedef struct {
     Vector origin, direction; // the direction need not be unit
     real squared;             // direction . direction
     real inverse_squared;
-    real near, far; // hits lie strictly between
-    mask active;    // lanes that carry a ray
-    real travelled; // distance from the eye to the origin, for texture filtering
+    real tmin, tmax; // hits lie strictly between
+    mask active;     // lanes that carry a ray
+    real travelled;  // distance from the eye to the origin, for texture filtering
     // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|; at `fast`, whose
     // compiler may rearrange how the direction was computed, within u of the origin
     uint common_origin;
     real cull_slack; // enlarges cull spheres by the rounding of the direction
-    // by ray_make_frame: 1 / direction, huge where the component is 0
+    // by ray_prepare: 1 / direction, huge where the component is 0
     Vector inverse;
-    // for triangles: two vectors across the direction, about as long as the square of its mantissas, and one
-    // along it, whose product with a point seen from the origin is the point's t
+    // for triangles: two vectors across the direction, of length O(1) since they are computed from a
+    // direction scaled by a power of two, and one along it, whose product with a point seen from the origin
+    // is the point's t
     Vector across_u, across_v, along;
 } Ray;
 
@@ -30,7 +31,7 @@ typedef struct {
 } Hit;
 
 // Compares the mask from memory with 0 anew: LLVM then sees that a lane is all ones or all zeros, and keeps
-// what derives from it in mask registers. Of a function's result it does not.
+// what derives from it in mask registers. It does not see this through a function call; hence a macro.
 #define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
 
 static inline mask hit_found(const Hit *hit)
@@ -62,21 +63,21 @@ static inline real real_inverse_or_huge(real a)
 static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
     real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
-    real norm = vector_length(d);
+    real norm = vector_norm(d);
     real w = real_fma(side, norm, d.z);
     real norm_w = norm * w;
     *u = (Vector){real_fma(-side * d.x, d.x, norm_w), -side * d.x * d.y, -side * d.x * w};
     *v = (Vector){-d.x * d.y, real_fma(-d.y, d.y, side * norm_w), -d.y * w};
 }
 
-static inline Ray ray_make(Vector origin, Vector direction, real near, real far, mask active)
+static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax, mask active)
 {
     Ray ray;
     ray.origin = origin;
     ray.direction = direction;
     ray.squared = vector_dot(direction, direction);
-    ray.near = near;
-    ray.far = far;
+    ray.tmin = tmin;
+    ray.tmax = tmax;
     ray.travelled = (real)(0);
     ray.common_origin = COMMON_ORIGIN_NONE;
     ray.active = active & (ray.squared > (real)(0));
@@ -86,14 +87,15 @@ static inline Ray ray_make(Vector origin, Vector direction, real near, real far,
     return ray;
 }
 
-// Computes what boxes, triangles and the BVH need, once rays reach the BVH or a box or triangle outside it.
-static inline void ray_make_frame(Ray *ray)
+// Computes what boxes, triangles and the BVH need. Lazy and idempotent: called before the BVH is traversed
+// and before boxes and triangles outside it are tested.
+static inline void ray_prepare(Ray *ray)
 {
     Vector d = ray->direction;
     ray->inverse = (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
     if (!HAS_TRIANGLES) return;
     real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
-    frame_across(vector_scale(d, real_inverse_power(largest)), &ray->across_u, &ray->across_v);
+    frame_across(vector_scale(d, real_inverse_power_of_two(largest)), &ray->across_u, &ray->across_v);
     ray->along = vector_scale(d, ray->inverse_squared);
 }
 
@@ -119,7 +121,7 @@ static inline void ray_set_common_origin(Ray *ray, uint common_origin)
 // The nearer of two crossings, near_t <= far_t, beyond the ray's start: far_t if near_t lies before it.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {
-    return lanes_select(near_t > ray->near, near_t, far_t);
+    return lanes_select(near_t > ray->tmin, near_t, far_t);
 }
 
 static inline Vector ray_point(const Ray *ray, real t)
@@ -130,7 +132,7 @@ static inline Vector ray_point(const Ray *ray, real t)
 // start + direction t, rounded about once.
 static inline real ray_coordinate(Pair start, real direction, real t)
 {
-    Pair offset = pair_product(direction, t), sum = pair_sum(start.high, offset.high);
+    Pair offset = two_product(direction, t), sum = two_sum(start.high, offset.high);
     return sum.high + (sum.low + (start.low + offset.low));
 }
 

@@ -10,14 +10,14 @@
 
 // Pushes the children of a node that the ray intersects.
 static inline void visit_node(TraversalStack *stack, const Scene *scene, global const BvhNode *node,
-                              const BoxRays *box_ray, Octant octant, scalar limit)
+                              const BoxRays *box_ray, Octant octant, scalar tmax)
 {
     global const scalar *boxes = (global const scalar *)node->planes;
     const uint bottom = stack->count;
     for (uint child = 0; child < BVH_WIDTH; child++) {
-        scalar near;
-        if (box_rays_intersect_child(box_ray, octant, boxes + child, limit, &near))
-            stack_push_child(stack, bottom, scene, node, child, 1, near);
+        scalar entry;
+        if (box_rays_intersect_child(box_ray, octant, boxes + child, tmax, &entry))
+            stack_push_child(stack, bottom, scene, node, child, 1, entry);
     }
 }
 
@@ -25,21 +25,21 @@ static inline void visit_node(TraversalStack *stack, const Scene *scene, global 
 static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
-    ray_make_frame(ray);
+    ray_prepare(ray);
     BoxRays box_ray = box_rays(ray, header->bounds);
-    scalar limit = traversal_limit(traversal);
-    if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, limit)) return;
+    scalar tmax = traversal_tmax(traversal);
+    if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, tmax)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
-    StackEntry entries[STACK_MAX], next = {0, BVH_NODE, 1, box_ray.near};
+    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, 1, box_ray.tmin};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
-        if (next.near <= limit) {
-            if (next.leaf_info == BVH_NODE) {
-                visit_node(&stack, scene, &scene->nodes[next.first], &box_ray, octant, limit);
+        if (next.entry <= tmax) {
+            if (next.child_kind == BVH_NODE) {
+                visit_node(&stack, scene, &scene->nodes[next.child_index], &box_ray, octant, tmax);
             } else {
-                intersect_leaf(traversal, scene, ray, next.leaf_info, next.first);
+                intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
                 if (!traversal->active) return;
-                limit = traversal_limit(traversal);
+                tmax = traversal_tmax(traversal);
             }
         }
         if (stack.count == 0) return;

@@ -7,14 +7,14 @@
 
 // A pending child. Kept small: a GPU may reserve the whole stack for each thread.
 typedef struct {
-    uint first;       // the node, or the leaf's first primitive
-    ushort leaf_info; // BVH_NODE, or a leaf
-    ushort lanes;     // whose rays intersect its box, as bits
-    scalar near;      // its entry distance
+    uint child_index;  // the node, or the leaf's first primitive
+    ushort child_kind; // BVH_NODE, or a leaf
+    ushort lanes;      // whose rays intersect its box, as bits
+    scalar entry;      // its entry distance
 } StackEntry;
 
 // A visit replaces a node by at most BVH_WIDTH children.
-#define STACK_MAX ((BVH_WIDTH - 1) * BVH_DEPTH_MAX + 1)
+#define STACK_CAPACITY ((BVH_WIDTH - 1) * BVH_DEPTH_LARGEST + 1)
 
 // `entries` is an array of its own, so that the count stays in a register.
 typedef struct {
@@ -25,31 +25,31 @@ typedef struct {
     bool farthest_first;
 } TraversalStack;
 
-static inline void entry_prefetch(const Scene *scene, uint first, uint leaf_info)
+static inline void entry_prefetch(const Scene *scene, uint child_index, uint child_kind)
 {
-    if (leaf_info == BVH_NODE)
-        memory_prefetch((global const char *)&scene->nodes[first], sizeof(BvhNode));
-    else if (HAS_TRIANGLES && (leaf_info & 0xff) == KIND_TRIANGLES)
-        memory_prefetch((global const char *)&scene->triangles[first], 4 * sizeof(Triangle));
-    else if (HAS_SPHERES && (leaf_info & 0xff) == KIND_SPHERES)
-        memory_prefetch((global const char *)&scene->spheres[first], sizeof(Sphere));
+    if (child_kind == BVH_NODE)
+        memory_prefetch((global const char *)&scene->nodes[child_index], sizeof(BvhNode));
+    else if (HAS_TRIANGLES && (child_kind & 0xff) == KIND_TRIANGLES)
+        memory_prefetch((global const char *)&scene->triangles[child_index], 4 * sizeof(Triangle));
+    else if (HAS_SPHERES && (child_kind & 0xff) == KIND_SPHERES)
+        memory_prefetch((global const char *)&scene->spheres[child_index], sizeof(Sphere));
 }
 
 // Pushes a child of a node, keeping the node's children, which start at `bottom`, sorted by entry distance:
 // the one to visit first is on top.
 static inline void stack_push_child(TraversalStack *stack, uint bottom, const Scene *scene,
-                                    global const BvhNode *node, uint child, uint lanes, scalar near)
+                                    global const BvhNode *node, uint child, uint lanes, scalar entry)
 {
     uint slot = stack->count++;
     for (; slot > bottom; slot--) {
         StackEntry below = stack->entries[slot - 1];
-        if (stack->farthest_first ? below.near <= near : below.near >= near) break;
+        if (stack->farthest_first ? below.entry <= entry : below.entry >= entry) break;
         stack->entries[slot] = below;
     }
-    uint first = ((global const uint *)node->first)[child],
-         leaf_info = ((global const uint *)node->leaf_info)[child];
-    stack->entries[slot] = (StackEntry){first, (ushort)leaf_info, (ushort)lanes, near};
-    entry_prefetch(scene, first, leaf_info);
+    uint child_index = ((global const uint *)node->child_index)[child];
+    uint child_kind = ((global const uint *)node->child_kind)[child];
+    stack->entries[slot] = (StackEntry){child_index, (ushort)child_kind, (ushort)lanes, entry};
+    entry_prefetch(scene, child_index, child_kind);
 }
 
 #endif

@@ -8,8 +8,8 @@
 
 static OUT_OF_LINE Traversal scene_traverse(const Scene *scene, Ray *ray, Query query)
 {
-    Traversal traversal = {query, ray->active, {ray->far, (integer)(-1)}, (integer)(0)};
-    intersect_unbounded(&traversal, scene, ray);
+    Traversal traversal = {query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
+    intersect_outside_bvh(&traversal, scene, ray);
     if (HAS_BVH) {
         global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
         if (!cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0)
@@ -28,7 +28,7 @@ static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
     return scene_traverse(scene, ray, CLOSEST_OPAQUE_HIT).hit;
 }
 
-// The fraction of light that passes along each active ray between near and far: 1 if it is free, 0 behind an
+// The fraction of light that passes along each active ray between tmin and tmax: 1 if it is free, 0 behind an
 // opaque object. Each transparent object transmits its fraction, without bending the ray.
 static inline real transmittance(const Scene *scene, Ray *ray)
 {

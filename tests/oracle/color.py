@@ -79,7 +79,7 @@ def curvature(thing, point):
         return 1 / shape.radius
     base = shape.center if isinstance(shape, exact.DoubleCone) else shape.base
     p = subtract(point, base)
-    off_axis = as_float(dot(p, p) - dot(p, shape.axis) ** 2 / shape.along)
+    off_axis = as_float(dot(p, p) - dot(p, shape.axis) ** 2 / shape.axis_squared)
     return 1 / sqrt(max(off_axis, 1e-60))
 
 
@@ -89,12 +89,12 @@ def rim_distance(shape, point):
         faces = sorted(as_float(min(abs(x - a), abs(x - b))) for a, x, b in zip(shape.low, point, shape.high))
         return faces[1]
     if isinstance(shape, exact.Revolution) and shape.has_ends():
-        height = as_float(dot(subtract(point, shape.base), shape.axis) / shape.along)
+        height = as_float(dot(subtract(point, shape.base), shape.axis) / shape.axis_squared)
         ends = sorted(abs(h) * shape.axis_length for h in (height, height - 1))
         if ends[0] > 1e-25:
             return ends[0]
         p = subtract(point, shape.base)
-        across = sqrt(max(as_float(dot(p, p) - dot(p, shape.axis) ** 2 / shape.along), 0.0))
+        across = sqrt(max(as_float(dot(p, p) - dot(p, shape.axis) ** 2 / shape.axis_squared), 0.0))
         start, end = map(as_float, shape.radii)
         return abs(start + (end - start) * height - across)
     return inf

@@ -1,8 +1,8 @@
 """Closest hits in exact rationals, certified roots and 300-bit balls; nothing here cancels, so that every formula is
 the textbook's own.
 
-A solid is a set of points with an exact membership test and, for a line, the places where it may begin or end. The
-line's places are sorted, a rational point between each two tells whether the stretch lies inside, and the crossings are
+A solid is a set of points with an exact membership test and, for a line, the t where it may begin or end. These are
+sorted, the membership of a rational point between each two says whether that interval is inside, and the crossings are
 where that changes. Surfaces without an inside (plane, disc, triangle) have one crossing at most.
 """
 
@@ -12,7 +12,7 @@ from math import sqrt
 from flint import arb, ctx, fmpq, fmpq_poly
 
 ctx.prec = 300
-SAME = fmpq(1, 2**200)  # places nearer than this are one: far below what roots of such small numbers can differ by
+SAME = fmpq(1, 2**200)  # values of t nearer than this are one: far below what roots of such small numbers can differ by
 
 
 def rational(number):
@@ -77,19 +77,19 @@ def polynomial_roots(coefficients):
 
 
 class Shape:
-    """center, size: for tolerances; radius: of what a ray may just miss."""
+    """center, size: for tolerances; radius: of the cross-section whose silhouette a ray may graze."""
 
     def crossings(self, ray):
         """(t, outward normal's cosine with the ray) of each crossing of a line, ascending."""
-        places = []
-        for t in sorted(self.places(ray)):
-            if not places or t - places[-1] > SAME:
-                places.append(t)
-        if not places:
+        ts = []
+        for t in sorted(self.boundary_ts(ray)):
+            if not ts or t - ts[-1] > SAME:
+                ts.append(t)
+        if not ts:
             return []
-        between = [places[0] - 1] + [(a + b) / 2 for a, b in zip(places, places[1:])] + [places[-1] + 1]
+        between = [ts[0] - 1] + [(a + b) / 2 for a, b in zip(ts, ts[1:])] + [ts[-1] + 1]
         inside = [self.contains(ray.at(t)) for t in between]
-        return [t for i, t in enumerate(places) if inside[i] != inside[i + 1]]
+        return [t for i, t in enumerate(ts) if inside[i] != inside[i + 1]]
 
     def hit(self, ray):
         """The first t beyond the ray's start, or None."""
@@ -105,17 +105,17 @@ class Shape:
 
 class Sphere(Shape):
     def __init__(self, center, radius):
-        self.center, self.squared = vector(center), rational(radius) ** 2
+        self.center, self.radius_squared = vector(center), rational(radius) ** 2
         self.radius = self.size = float(fraction(rational(radius)))
 
-    def places(self, ray):
+    def boundary_ts(self, ray):
         f = subtract(ray.origin, self.center)
         d = ray.direction
-        return polynomial_roots([dot(f, f) - self.squared, 2 * dot(f, d), dot(d, d)])
+        return polynomial_roots([dot(f, f) - self.radius_squared, 2 * dot(f, d), dot(d, d)])
 
     def contains(self, point):
         p = subtract(point, self.center)
-        return dot(p, p) <= self.squared
+        return dot(p, p) <= self.radius_squared
 
     def normal(self, point):
         return subtract(point, self.center)
@@ -128,7 +128,7 @@ class Box(Shape):
         self.half = floats([(b - a) / 2 for a, b in zip(self.low, self.high)])
         self.size = self.radius = sqrt(sum(x * x for x in self.half))
 
-    def places(self, ray):
+    def boundary_ts(self, ray):
         return [
             (face - o) / d
             for low, high, o, d in zip(self.low, self.high, ray.origin, ray.direction)
@@ -156,15 +156,15 @@ class Revolution(Shape):
     def __init__(self, base, axis, radii, infinite=False, caps=True):
         self.base, self.axis = vector(base), vector(axis)
         self.radii, self.infinite, self.caps = [rational(r) for r in radii], infinite, caps
-        self.along = dot(self.axis, self.axis)
+        self.axis_squared = dot(self.axis, self.axis)
         self.axis_length = length(self.axis)
         self.center = self.base if infinite else [b + a / 2 for b, a in zip(self.base, self.axis)]
         self.radius = float(max(map(fraction, self.radii)))
         self.size = self.radius if infinite else sqrt(self.radius**2 + self.axis_length**2 / 4)
 
-    def places(self, ray):
+    def boundary_ts(self, ray):
         # (|p|^2 - h^2 / |w|^2) = (r + (R - r) h / |w|^2)^2 with h = p . w, times |w|^4
-        f, d, w, ww = subtract(ray.origin, self.base), ray.direction, self.axis, self.along
+        f, d, w, ww = subtract(ray.origin, self.base), ray.direction, self.axis, self.axis_squared
         p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
         height = fmpq_poly([dot(f, w), dot(d, w)])
         radius = self.radii[0] * ww + (self.radii[1] - self.radii[0]) * height
@@ -181,24 +181,24 @@ class Revolution(Shape):
         found = super().crossings(ray)
         if self.caps or self.infinite:
             return found
-        return [t for t in found if 0 <= dot(subtract(ray.at(t), self.base), self.axis) <= self.along]
+        return [t for t in found if 0 <= dot(subtract(ray.at(t), self.base), self.axis) <= self.axis_squared]
 
     def contains(self, point):
         p = subtract(point, self.base)
         height = dot(p, self.axis)
-        if self.has_ends() and not 0 <= height <= self.along:
+        if self.has_ends() and not 0 <= height <= self.axis_squared:
             return False
-        radius = self.radii[0] * self.along + (self.radii[1] - self.radii[0]) * height
-        return radius >= 0 and (dot(p, p) * self.along - height**2) * self.along <= radius**2
+        radius = self.radii[0] * self.axis_squared + (self.radii[1] - self.radii[0]) * height
+        return radius >= 0 and (dot(p, p) * self.axis_squared - height**2) * self.axis_squared <= radius**2
 
     def normal(self, point):
         p = subtract(point, self.base)
-        height = dot(p, self.axis) / self.along
+        height = dot(p, self.axis) / self.axis_squared
         if self.has_ends() and min(abs(height), abs(height - 1)) < SAME:
             return self.axis
         across = [x - height * a for x, a in zip(p, self.axis)]
         radius = self.radii[0] + (self.radii[1] - self.radii[0]) * height
-        lean = radius * (self.radii[1] - self.radii[0]) / self.along
+        lean = radius * (self.radii[1] - self.radii[0]) / self.axis_squared
         normal = [x - lean * a for x, a in zip(across, self.axis)]
         return normal if any(normal) else self.axis
 
@@ -209,7 +209,7 @@ class DoubleCone(Shape):
 
     def __init__(self, apex, axis, slope, apart=0):
         self.center, self.axis, self.slope, self.apart = vector(apex), vector(axis), rational(slope), rational(apart)
-        self.along = dot(self.axis, self.axis)
+        self.axis_squared = dot(self.axis, self.axis)
         self.radius = self.size = 0.0
 
     def tips(self):
@@ -217,27 +217,27 @@ class DoubleCone(Shape):
         for sign in (1, -1):
             yield [c + sign * self.apart * a for c, a in zip(self.center, self.axis)], [sign * a for a in self.axis]
 
-    def places(self, ray):
+    def boundary_ts(self, ray):
         # |p|^2 |w|^2 - h^2 = slope^2 h^2 with h = p . w
         found = []
         for tip, w in self.tips():
             f, d = subtract(ray.origin, tip), ray.direction
             height = fmpq_poly([dot(f, w), dot(d, w)])
             p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
-            found += polynomial_roots((p_p * self.along - height * height * (1 + self.slope**2)).coeffs())
+            found += polynomial_roots((p_p * self.axis_squared - height * height * (1 + self.slope**2)).coeffs())
         return found
 
     def contains(self, point):
         for tip, w in self.tips():
             p = subtract(point, tip)
             height = dot(p, w)
-            if height >= 0 and dot(p, p) * self.along <= (1 + self.slope**2) * height**2:
+            if height >= 0 and dot(p, p) * self.axis_squared <= (1 + self.slope**2) * height**2:
                 return True
         return False
 
     def normal(self, point):
         p = subtract(point, self.center)
-        height = dot(p, self.axis) / self.along
+        height = dot(p, self.axis) / self.axis_squared
         return [x - height * (1 + self.slope**2) * a for x, a in zip(p, self.axis)]
 
 
@@ -245,22 +245,22 @@ class Torus(Shape):
     def __init__(self, center, major, minor, axis=(0, 0, 1)):
         self.center, self.major, self.minor = vector(center), rational(major), rational(minor)
         self.axis = vector(axis)
-        self.along = dot(self.axis, self.axis)
+        self.axis_squared = dot(self.axis, self.axis)
         self.radius, self.major_radius = floats([self.minor, self.major])
         self.size = self.major_radius + self.radius
 
-    def places(self, ray):
+    def boundary_ts(self, ray):
         # (|p|^2 + R^2 - r^2)^2 = 4 R^2 (|p|^2 - h^2 / |w|^2) with h = p . w
         f, d = subtract(ray.origin, self.center), ray.direction
         p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
         height = fmpq_poly([dot(f, self.axis), dot(d, self.axis)])
         sum_ = p_p + (self.major**2 - self.minor**2)
-        flat = p_p - height * height / self.along
+        flat = p_p - height * height / self.axis_squared
         return polynomial_roots((sum_ * sum_ - 4 * self.major**2 * flat).coeffs())
 
     def flat(self, p):
         """The squared distance from the axis."""
-        return dot(p, p) - dot(p, self.axis) ** 2 / self.along
+        return dot(p, p) - dot(p, self.axis) ** 2 / self.axis_squared
 
     def contains(self, point):
         # the sum is below 0 only where the tube of a spindle, minor > major, reaches beyond the axis
@@ -273,7 +273,7 @@ class Torus(Shape):
         across = middle(arb(self.flat(p)).sqrt())
         if across == 0:
             return p
-        height = dot(p, self.axis) / self.along
+        height = dot(p, self.axis) / self.axis_squared
         return [x - self.major / across * (x - height * a) for x, a in zip(p, self.axis)]
 
 
@@ -283,17 +283,17 @@ class Paraboloid(Shape):
 
     def __init__(self, apex, axis, focal_length, height, infinite=False, caps=True):
         self.center, self.axis, self.focal_length = vector(apex), vector(axis), rational(focal_length)
-        self.along = dot(self.axis, self.axis)
-        self.unit = middle(arb(self.along).sqrt())
+        self.axis_squared = dot(self.axis, self.axis)
+        self.unit = middle(arb(self.axis_squared).sqrt())
         self.end, self.infinite, self.caps = rational(height) * self.unit, infinite, caps
         self.radius = self.size = 2 * float(height if infinite else sqrt(focal_length * height) + height)
 
-    def places(self, ray):
+    def boundary_ts(self, ray):
         # |p|^2 - h^2 / |w|^2 = 4 f h / |w| with h = p . w
         f, d, w = subtract(ray.origin, self.center), ray.direction, self.axis
         height = fmpq_poly([dot(f, w), dot(d, w)])
         p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
-        found = polynomial_roots((p_p - height * height / self.along - 4 * self.focal_length / self.unit * height).coeffs())
+        found = polynomial_roots((p_p - height * height / self.axis_squared - 4 * self.focal_length / self.unit * height).coeffs())
         if self.has_end() and dot(d, w) != 0:
             found.append((self.end - dot(f, w)) / dot(d, w))
         return found
@@ -312,7 +312,7 @@ class Paraboloid(Shape):
         height = dot(p, self.axis)
         if self.has_end() and height > self.end:
             return False
-        return dot(p, p) - height**2 / self.along <= 4 * self.focal_length / self.unit * height
+        return dot(p, p) - height**2 / self.axis_squared <= 4 * self.focal_length / self.unit * height
 
     def normal(self, point):
         p = subtract(point, self.center)
@@ -339,7 +339,7 @@ class Plane(Shape):
 class Disc(Plane):
     def __init__(self, center, normal, radius):
         super().__init__(center, normal)
-        self.squared = rational(radius) ** 2
+        self.radius_squared = rational(radius) ** 2
         self.size = self.radius = float(radius)
 
     def off(self, ray, t):
@@ -347,7 +347,7 @@ class Disc(Plane):
         return dot(v, v)
 
     def crossings(self, ray):
-        return [t for t in super().crossings(ray) if self.off(ray, t) <= self.squared]
+        return [t for t in super().crossings(ray) if self.off(ray, t) <= self.radius_squared]
 
 
 class Triangle(Plane):
@@ -369,7 +369,8 @@ class Triangle(Plane):
 
 
 def shape_of(given):
-    """A shape by its numbers and flags, as answers.c prints them."""
+    """A shape by its numbers and flags, as answers.c prints them: the nine doubles that its member of Object.as
+    (host/scene/scene.h) begins with, in their order there."""
     kind, n = given["shape"], given["numbers"]
     if kind == "sphere":
         return Sphere(n[:3], n[3])

@@ -1,7 +1,7 @@
 // How far t is off, by shape, precision and distance: random rays through the kernels that this program was
 // built with, each beside the quadruple-precision reference of host/verify/reference.c on the very bits that
-// the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --hold it prints what
-// breaks the hard cases' bounds instead.
+// the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --check it prints
+// what exceeds the hard cases' bounds instead.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
@@ -15,25 +15,25 @@
 #include <string.h>
 #include <time.h>
 
-// Distance of a ray's start from the shape's center, in radii of the ball that holds the shape.
+// Distance of a ray's start from the shape's center, in radii of the shape's bounding sphere.
 static const double rungs[] = {1.0001, 1.01, 1.1, 2, 10, 100, 1e3, 1e4, 1e5, 1e6};
 
 enum {
     RUNG_COUNT = sizeof rungs / sizeof *rungs,
     INSTANCES = 6,  // of each shape, among which each rung's rays are divided
-    COPIES = 64,    // of a shape in the scene whose time tells a test's
+    COPIES = 64,    // of a shape, to time a test
     TIMED_RUNS = 5, // of which the shortest counts
     TIMED_RAYS = 1 << 17
 };
 
 typedef struct {
     size_t ray_count; // of each shape, over all rungs; 0: no errors are measured
-    bool hold, time;
+    bool check, time;
     unsigned precisions; // set
     const char *shape;   // NULL: all
 } LadderOptions;
 
-// Rays of one rung at one aim, and what they should meet.
+// Rays of one rung towards one shape, and what they should hit.
 typedef struct {
     TraceRay *rays;
     ReferenceHit *hits;
@@ -48,15 +48,16 @@ typedef struct {
 } Errors;
 
 typedef struct {
-    Errors steep, grazing;        // at a cosine of 0.1 or more, and below
-    size_t compared, wrong, open; // hits and misses; wrong beyond the band in which both are right; within it
-    double owed;                  // the largest error as a part of the tier's bound
+    Errors steep, grazing; // at a cosine of 0.1 or more, and below
+    size_t compared, wrong,
+        undecided;         // hits and misses; differing beyond the band in which both are right; in it
+    double bound_fraction; // the largest error as a fraction of the tier's bound
 } Tally;
 
-// What a tier owes: so many ulps of t, so much of size or distance over the cosine, and the band in which hit
-// or miss is open; in u. The hard cases grant tier B its slack below a cosine of 0.1 alone; here it is
-// granted at every angle (tests/test_shapes.c says why, docs/numerics.md which rungs need it). The textbook
-// owes nothing.
+// A tier's bounds: on t, in ulps plus a slack of size or distance over the cosine, and the band in which hit
+// or miss is undecided; in u. The hard cases allow tier B its slack below a cosine of 0.1 alone; here it is
+// allowed at every angle (tests/test_shapes.c says why, docs/numerics.md which rungs need it). The textbook
+// has no bounds.
 typedef struct {
     double ulps, slack, band;
     bool of_size; // else of the distance
@@ -74,12 +75,12 @@ static Vector3 vector_from(const double parts[3])
     return (Vector3){parts[0], parts[1], parts[2]};
 }
 
-// From so many radii away towards a random point of the ball, a fiftieth larger, that holds the shape.
-static RandomRay ladder_ray(const RandomShape *aim, double rung, Random *random)
+// From `rung` radii away towards a random point of the bounding sphere, enlarged by a fiftieth.
+static RandomRay ladder_ray(const RandomShape *shape, double rung, Random *random)
 {
     Vector3 out = vector_normalize(random_in_sphere(random));
-    Vector3 eye = vector_add(aim->center, vector_scale(out, rung * aim->radius));
-    Vector3 target = vector_add(aim->center, vector_scale(random_in_sphere(random), 1.02 * aim->radius));
+    Vector3 eye = vector_add(shape->center, vector_scale(out, rung * shape->reach));
+    Vector3 target = vector_add(shape->center, vector_scale(random_in_sphere(random), 1.02 * shape->reach));
     return (RandomRay){eye, vector_normalize(vector_subtract(target, eye))};
 }
 
@@ -90,16 +91,16 @@ static void rays_free(Rays *rays)
     free(rays->answers);
 }
 
-static Rays rays_make(const Object *object, const RandomShape *aim, double rung, size_t count, bool is_double,
+static Rays rays_make(const Object *object, const RandomShape *shape, double rung, size_t count, bool wide,
                       Random *random)
 {
     Rays rays = {memory_allocate(count + 1, sizeof(TraceRay)),
                  memory_allocate(count + 1, sizeof(ReferenceHit)),
                  memory_allocate(count + 1, sizeof(TraceHit)), count};
     for (size_t i = 0; i < count; i++) {
-        RandomRay given = ladder_ray(aim, rung, random);
-        ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
-                                     : reference_ray_rounded(given.origin, given.direction);
+        RandomRay given = ladder_ray(shape, rung, random);
+        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
+                                : reference_ray_rounded(given.origin, given.direction);
         rays.rays[i] = (TraceRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
                                   {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
                                   (double)ray.tmin,
@@ -137,7 +138,7 @@ static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision pre
     return renderer;
 }
 
-static void tally_add(Tally *tally, const RandomShape *aim, const Rays *rays, size_t i, Precision precision)
+static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, size_t i, Precision precision)
 {
     const ReferenceHit *expected = &rays->hits[i];
     const TraceHit *hit = &rays->answers[i];
@@ -145,28 +146,28 @@ static void tally_add(Tally *tally, const RandomShape *aim, const Rays *rays, si
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
-    double distance = vector_length(vector_subtract(origin, aim->center)) + aim->radius;
-    // a plane may be hit far beyond the radius
+    double distance = vector_length(vector_subtract(origin, shape->center)) + shape->reach;
+    // a plane may be hit far beyond the reach
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
-    double scale = u * (tier->of_size ? aim->radius : distance);
-    // flat shapes have no compensated edges; a triangle's are open below 16 u of edge and distance
-    double flat = aim->object.kind == SHAPE_TRIANGLE ? 16 : 4;
+    double scale = u * (tier->of_size ? shape->reach : distance);
+    // flat shapes have no compensated edges; a triangle's are undecided below 16 u of edge and distance
+    double flat = shape->object.kind == SHAPE_TRIANGLE ? 16 : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
 
     tally->compared++;
     if ((hit->object != UINT32_MAX) != expected->found) {
-        (*(undecided ? &tally->open : &tally->wrong))++;
+        (*(undecided ? &tally->undecided : &tally->wrong))++;
         return;
     }
     if (!expected->found) return;
     double cosine = (double)expected->cosine, ulp = reference_ulp(expected->t, bits);
     double off = fabs((double)(hit->t - expected->t));
     Errors *errors = cosine >= 0.1 ? &tally->steep : &tally->grazing;
-    // no number is as wrong as can be
+    // NaN and infinity exceed every bound
     errors->ulps[errors->count++] = isfinite(off) ? off / ulp : HUGE_VAL;
     if (undecided) return;
-    double owed = tier->ulps * ulp + tier->slack * scale / (cosine * vector_length(direction));
-    tally->owed = fmax(tally->owed, isfinite(off) ? off / owed : HUGE_VAL);
+    double bound = tier->ulps * ulp + tier->slack * scale / (cosine * vector_length(direction));
+    tally->bound_fraction = fmax(tally->bound_fraction, isfinite(off) ? off / bound : HUGE_VAL);
 }
 
 static int compare_doubles(const void *a, const void *b)
@@ -212,17 +213,17 @@ static double trace_seconds(Renderer *renderer, const Rays *rays)
     return least;
 }
 
-// A shape's test costs what a scene with 64 more copies of it takes longer, for rays of all rungs.
-static double test_seconds(Compute *compute, const RandomShape *aim, Precision precision)
+// Time per test = (time with 1 + COPIES copies - time with 1) / COPIES, for rays of all rungs.
+static double test_seconds(Compute *compute, const RandomShape *shape, Precision precision)
 {
-    bool is_double = precision == PRECISION_DOUBLE;
-    Object object = is_double ? aim->object : reference_round_object(&aim->object);
+    bool wide = precision == PRECISION_DOUBLE;
+    Object object = wide ? shape->object : reference_round_object(&shape->object);
     Rays all = {memory_allocate(TIMED_RAYS, sizeof(TraceRay)), NULL,
                 memory_allocate(TIMED_RAYS, sizeof(TraceHit)), 0};
     Random random = {2};
     for (int rung = 0; rung < RUNG_COUNT; rung++)
         for (int i = 0; i < TIMED_RAYS / RUNG_COUNT; i++) {
-            RandomRay ray = ladder_ray(aim, rungs[rung], &random);
+            RandomRay ray = ladder_ray(shape, rungs[rung], &random);
             all.rays[all.count++] = (TraceRay){{ray.origin.x, ray.origin.y, ray.origin.z},
                                                {ray.direction.x, ray.direction.y, ray.direction.z},
                                                0,
@@ -280,55 +281,76 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
     rays_trace(*renderer, rays);
 }
 
-// One shape on one rung: each precision of the same width on the same rays. True if all kept to their tiers.
-static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool is_double,
-                     const LadderOptions *options, Json *json)
+// Adds one shape's errors on one rung: each precision of the same width on the same rays.
+static void rung_measure(Compute *compute, LadderShape *shape, int rung, bool wide,
+                         const LadderOptions *options, size_t count, Tally tallies[PRECISION_COUNT])
+{
+    Random random = {3 + (uint64_t)rung};
+    for (int which = 0; which < INSTANCES; which++) {
+        const RandomShape *instance = &shape->instances[which];
+        Object object = wide ? instance->object : reference_round_object(&instance->object);
+        Rays rays = rays_make(&object, instance, rungs[rung], count, wide, &random);
+        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+            if (!(options->precisions >> precision & 1) || wide != (precision == PRECISION_DOUBLE)) continue;
+            shape_trace(shape, which, precision, compute, &object, &rays);
+            for (size_t i = 0; i < count; i++)
+                tally_add(&tallies[precision], instance, &rays, i, precision);
+        }
+        rays_free(&rays);
+    }
+}
+
+static void tally_write(Tally *tally, const char *shape, Precision precision, double distance, Json *json)
+{
+    json_begin_object(json, NULL);
+    json_text(json, "shape", shape);
+    json_text(json, "precision", precision_names[precision]);
+    json_number(json, "distance", distance);
+    json_integer(json, "rays", (int64_t)tally->compared);
+    errors_write(json, "steep", &tally->steep);
+    errors_write(json, "grazing", &tally->grazing);
+    json_integer(json, "wrong", (int64_t)tally->wrong);
+    json_integer(json, "undecided", (int64_t)tally->undecided);
+    json_number(json, "bound_fraction", tally->bound_fraction);
+    json_end(json);
+}
+
+static bool tally_within_bounds(const Tally *tally)
+{
+    return tally->wrong == 0 && tally->bound_fraction <= 1;
+}
+
+// For --check: what exceeds the bounds.
+static void tally_report(const Tally *tally, const char *shape, Precision precision, double distance)
+{
+    if (tally_within_bounds(tally)) return;
+    printf("%s at %g, %s: %zu of %zu wrong, error of t %.3g of the bound\n", shape, distance,
+           precision_names[precision], tally->wrong, tally->compared, tally->bound_fraction);
+}
+
+// True if one shape on one rung is within the bounds at each precision of one width.
+static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, const LadderOptions *options,
+                     Json *json)
 {
     size_t count = options->ray_count / (RUNG_COUNT * INSTANCES) + 1;
     Tally tallies[PRECISION_COUNT] = {0};
-    Random random = {3 + (uint64_t)rung};
     for (int precision = 0; precision < PRECISION_COUNT; precision++) {
         tallies[precision].steep.ulps = memory_allocate(count * INSTANCES, sizeof(double));
         tallies[precision].grazing.ulps = memory_allocate(count * INSTANCES, sizeof(double));
     }
-    for (int which = 0; which < INSTANCES; which++) {
-        const RandomShape *aim = &shape->instances[which];
-        Object object = is_double ? aim->object : reference_round_object(&aim->object);
-        Rays rays = rays_make(&object, aim, rungs[rung], count, is_double, &random);
-        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-            if (!(options->precisions >> precision & 1) || is_double != (precision == PRECISION_DOUBLE))
-                continue;
-            shape_trace(shape, which, precision, compute, &object, &rays);
-            for (size_t i = 0; i < count; i++)
-                tally_add(&tallies[precision], aim, &rays, i, precision);
-        }
-        rays_free(&rays);
-    }
-    bool held = true;
+    rung_measure(compute, shape, rung, wide, options, count, tallies);
+    bool within_bounds = true;
     for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
         Tally *tally = &tallies[precision];
         if (tally->compared > 0) {
-            json_begin_object(json, NULL);
-            json_text(json, "shape", shape->name);
-            json_text(json, "precision", precision_names[precision]);
-            json_number(json, "distance", rungs[rung]);
-            json_integer(json, "rays", (int64_t)tally->compared);
-            errors_write(json, "steep", &tally->steep);
-            errors_write(json, "grazing", &tally->grazing);
-            json_integer(json, "wrong", (int64_t)tally->wrong);
-            json_integer(json, "open", (int64_t)tally->open);
-            json_number(json, "owed", tally->owed);
-            json_end(json);
-            bool kept = tally->wrong == 0 && tally->owed <= 1;
-            if (options->hold && !kept)
-                printf("%s at %g, %s: %zu of %zu wrong, error of t %.3g of the bound\n", shape->name,
-                       rungs[rung], precision_names[precision], tally->wrong, tally->compared, tally->owed);
-            held &= kept;
+            tally_write(tally, shape->name, precision, rungs[rung], json);
+            if (options->check) tally_report(tally, shape->name, precision, rungs[rung]);
+            within_bounds &= tally_within_bounds(tally);
         }
         free(tally->steep.ulps);
         free(tally->grazing.ulps);
     }
-    return held;
+    return within_bounds;
 }
 
 static bool options_read(LadderOptions *options, int argument_count, char **arguments)
@@ -336,7 +358,7 @@ static bool options_read(LadderOptions *options, int argument_count, char **argu
     static const struct option names[] = {{"rays", required_argument, NULL, 'r'},
                                           {"shape", required_argument, NULL, 's'},
                                           {"precision", required_argument, NULL, 'p'},
-                                          {"hold", no_argument, NULL, 'h'},
+                                          {"check", no_argument, NULL, 'c'},
                                           {"time", no_argument, NULL, 't'},
                                           {0}};
     *options = (LadderOptions){.ray_count = 1000000};
@@ -344,7 +366,7 @@ static bool options_read(LadderOptions *options, int argument_count, char **argu
     while ((option = getopt_long(argument_count, arguments, "", names, NULL)) != -1) {
         if (option == 'r') options->ray_count = strtoul(optarg, NULL, 10);
         if (option == 's') options->shape = optarg;
-        if (option == 'h') options->hold = true;
+        if (option == 'c') options->check = true;
         if (option == 't') options->time = true;
         for (int i = 0; option == 'p' && i < PRECISION_COUNT; i++)
             if (strcmp(optarg, precision_names[i]) == 0) options->precisions |= 1U << i;
@@ -358,7 +380,7 @@ int main(int argument_count, char **arguments)
 {
     LadderOptions options;
     if (!options_read(&options, argument_count, arguments)) {
-        fputs("usage: ladder [--rays COUNT] [--shape NAME] [--precision P]... [--time] [--hold]\n", stderr);
+        fputs("usage: ladder [--rays COUNT] [--shape NAME] [--precision P]... [--time] [--check]\n", stderr);
         return EXIT_FAILURE;
     }
     DeviceList devices;
@@ -372,7 +394,7 @@ int main(int argument_count, char **arguments)
     compute_open(&compute, device);
     if (!device->fp64) options.precisions &= ~(1U << PRECISION_DOUBLE);
 
-    bool held = true;
+    bool within_bounds = true;
     Json *json = json_open();
     json_text(json, "device", device->name);
     json_begin_array(json, "rungs");
@@ -380,8 +402,8 @@ int main(int argument_count, char **arguments)
         LadderShape shape = shape_make((ShapeKind)i);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
         for (int rung = 0; rung < RUNG_COUNT; rung++)
-            for (int is_double = 0; is_double < 2; is_double++)
-                held &= rung_run(&compute, &shape, rung, is_double, &options, json);
+            for (int wide = 0; wide < 2; wide++)
+                within_bounds &= rung_run(&compute, &shape, rung, wide, &options, json);
         shape_close(&shape);
     }
     json_end(json);
@@ -400,11 +422,11 @@ int main(int argument_count, char **arguments)
         }
     }
     json_end(json);
-    if (options.hold)
-        printf("%s\n", held ? "all within their tiers" : "beyond their tiers");
+    if (options.check)
+        printf("%s\n", within_bounds ? "all within their bounds" : "beyond their bounds");
     else
         json_print(json, stdout);
     compute_close(&compute);
     device_list_close(&devices);
-    return held || !options.hold ? EXIT_SUCCESS : 3;
+    return within_bounds || !options.check ? EXIT_SUCCESS : 3;
 }

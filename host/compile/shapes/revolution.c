@@ -27,7 +27,7 @@ static void cylinder_flatten(Flattening *flattening, const Object *object)
     Cylinder cylinder =
         revolution_make(&flattening->rounding, object->as.cylinder.from, object->as.cylinder.axis, radius,
                         radius, 0, object->as.cylinder.finite, object->as.cylinder.caps);
-    if (object->as.cylinder.only_inside) cylinder.id.y |= ONLY_INSIDE;
+    if (object->as.cylinder.only_inside) cylinder.id.y |= IGNORES_FRONT_FACES;
     primitive_add(flattening, KIND_CYLINDERS, &cylinder, object->material);
 }
 
@@ -38,7 +38,7 @@ static void cone_flatten(Flattening *flattening, const Object *object)
     Cone cone = revolution_make(&flattening->rounding, object->as.cone.from, object->as.cone.axis,
                                 finite ? radius[0] : 0, radius[1], object->as.cone.slope, finite,
                                 object->as.cone.caps);
-    if (object->as.cone.only_inside) cone.id.y |= ONLY_INSIDE;
+    if (object->as.cone.only_inside) cone.id.y |= IGNORES_FRONT_FACES;
     primitive_add(flattening, KIND_CONES, &cone, object->material);
 }
 

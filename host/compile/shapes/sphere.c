@@ -11,7 +11,7 @@ static void sphere_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 center = point_from_eye(&flattening->rounding, object->as.sphere.center);
     const Sphere sphere = {.center_radius = scalar4_of(center, object->as.sphere.radius),
-                           .id.y = object->as.sphere.only_inside ? ONLY_INSIDE : 0u};
+                           .id.y = object->as.sphere.only_inside ? IGNORES_FRONT_FACES : 0u};
     primitive_add(flattening, KIND_SPHERES, &sphere, object->material);
 }
 

@@ -19,7 +19,7 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
     real near = real_max(real_max(x.near, y.near), z.near);
     real far = real_min(real_min(x.far, y.far), z.far);
     *t = ray_first(ray, near, far);
-    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->near);
+    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
 }
 
 // The face of the axis on which the point lies farthest out, as a part of the box.

@@ -9,7 +9,7 @@ static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, r
 {
     real along = vector_dot(normal, ray->direction);
     *t = vector_dot(normal, vector_subtract(point, ray->origin)) / along;
-    return RAY_ACTIVE(ray) & (fabs(along) > (real)(1e-6f)) & (*t > ray->near);
+    return RAY_ACTIVE(ray) & (fabs(along) > (real)(1e-6f)) & (*t > ray->tmin);
 }
 
 static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)

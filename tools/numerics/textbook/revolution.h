@@ -12,7 +12,7 @@ typedef struct {
 
 static inline void nearest_take(Nearest *nearest, const Ray *ray, real t, mask counts)
 {
-    mask closer = counts & (t > ray->near) & (!nearest->found | (t < nearest->t));
+    mask closer = counts & (t > ray->tmin) & (!nearest->found | (t < nearest->t));
     nearest->t = lanes_select(closer, t, nearest->t);
     nearest->found = nearest->found | closer;
 }
@@ -47,12 +47,12 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
 
     Nearest nearest = {*t, mask_none()};
     real near_height = start + roots.near * rise, far_height = start + roots.far * rise;
-    mask near_counts = hit, far_counts = hit;
+    mask near_valid = hit, far_counts = hit;
     if (finite) {
-        near_counts = hit & (near_height >= (real)(0)) & (near_height <= body.height);
+        near_valid = hit & (near_height >= (real)(0)) & (near_height <= body.height);
         far_counts = hit & (far_height >= (real)(0)) & (far_height <= body.height);
     }
-    if (!(shape->id.y & ONLY_INSIDE) || capped) nearest_take(&nearest, ray, roots.near, near_counts);
+    if (!(shape->id.y & IGNORES_FRONT_FACES) || capped) nearest_take(&nearest, ray, roots.near, near_valid);
     nearest_take(&nearest, ray, roots.far, far_counts);
     if (capped) {
         for (uint end = 0; end < 2; end++) {

@@ -14,8 +14,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     mask hit = RAY_ACTIVE(ray) & (discriminant >= (real)(0));
     if (!lanes_any(hit)) return hit;
     Roots roots = quadratic_roots(ray->inverse_squared, b, discriminant);
-    *t = sphere->id.y & ONLY_INSIDE ? roots.far : ray_first(ray, roots.near, roots.far);
-    return hit & (*t > ray->near);
+    *t = sphere->id.y & IGNORES_FRONT_FACES ? roots.far : ray_first(ray, roots.near, roots.far);
+    return hit & (*t > ray->tmin);
 }
 
 static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray *ray, real t)

@@ -72,7 +72,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     v = sqrt(real_max(v, (real)(0)));
     v = lanes_select(q < (real)(0), -v, v);
     Ray unit = *ray;
-    unit.near = ray->near * norm;
+    unit.tmin = ray->tmin * norm;
     Nearest nearest = {*t, mask_none()};
     quadratic_offer(v, y - u, shift, splits, &unit, &nearest);
     quadratic_offer(-v, y + u, shift, splits, &unit, &nearest);

@@ -45,7 +45,7 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     TriangleWeights weights;
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
     mask hit = RAY_ACTIVE(ray) & triangle_crossing(corners, ray, t, &weights);
-    return hit & (*t > ray->near);
+    return hit & (*t > ray->tmin);
 }
 
 static inline TriangleWeights triangle_weights(Corners corners, const Ray *ray)

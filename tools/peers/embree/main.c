@@ -29,7 +29,7 @@ static const char usage[] =
 
 typedef struct {
     const char *description, *output;
-    bool single, incoherent, user_spheres;
+    bool one_by_one, incoherent, user_spheres;
     enum RTCBuildQuality quality;
     unsigned tile, threads, width, height;
     double seconds;
@@ -239,7 +239,7 @@ static Options options_read(int count, char **words)
     for (int letter; (letter = getopt_long(count, words, "o:", names, NULL)) != -1;) {
         switch (letter) {
         case 's':
-            options.single = true;
+            options.one_by_one = true;
             break;
         case 'u':
             options.user_spheres = true;
@@ -272,7 +272,7 @@ static Options options_read(int count, char **words)
         }
     }
     bool sound = options.tile >= PACKET_SIDE && options.tile % PACKET_SIDE == 0 && options.threads >= 1 &&
-                 options.width >= 1 && options.height >= 1 && !(options.single && options.user_spheres);
+                 options.width >= 1 && options.height >= 1 && !(options.one_by_one && options.user_spheres);
     if (optind != count - 1 || !sound) options_fail();
     options.description = words[optind];
     return options;
@@ -285,7 +285,7 @@ static void json_print(const Options *options, double build_seconds, double proc
     printf("{\"version\": \"%d.%d.%d\", \"rays\": \"%s\", \"coherent\": %s, \"user_spheres\": %s, "
            "\"threads\": %u, \"tile\": %u, ",
            RTC_VERSION_MAJOR, RTC_VERSION_MINOR, RTC_VERSION_PATCH,
-           options->single ? "single" : "packets of 16", options->incoherent ? "false" : "true",
+           options->one_by_one ? "single" : "packets of 16", options->incoherent ? "false" : "true",
            options->user_spheres ? "true" : "false", options->threads, options->tile);
     printf("\"size\": [%u, %u], \"build_ms\": %.3f, \"processor_ms\": %.3f, ", options->width,
            options->height, 1e3 * build_seconds, 1e3 * processor_seconds);
@@ -311,7 +311,7 @@ int main(int argument_count, char **arguments)
 
     Renderer renderer = {.description = &description,
                          .scene = scene,
-                         .single = options.single,
+                         .one_by_one = options.one_by_one,
                          .coherence = options.incoherent ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
                                                          : RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
                          .width = options.width,

@@ -6,8 +6,9 @@
 
 static const int valid_lane = -1; // as Embree has it
 
-// A plane is not put to Embree: 16 rays against one are few instructions, and leave it shorter rays. This is
-// faster than two large triangles in its BVH. Plane k is noted in hits as geometry FIRST_PLANE + k.
+// Planes are intersected here, before Embree: 16 rays against one plane cost a few instructions and shorten
+// tfar. This is faster than two large triangles in its BVH. Plane k is noted in hits as geometry FIRST_PLANE
+// + k.
 enum { FIRST_PLANE = 1 << 30 };
 
 typedef struct {
@@ -38,14 +39,14 @@ static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, s
         float direction_x = camera->forward.x + x * camera->right.x + y * camera->up.x;
         float direction_y = camera->forward.y + x * camera->right.y + y * camera->up.y;
         float direction_z = camera->forward.z + x * camera->right.z + y * camera->up.z;
-        float shorten =
+        float inverse_length =
             1 / sqrtf(direction_x * direction_x + direction_y * direction_y + direction_z * direction_z);
         rays->ray.org_x[i] = camera->eye.x;
         rays->ray.org_y[i] = camera->eye.y;
         rays->ray.org_z[i] = camera->eye.z;
-        rays->ray.dir_x[i] = shorten * direction_x;
-        rays->ray.dir_y[i] = shorten * direction_y;
-        rays->ray.dir_z[i] = shorten * direction_z;
+        rays->ray.dir_x[i] = inverse_length * direction_x;
+        rays->ray.dir_y[i] = inverse_length * direction_y;
+        rays->ray.dir_z[i] = inverse_length * direction_z;
         rays->ray.tnear[i] = 0;
         rays->ray.tfar[i] = far_away;
         rays->ray.time[i] = 0;
@@ -87,7 +88,7 @@ static void rays_intersect(const Renderer *renderer, const int *valid, struct RT
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = renderer->coherence;
-    if (!renderer->single) {
+    if (!renderer->one_by_one) {
         rtcIntersect16(valid, renderer->scene, &context, rays);
         return;
     }
@@ -116,13 +117,13 @@ static void rays_intersect(const Renderer *renderer, const int *valid, struct RT
     }
 }
 
-// Leaves the ends of those rays that meet something below 0.
+// Sets tfar < 0 for occluded rays (Embree's convention).
 static void rays_occlude(const Renderer *renderer, const int *valid, struct RTCRay16 *rays)
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = renderer->coherence;
-    if (!renderer->single) {
+    if (!renderer->one_by_one) {
         rtcOccluded16(valid, renderer->scene, &context, rays);
         return;
     }
@@ -161,11 +162,11 @@ static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit
         float x = w * normals[a] + u * normals[b] + v * normals[c];
         float y = w * normals[a + 1] + u * normals[b + 1] + v * normals[c + 1];
         float z = w * normals[a + 2] + u * normals[b + 2] + v * normals[c + 2];
-        float shorten = 1 / sqrtf(x * x + y * y + z * z);
-        shorten = flip[i] ? -shorten : shorten;
-        normal->x[i] = shorten * x;
-        normal->y[i] = shorten * y;
-        normal->z[i] = shorten * z;
+        float inverse_length = 1 / sqrtf(x * x + y * y + z * z);
+        inverse_length = flip[i] ? -inverse_length : inverse_length;
+        normal->x[i] = inverse_length * x;
+        normal->y[i] = inverse_length * y;
+        normal->z[i] = inverse_length * z;
     }
 }
 
@@ -174,11 +175,11 @@ static void normals_face(Vectors *normal, const int *flip)
     FOR_LANES
     {
         float x = normal->x[i], y = normal->y[i], z = normal->z[i];
-        float shorten = 1 / sqrtf(x * x + y * y + z * z);
-        shorten = flip[i] ? -shorten : shorten;
-        normal->x[i] = shorten * x;
-        normal->y[i] = shorten * y;
-        normal->z[i] = shorten * z;
+        float inverse_length = 1 / sqrtf(x * x + y * y + z * z);
+        inverse_length = flip[i] ? -inverse_length : inverse_length;
+        normal->x[i] = inverse_length * x;
+        normal->y[i] = inverse_length * y;
+        normal->z[i] = inverse_length * z;
     }
 }
 
@@ -329,11 +330,11 @@ static void light_add(const Renderer *renderer, const Light *light, Surfaces *su
     {
         float x = place.x - surfaces->position.x[i], y = place.y - surfaces->position.y[i],
               z = place.z - surfaces->position.z[i];
-        float squared = x * x + y * y + z * z, shorten = 1 / sqrtf(squared);
-        distance[i] = squared * shorten;
-        to_light.x[i] = shorten * x;
-        to_light.y[i] = shorten * y;
-        to_light.z[i] = shorten * z;
+        float squared = x * x + y * y + z * z, inverse_length = 1 / sqrtf(squared);
+        distance[i] = squared * inverse_length;
+        to_light.x[i] = inverse_length * x;
+        to_light.y[i] = inverse_length * y;
+        to_light.z[i] = inverse_length * z;
         facing[i] =
             normal->x[i] * to_light.x[i] + normal->y[i] * to_light.y[i] + normal->z[i] * to_light.z[i];
         lit[i] = facing[i] > 0 ? surfaces->found[i] : 0;

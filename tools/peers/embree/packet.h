@@ -22,8 +22,8 @@ static inline bool lanes_any(const int *lanes)
 
 typedef struct {
     const Description *description;
-    RTCScene scene; // geometry 0 is the spheres, if there are any; then come the meshes
-    bool single;    // rays one by one, not in packets of 16
+    RTCScene scene;  // geometry 0 is the spheres, if there are any; then come the meshes
+    bool one_by_one; // not in packets of 16
     enum RTCIntersectContextFlags coherence;
     unsigned width, height;
     float *film; // height * width * 3, from the top left
