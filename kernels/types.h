@@ -128,16 +128,16 @@ typedef struct {
 } BvhNode;
 #endif
 
-// BVH_DEPTH_LARGEST: see host/compile/bvh.h.
-enum { BVH_NODE = 0xff, BVH_DEPTH_LARGEST = 80 };
+// BVH_DEPTH_MAX: see host/compile/bvh.h.
+enum { BVH_NODE = 0xff, BVH_DEPTH_MAX = 80 };
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
 // a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
 // whole BVH, then one of each primitive outside it, kind by kind; planes have none.
 //
 // xyz: v, from the common origin to the center; w: the origin's power |v|^2 - radius^2, lowered by
-// CULL_SPHERE_SLACK u |v|^2. With v = 0, -CULL_SPHERE_LARGEST is never culled (unbounded, or out of float's
-// range) and +CULL_SPHERE_LARGEST always (an empty BVH).
+// CULL_SPHERE_SLACK u |v|^2. With v = 0, -CULL_SPHERE_MAX is never culled (unbounded, or out of float's
+// range) and +CULL_SPHERE_MAX always (an empty BVH).
 typedef struct {
     scalar4 center_power;
 } CullSphere;
@@ -221,7 +221,7 @@ typedef struct {
     scalar4 color;
     scalar4 position;  // from the eye; point and spot
     scalar4 direction; // unit, away from the light; directional and spot
-    // spot: x: 1 - cos(angle), from the axis to the edge; y: 1 - cos(angle - penumbra), which no kernel
+    // spot: x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which no kernel
     // reads; z: 1 / (x - y), 0 for a hard edge
     scalar4 cone;
     uint4 kind; // x: LIGHT_KIND_…

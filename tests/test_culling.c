@@ -178,7 +178,7 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
     }
 }
 
-static cl_program culling_program(bool wide)
+static cl_program culling_program(bool is_double)
 {
     Text prelude = {0};
     text_appendf(&prelude,
@@ -193,11 +193,11 @@ static cl_program culling_program(bool wide)
     return program;
 }
 
-static void culling_check(bool wide, bool from_eye)
+static void culling_check(bool is_double, bool from_eye)
 {
-    if (wide && !probe_has(PRECISION_DOUBLE)) skip();
-    cl_program program = culling_program(wide);
-    Trial trial = {.wide = wide, .unit_roundoff = wide ? DBL_EPSILON / 2 : FLT_EPSILON / 2, .random = {7}};
+    if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
+    cl_program program = culling_program(is_double);
+    Trial trial = {.is_double = is_double, .unit_roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2, .random = {7}};
     trial.lines = memory_allocate((size_t)SPHERES_PER_ORIGIN * 6, sizeof *trial.lines);
     trial.missed = memory_allocate(SPHERES_PER_ORIGIN, sizeof *trial.missed);
     for (size_t i = 0; i < ORIGIN_COUNT; i++) {

@@ -104,7 +104,7 @@ static Scene random_scene(uint64_t seed)
         Light light = {.kind = kinds[i], .color = random_color(&random)};
         light.position = vector_subtract(random_point(&random, 5, 15), vector_scale(up, 8));
         light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
-        light.angle = random_between(&random, 15, 40);
+        light.half_angle = random_between(&random, 15, 40);
         light.penumbra = random_between(&random, 0, 10);
         array_push(scene.lights, light);
     }

@@ -30,15 +30,15 @@ static void vector_at(const void *scalars, size_t index, bool is_double, double 
 static TraceHit hit_at(const void *scalars, size_t index, bool is_double, uint32_t object, double unit)
 {
     TraceHit hit = {.object = object,
-                    .t = scalar_at(scalars, index + RESULT_T, wide),
-                    .transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, wide),
-                    .light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, wide)};
-    vector_at(scalars, index + RESULT_NORMAL, wide, hit.normal);
-    vector_at(scalars, index + RESULT_POSITION, wide, hit.position);
-    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, wide, hit.reflected_origin);
-    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, wide, hit.reflected_direction);
-    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, wide, hit.refracted_origin);
-    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, wide, hit.refracted_direction);
+                    .t = scalar_at(scalars, index + RESULT_T, is_double),
+                    .transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, is_double),
+                    .light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, is_double)};
+    vector_at(scalars, index + RESULT_NORMAL, is_double, hit.normal);
+    vector_at(scalars, index + RESULT_POSITION, is_double, hit.position);
+    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, hit.reflected_origin);
+    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, hit.reflected_direction);
+    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, hit.refracted_origin);
+    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, hit.refracted_direction);
     hit.t *= unit;
     for (size_t axis = 0; axis < 3; axis++) {
         hit.position[axis] *= unit;
