@@ -221,8 +221,8 @@ typedef struct {
     scalar4 color;
     scalar4 position;  // from the eye; point and spot
     scalar4 direction; // unit, away from the light; directional and spot
-    // spot: x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which no kernel
-    // reads; z: 1 / (x - y), 0 for a hard edge
+    // spot: x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which no
+    // kernel reads; z: 1 / (x - y), 0 for a hard edge
     scalar4 cone;
     uint4 kind; // x: LIGHT_KIND_…
 } Light;

@@ -7,7 +7,8 @@
 // GLINT_LONG_TESTS=1: tests take minutes instead of seconds.
 bool tests_are_long(void);
 
-// The lanes to compare, up to a 0: 1 and 4; where tests are long also 8 and 16, which take the compiler longest.
+// The lanes to compare, up to a 0: 1 and 4; where tests are long also 8 and 16, which take the compiler
+// longest.
 const uint32_t *tested_lanes(void);
 
 // The whole image, one sample per pixel, with the defaults of glint render, but for the features: unless

@@ -197,7 +197,9 @@ static void culling_check(bool is_double, bool from_eye)
 {
     if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
     cl_program program = culling_program(is_double);
-    Trial trial = {.is_double = is_double, .unit_roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2, .random = {7}};
+    Trial trial = {.is_double = is_double,
+                   .unit_roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2,
+                   .random = {7}};
     trial.lines = memory_allocate((size_t)SPHERES_PER_ORIGIN * 6, sizeof *trial.lines);
     trial.missed = memory_allocate(SPHERES_PER_ORIGIN, sizeof *trial.missed);
     for (size_t i = 0; i < ORIGIN_COUNT; i++) {

@@ -14,7 +14,7 @@
 // A node's width is its kernel's: this is that of one lane.
 typedef struct {
     scalar4 planes[BVH_PLANES];
-    uint4 first[1], leaf_info[1];
+    uint4 child_index[1], child_kind[1];
 } HostBvhNode;
 
 // Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
@@ -50,8 +50,8 @@ typedef struct {
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[3])                           \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[4])                           \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
-    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, first[0])                         \
-    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, leaf_info[0])                          \
+    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_index[0])                   \
+    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_kind[0])                    \
     REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \

@@ -13,7 +13,6 @@
 
 enum { SHAPES_OF_A_FORM = 3, RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SCENE_COUNT = 3 };
 
-
 static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
 

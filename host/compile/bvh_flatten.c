@@ -110,7 +110,7 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
                        const Bounds *empty, unsigned width, void *node)
 {
     double *planes = node;
-    uint32_t *first = (void *)(planes + (size_t)BVH_PLANES * width), *leaf_info = first + width;
+    uint32_t *child_index = (void *)(planes + (size_t)BVH_PLANES * width), *child_kind = child_index + width;
     uint32_t next_node = wide->first_node;
     for (unsigned i = 0; i < width; i++) {
         const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
@@ -122,11 +122,11 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
             planes[(BVH_HIGH + axis) * width + i] = high[axis];
         }
         if (child && child->count > 0) {
-            first[i] = order[child->first];
-            leaf_info[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+            child_index[i] = order[child->first];
+            child_kind[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
         } else if (child) {
-            first[i] = next_node++;
-            leaf_info[i] = BVH_NODE;
+            child_index[i] = next_node++;
+            child_kind[i] = BVH_NODE;
         }
     }
 }

@@ -114,8 +114,8 @@ static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, sca
 
 // `footprint`: the pixel's width in texels of the full texture. Colors are linear in it between the levels
 // for 2^n and 2^(n + 1) texels.
-static inline scalar4 texture_filtered(const Scene *scene, uint4 image, scalar u, scalar v, scalar footprint,
-                                       bool wraps_v)
+static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar u, scalar v,
+                                       scalar footprint, bool wraps_v)
 {
     uint level = texture.x - 1, last = level + texture.y - 1;
     scalar part = 0;
@@ -147,7 +147,7 @@ static inline Vector texture_color(const Scene *scene, uint kind, const Material
         if (lanes.each[lane] == 0) continue;
         bool is_sphere = kind == KIND_SPHERES;
         scalar lane_v = is_sphere ? v.each[lane] : wrap_unit(v.each[lane]);
-        scalar4 color = texture_filtered(scene, material->image, wrap_unit(u.each[lane]), lane_v,
+        scalar4 color = texture_filtered(scene, material->texture, wrap_unit(u.each[lane]), lane_v,
                                          footprint.each[lane], !is_sphere);
         red.each[lane] = color.x;
         green.each[lane] = color.y;
