@@ -79,8 +79,8 @@ static Vector3 vector_from(const double parts[3])
 static RandomRay ladder_ray(const RandomShape *shape, double rung, Random *random)
 {
     Vector3 out = vector_normalize(random_in_sphere(random));
-    Vector3 eye = vector_add(shape->center, vector_scale(out, rung * shape->reach));
-    Vector3 target = vector_add(shape->center, vector_scale(random_in_sphere(random), 1.02 * shape->reach));
+    Vector3 eye = vector_add(shape->center, vector_scale(out, rung * shape->radius));
+    Vector3 target = vector_add(shape->center, vector_scale(random_in_sphere(random), 1.02 * shape->radius));
     return (RandomRay){eye, vector_normalize(vector_subtract(target, eye))};
 }
 
@@ -91,16 +91,16 @@ static void rays_free(Rays *rays)
     free(rays->answers);
 }
 
-static Rays rays_make(const Object *object, const RandomShape *shape, double rung, size_t count, bool wide,
-                      Random *random)
+static Rays rays_make(const Object *object, const RandomShape *shape, double rung, size_t count,
+                      bool is_double, Random *random)
 {
     Rays rays = {memory_allocate(count + 1, sizeof(TraceRay)),
                  memory_allocate(count + 1, sizeof(ReferenceHit)),
                  memory_allocate(count + 1, sizeof(TraceHit)), count};
     for (size_t i = 0; i < count; i++) {
         RandomRay given = ladder_ray(shape, rung, random);
-        ReferenceRay ray = wide ? reference_ray(given.origin, given.direction)
-                                : reference_ray_rounded(given.origin, given.direction);
+        ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
+                                     : reference_ray_rounded(given.origin, given.direction);
         rays.rays[i] = (TraceRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
                                   {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
                                   (double)ray.tmin,
@@ -146,10 +146,10 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
-    double distance = vector_length(vector_subtract(origin, shape->center)) + shape->reach;
+    double distance = vector_length(vector_subtract(origin, shape->center)) + shape->radius;
     // a plane may be hit far beyond the reach
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
-    double scale = u * (tier->of_size ? shape->reach : distance);
+    double scale = u * (tier->of_size ? shape->radius : distance);
     // flat shapes have no compensated edges; a triangle's are undecided below 16 u of edge and distance
     double flat = shape->object.kind == SHAPE_TRIANGLE ? 16 : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
@@ -216,8 +216,8 @@ static double trace_seconds(Renderer *renderer, const Rays *rays)
 // Time per test = (time with 1 + COPIES copies - time with 1) / COPIES, for rays of all rungs.
 static double test_seconds(Compute *compute, const RandomShape *shape, Precision precision)
 {
-    bool wide = precision == PRECISION_DOUBLE;
-    Object object = wide ? shape->object : reference_round_object(&shape->object);
+    bool is_double = precision == PRECISION_DOUBLE;
+    Object object = is_double ? shape->object : reference_round_object(&shape->object);
     Rays all = {memory_allocate(TIMED_RAYS, sizeof(TraceRay)), NULL,
                 memory_allocate(TIMED_RAYS, sizeof(TraceHit)), 0};
     Random random = {2};
@@ -282,16 +282,17 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
 }
 
 // Adds one shape's errors on one rung: each precision of the same width on the same rays.
-static void rung_measure(Compute *compute, LadderShape *shape, int rung, bool wide,
+static void rung_measure(Compute *compute, LadderShape *shape, int rung, bool is_double,
                          const LadderOptions *options, size_t count, Tally tallies[PRECISION_COUNT])
 {
     Random random = {3 + (uint64_t)rung};
     for (int which = 0; which < INSTANCES; which++) {
         const RandomShape *instance = &shape->instances[which];
-        Object object = wide ? instance->object : reference_round_object(&instance->object);
-        Rays rays = rays_make(&object, instance, rungs[rung], count, wide, &random);
+        Object object = is_double ? instance->object : reference_round_object(&instance->object);
+        Rays rays = rays_make(&object, instance, rungs[rung], count, is_double, &random);
         for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-            if (!(options->precisions >> precision & 1) || wide != (precision == PRECISION_DOUBLE)) continue;
+            if (!(options->precisions >> precision & 1) || is_double != (precision == PRECISION_DOUBLE))
+                continue;
             shape_trace(shape, which, precision, compute, &object, &rays);
             for (size_t i = 0; i < count; i++)
                 tally_add(&tallies[precision], instance, &rays, i, precision);
@@ -329,8 +330,8 @@ static void tally_report(const Tally *tally, const char *shape, Precision precis
 }
 
 // True if one shape on one rung is within the bounds at each precision of one width.
-static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, const LadderOptions *options,
-                     Json *json)
+static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool is_double,
+                     const LadderOptions *options, Json *json)
 {
     size_t count = options->ray_count / (RUNG_COUNT * INSTANCES) + 1;
     Tally tallies[PRECISION_COUNT] = {0};
@@ -338,7 +339,7 @@ static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool wide, 
         tallies[precision].steep.ulps = memory_allocate(count * INSTANCES, sizeof(double));
         tallies[precision].grazing.ulps = memory_allocate(count * INSTANCES, sizeof(double));
     }
-    rung_measure(compute, shape, rung, wide, options, count, tallies);
+    rung_measure(compute, shape, rung, is_double, options, count, tallies);
     bool within_bounds = true;
     for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
         Tally *tally = &tallies[precision];
@@ -402,8 +403,8 @@ int main(int argument_count, char **arguments)
         LadderShape shape = shape_make((ShapeKind)i);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
         for (int rung = 0; rung < RUNG_COUNT; rung++)
-            for (int wide = 0; wide < 2; wide++)
-                within_bounds &= rung_run(&compute, &shape, rung, wide, &options, json);
+            for (int is_double = 0; is_double < 2; is_double++)
+                within_bounds &= rung_run(&compute, &shape, rung, is_double, &options, json);
         shape_close(&shape);
     }
     json_end(json);
