@@ -366,7 +366,7 @@ static void rays_behind_fill(TraceRay *rays, const Scene *scene)
     for (size_t packet = 0; packet < PACKETS; packet++) {
         Vector3 origin = random_in_cube(8), target = delicate_point(scene);
         Vector3 ahead = vector_normalize(vector_subtract(target, origin));
-        bool looks_behind = random_coin(&random_state); // each of its rays, at what lies there
+        bool looks_behind = random_coin(&random_state); // each of its rays, at what is there
         if (looks_behind) ahead = vector_scale(ahead, -1);
         for (size_t lane = 0; lane < PACKET; lane++) {
             bool goes_along = packet % 3 == 0 || (packet % 3 == 1 && lane % 4 != 0);

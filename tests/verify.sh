@@ -54,7 +54,7 @@ status=0
 "$GLINT" verify R1 R3 --precision single --perturb 1:1000 >"$scratch/erring" || status=$?
 check "a renderer that errs: exit status $status, not 3" test $status = 3
 check 'a renderer that errs: both cases are wrong' test "$(grep -c 'FAIL.* wrong' "$scratch/erring")" = 2
-check 'the JSON tells what errors were put in' \
+check 'the JSON names the injected errors' \
     grep -Pzq '"perturb": \{\s*"seed": 1,\s*"scale": 1000\s*\}' <("$GLINT" verify P4 --precision single --perturb 1:1000 --json)
 
 status=0

@@ -176,7 +176,7 @@ static const char *const coincident[] = {
 enum { COINCIDENT = sizeof coincident / sizeof *coincident };
 
 // Of objects that are met at the same distance the first in the list is seen; the distance does not depend on
-// the list's order. Each object alone tells how far it is.
+// the list's order. A scene of each object alone gives it.
 void verify_coincident_faces(VerifyRun *run)
 {
     enum { COUNT = 1200 };

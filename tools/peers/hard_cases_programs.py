@@ -68,7 +68,7 @@ class Embree:
 
 
 class Glint:
-    """Of images alone: what glint makes of rays, glint verify tells."""
+    """Of images alone: what glint makes of rays, glint verify reports."""
 
     def __init__(self, program, precision):
         self.program, self.precision, self.name = program, precision, f"glint {precision}"

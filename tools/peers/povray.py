@@ -61,7 +61,7 @@ def command(scene_path, image, size):
 
 
 def stage_seconds(_stdout, stderr):
-    """What the program tells of its own time: (read, prepare, trace)."""
+    """What the program reports of its own time: (read, prepare, trace)."""
     def seconds(name):
         match = re.search(name + r" Time:.*\(([0-9.]+) seconds\)", stderr)
         return float(match.group(1)) if match else 0.0

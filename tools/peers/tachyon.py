@@ -64,6 +64,6 @@ def command(scene_path, image, size):
 
 
 def stage_seconds(stdout, _stderr):
-    """What the program tells of its own time: (read, prepare, trace)."""
+    """What the program reports of its own time: (read, prepare, trace)."""
     names = "Scene Parsing", "Preprocessing", "Ray Tracing"
     return tuple(float(re.search(name + r" Time:\s*([0-9.]+)", stdout).group(1)) for name in names)
