@@ -200,6 +200,23 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
 }
 
+static bool is_case(const char *name)
+{
+    size_t i = 0;
+    while (verify_case_name(i) && strcmp(verify_case_name(i), name) != 0)
+        i++;
+    return verify_case_name(i);
+}
+
+static int refuse_case(const char *name)
+{
+    fprintf(stderr, "glint: verify: there is no case \"%s\"; there are ", name);
+    for (size_t i = 0; verify_case_name(i); i++)
+        fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
+    fprintf(stderr, " (docs/verify.md)\n");
+    return EXIT_USER;
+}
+
 static int options_read(VerifyOptions *options, int argument_count, char **arguments)
 {
     *options = (VerifyOptions){.every_precision = true};
@@ -218,11 +235,7 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
     }
     options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
     for (size_t i = 0; i < options->cases.count; i++)
-        if (!verify_is_case(options->cases.names[i])) {
-            fprintf(stderr, "glint: verify: there is no case \"%s\"; docs/verify.md lists them\n",
-                    options->cases.names[i]);
-            return EXIT_USER;
-        }
+        if (!is_case(options->cases.names[i])) return refuse_case(options->cases.names[i]);
     return OPTIONS_READ;
 }
 

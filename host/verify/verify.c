@@ -299,11 +299,9 @@ Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
                     .half_tangent = tan(fov_degrees * (M_PI / 360))};
 }
 
-bool verify_is_case(const char *name)
+const char *verify_case_name(size_t i)
 {
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        if (strcmp(cases[i].name, name) == 0) return true;
-    return false;
+    return i < sizeof cases / sizeof *cases ? cases[i].name : NULL;
 }
 
 static bool is_chosen(const VerifyChoice *choice, const char *name)

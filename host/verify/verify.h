@@ -54,7 +54,8 @@ typedef struct {
     size_t count;
 } VerifyChoice;
 
-bool verify_is_case(const char *name);
+// In the order in which they run; NULL past the last.
+const char *verify_case_name(size_t i);
 
 // The bits of the reference's numbers: 113, or those of a long double where the compiler has no more.
 int verify_reference_bits(void);

@@ -168,7 +168,7 @@ def compare_pixel(answer, seen, rounding, tallies, where):
 
 def main(glint, folder, is_long):
     folder = pathlib.Path(folder)
-    size = (48, 36) if is_long else (32, 24)
+    size = (48, 36) if is_long else (24, 18)
     is_right = True
     for precision, rounding in ROUNDINGS.items():
         tallies = {kind: Tally() for kind in ("object", "t", "normal", "shadow", "color")}
