@@ -21,7 +21,11 @@ static void assert_near(double value, double expected, double tolerance)
 // Gray display values, as a PNG holds them.
 static Image gray_image(unsigned step)
 {
-    Image image = {SIDE, SIDE, 3, malloc(SIDE * SIDE * 3 * sizeof(float)), TRANSFER_SRGB, true};
+    Image image = {.width = SIDE,
+                   .height = SIDE,
+                   .channels = 3,
+                   .values = malloc(SIDE * SIDE * 3 * sizeof(float)),
+                   .display = true};
     assert_non_null(image.values);
     for (size_t i = 0; i < SIDE * SIDE * 3; i++)
         image.values[i] = (float)step / 255;
@@ -115,7 +119,8 @@ static void test_zeros_of_two_signs_differ(void **state)
 {
     (void)state;
     float plus = 0, minus = -0.0F;
-    Image a = {1, 1, 1, &plus, TRANSFER_NONE, false}, b = {1, 1, 1, &minus, TRANSFER_NONE, false};
+    Image a = {.width = 1, .height = 1, .channels = 1, .values = &plus}, b = a;
+    b.values = &minus;
     ImageMetrics metrics = image_metrics(&a, &b);
     assert_int_equal(metrics.differing_count, 1);
     assert_true(metrics.linear.largest == 0);
@@ -152,7 +157,7 @@ static void test_kinds_that_do_not_compare(void **state)
 {
     (void)state;
     float value[3] = {0};
-    Image image = {1, 1, 3, value, TRANSFER_NONE, false}, other = image;
+    Image image = {.width = 1, .height = 1, .channels = 3, .values = value}, other = image;
     MessageList messages = {0};
     assert_true(image_comparable(&image, &other, &messages));
     other.display = true;

@@ -102,17 +102,20 @@ static bool reference_read(Accuracy *accuracy)
     const char *path = accuracy->options.reference_path;
     const RenderSettings *settings = &accuracy->set.variants[0].settings;
     Image image;
-    double *colors = image_read_doubles(&image, path, &accuracy->messages);
-    if (!colors) return false;
-    const char *fault = image.display         ? "display values; linear light is needed, of an .exr or .npy"
-                        : image.channels != 3 ? "no colors"
-                                              : NULL;
+    if (!image_read(&image, path, &accuracy->messages)) return false;
+    const char *fault = image.display ? "display values; linear light is needed, of an .exr or .npy"
+                        : image.data || image.channels != 3 ? "no colors"
+                                                            : NULL;
     if (fault) message_add(&accuracy->messages, MESSAGE_ERROR, "the reference '%s' holds %s", path, fault);
     bool fits = image.width == settings->width && image.height == settings->height;
     if (!fault && !fits)
         message_add(&accuracy->messages, MESSAGE_ERROR,
                     "the reference '%s' has %ux%u pixels, the images have %ux%u", path, image.width,
                     image.height, settings->width, settings->height);
+    size_t value_count = (size_t)image.width * image.height * image.channels;
+    double *colors = memory_allocate(value_count, sizeof *colors);
+    for (size_t i = 0; i < value_count; i++)
+        colors[i] = image_value(&image, i);
     accuracy->reference = (Film){.width = image.width,
                                  .height = image.height,
                                  .is_double = true,

@@ -38,18 +38,25 @@ typedef struct {
     ImageMetrics metrics;
 } Comparison;
 
-static const float *worst_values(const Comparison *comparison, const Image *image)
+// Of the worst pixel.
+static double worst_value(const Comparison *comparison, const Image *image, uint32_t channel)
 {
     const ImageMetrics *metrics = &comparison->metrics;
-    return image->values + ((size_t)metrics->worst_y * image->width + metrics->worst_x) * image->channels;
+    size_t pixel = (size_t)metrics->worst_y * image->width + metrics->worst_x;
+    return image_value(image, pixel * image->channels + channel);
 }
 
-static void values_json(Json *json, const char *key, const float *values, uint32_t count)
+static void worst_json(Json *json, const char *key, const Comparison *comparison, const Image *image)
 {
     json_begin_array(json, key);
-    for (uint32_t i = 0; i < count; i++)
-        json_number(json, NULL, (double)values[i]);
+    for (uint32_t i = 0; i < image->channels; i++)
+        json_number(json, NULL, worst_value(comparison, image, i));
     json_end(json);
+}
+
+static const char *kind_word(const Image *image)
+{
+    return image->data ? "data" : image->display ? "display" : "linear";
 }
 
 static void json_report(const DiffOptions *options, const Comparison *comparison)
@@ -62,7 +69,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_text(json, "image", options->test_path);
     size_json(json, reference->width, reference->height);
     json_integer(json, "channels", reference->channels);
-    json_text(json, "kind", reference->display ? "display" : "linear");
+    json_text(json, "kind", kind_word(reference));
     json_boolean(json, "equal", metrics->differing_count == 0);
     json_integer(json, "differing_values", (int64_t)metrics->differing_count);
     json_begin_object(json, "nonfinite_pixels");
@@ -93,8 +100,8 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_begin_object(json, "worst");
     json_integer(json, "x", metrics->worst_x);
     json_integer(json, "y", metrics->worst_y);
-    values_json(json, "reference", worst_values(comparison, reference), reference->channels);
-    values_json(json, "image", worst_values(comparison, &comparison->test), reference->channels);
+    worst_json(json, "reference", comparison, reference);
+    worst_json(json, "image", comparison, &comparison->test);
     json_end(json);
     if (options->heatmap_path) {
         json_begin_object(json, "heatmap");
@@ -106,10 +113,11 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_print(json, stdout);
 }
 
-static void values_print(const float *values, uint32_t count)
+// With the digits that tell any two values of the file apart.
+static void worst_print(const Comparison *comparison, const Image *image)
 {
-    for (uint32_t i = 0; i < count; i++)
-        printf(" %.9g", (double)values[i]);
+    for (uint32_t i = 0; i < image->channels; i++)
+        printf(" %.*g", image->doubles ? 17 : 9, worst_value(comparison, image, i));
 }
 
 static void text_print(const DiffOptions *options, const Comparison *comparison)
@@ -120,18 +128,18 @@ static void text_print(const DiffOptions *options, const Comparison *comparison)
     size_t value_count = (size_t)reference->width * reference->height * reference->channels;
     printf("%s, %s: %ux%u, %u %s of %s\n", options->reference_path, options->test_path, reference->width,
            reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
-           reference->display ? "display values" : "linear light");
+           image_kind(reference));
     if (metrics->differing_count == 0)
         printf("  equal, bit for bit\n");
     else
         printf("  %zu of %zu values differ\n", metrics->differing_count, value_count);
     if (metrics->nonfinite_reference + metrics->nonfinite_test > 0)
-        printf("  nonfinite pixels: %zu and %zu; excluded from the figures of light\n",
-               metrics->nonfinite_reference, metrics->nonfinite_test);
+        printf("  nonfinite pixels: %zu and %zu; excluded from the figures\n", metrics->nonfinite_reference,
+               metrics->nonfinite_test);
     if (metrics->differing_count == 0) return;
-    printf("  light      max %.4g, RMSE %.4g, bias %+.4g, 99.9 %% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
-           linear->largest, linear->rmse, linear->bias, linear->percentile_999, linear->rel_mse,
-           linear->psnr);
+    printf("  %-10s max %.4g, RMSE %.4g, bias %+.4g, 99.9 %% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
+           reference->data ? "data" : "light", linear->largest, linear->rmse, linear->bias,
+           linear->percentile_999, linear->rel_mse, linear->psnr);
     if (metrics->has_color) {
         printf("  8-bit sRGB %zu values differ by 1, %zu by more, PSNR %.2f dB\n", metrics->off_by_1,
                metrics->off_by_more, metrics->srgb_psnr);
@@ -139,9 +147,9 @@ static void text_print(const DiffOptions *options, const Comparison *comparison)
                metrics->flip_max, FLIP_PIXELS_PER_DEGREE);
     }
     printf("  worst      pixel %u,%u:", metrics->worst_x, metrics->worst_y);
-    values_print(worst_values(comparison, reference), reference->channels);
+    worst_print(comparison, reference);
     printf(" and");
-    values_print(worst_values(comparison, &comparison->test), reference->channels);
+    worst_print(comparison, &comparison->test);
     printf("\n");
     if (options->heatmap_path)
         printf("  heat map   %s: logarithmic, white %.3g, black %.3g or less, red nonfinite\n",

@@ -30,7 +30,6 @@ typedef struct {
     const uint8_t *bytes;
     size_t length;
     MessageList *messages;
-    double **doubles; // NULL, or receives the exact values of a file of doubles; caller frees
 } ImageFile;
 
 // A decoder reports failure with image_refuse; image.c then frees the image.

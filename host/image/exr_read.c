@@ -60,7 +60,7 @@ static int channel_find(const exr_attr_chlist_t *list, const char *name)
 }
 
 // R, G, B; else Y; else the first three channels, or the first of fewer.
-static uint32_t channels_choose(ExrReader *reader)
+static uint32_t channels_choose(ExrReader *reader, Image *image)
 {
     const exr_attr_chlist_t *list = reader->list;
     static const char *const colors[] = {"R", "G", "B"};
@@ -71,6 +71,7 @@ static uint32_t channels_choose(ExrReader *reader)
     }
     if (has_colors) return 3;
     int luminance = channel_find(list, "Y");
+    image->data = luminance < 0;
     for (int i = 0; i < 3; i++)
         reader->chosen[i] = luminance >= 0 ? luminance : i;
     return luminance >= 0 || list->num_channels < 3 ? 1 : 3;
@@ -85,7 +86,7 @@ static bool exr_prepare(ExrReader *reader, Image *image)
     if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
     if (reader->list->num_channels < 1 || chunk_count < 1)
         return image_refuse(reader->file, "EXR: the image is empty");
-    uint32_t channels = channels_choose(reader);
+    uint32_t channels = channels_choose(reader, image);
     for (uint32_t i = 0; i < channels; i++) {
         const exr_attr_chlist_entry_t *entry = &reader->list->entries[reader->chosen[i]];
         if (entry->pixel_type == EXR_PIXEL_UINT || entry->x_sampling != 1 || entry->y_sampling != 1)

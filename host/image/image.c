@@ -142,7 +142,7 @@ static bool image_decode(Image *image, const ImageFile *file)
     return image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
 }
 
-static bool file_read(Image *image, double **doubles, const char *path, MessageList *messages)
+bool image_read(Image *image, const char *path, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
     Text text = {0};
@@ -150,31 +150,21 @@ static bool file_read(Image *image, double **doubles, const char *path, MessageL
         text_free(&text);
         return false;
     }
-    ImageFile file = {path, (const uint8_t *)text_c(&text), text.count, messages, doubles};
+    ImageFile file = {path, (const uint8_t *)text_c(&text), text.count, messages};
     bool done = image_decode(image, &file);
     text_free(&text);
     if (!done) image_free(image);
     return done;
 }
 
-bool image_read(Image *image, const char *path, MessageList *messages)
+double image_value(const Image *image, size_t i)
 {
-    return file_read(image, NULL, path, messages);
-}
-
-double *image_read_doubles(Image *image, const char *path, MessageList *messages)
-{
-    double *values = NULL;
-    if (!file_read(image, &values, path, messages) || values) return values;
-    size_t count = (size_t)image->width * image->height * image->channels;
-    values = memory_allocate(count, sizeof *values);
-    for (size_t i = 0; i < count; i++)
-        values[i] = (double)image->values[i];
-    return values;
+    return image->doubles ? image->doubles[i] : (double)image->values[i];
 }
 
 void image_free(Image *image)
 {
     free(image->values);
+    free(image->doubles);
     *image = (Image){0};
 }

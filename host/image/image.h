@@ -52,12 +52,12 @@ typedef struct {
     uint32_t width, height, channels;
     float *values;
     Transfer transfer;
-    bool display; // 8 or 16 bit display values, scaled to 0..1, curve not undone
+    bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
+    bool data;       // no light: NPY of other than 3 channels, EXR without colors and luminance
+    double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL
 } Image;
 // Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message
 // and an empty image that need not be freed.
 bool image_read(Image *image, const char *path, MessageList *messages);
-// The same, and returns the values in double, exact if the file holds doubles. Caller frees both. NULL with
-// an error message and an empty image on failure.
-double *image_read_doubles(Image *image, const char *path, MessageList *messages);
+double image_value(const Image *image, size_t i); // values[i], at the file's own width
 void image_free(Image *image);

@@ -92,7 +92,7 @@ static bool npy_shape_read(const char *dictionary, uint64_t shape[3])
     return count >= 2;
 }
 
-static float npy_value(const uint8_t *bytes, NpyType type)
+static double npy_value(const uint8_t *bytes, NpyType type)
 {
     float float32;
     double float64;
@@ -100,15 +100,15 @@ static float npy_value(const uint8_t *bytes, NpyType type)
     switch (type) {
     case NPY_FLOAT:
         memcpy(&float32, bytes, sizeof float32);
-        return float32;
+        return (double)float32;
     case NPY_DOUBLE:
         memcpy(&float64, bytes, sizeof float64);
-        return (float)float64;
+        return float64;
     case NPY_UINT32:
         memcpy(&integer, bytes, sizeof integer);
-        return (float)integer;
+        return (double)integer;
     default:
-        return (float)*bytes;
+        return (double)*bytes;
     }
 }
 
@@ -127,12 +127,14 @@ static bool npy_dictionary_decode(Image *image, const ImageFile *file, const cha
     if (!image_allocate(image, file, shape[1], shape[0], shape[2], type == NPY_UINT8 ? 4 : 1)) return false;
     size_t count = (size_t)image->width * image->height * image->channels;
     if (count > (file->length - data) / size) return image_refuse(file, "NPY: the file ends too early");
-    for (size_t i = 0; i < count; i++)
-        image->values[i] = npy_value(file->bytes + data + i * size, type);
-    if (file->doubles && type == NPY_DOUBLE) {
-        *file->doubles = memory_allocate(count, sizeof **file->doubles);
-        memcpy(*file->doubles, file->bytes + data, count * sizeof **file->doubles);
+    if (type == NPY_DOUBLE || type == NPY_UINT32)
+        image->doubles = memory_allocate(count, sizeof *image->doubles);
+    for (size_t i = 0; i < count; i++) {
+        double value = npy_value(file->bytes + data + i * size, type);
+        if (image->doubles) image->doubles[i] = value;
+        image->values[i] = (float)value;
     }
+    image->data = image->channels != 3;
     return true;
 }
 

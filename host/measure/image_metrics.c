@@ -45,6 +45,11 @@ ErrorSummary error_summarize(const double *reference, const double *test, size_t
     return summary;
 }
 
+const char *image_kind(const Image *image)
+{
+    return image->data ? "data" : image->display ? "display values" : "linear light";
+}
+
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages)
 {
     if (reference->width != test->width || reference->height != test->height ||
@@ -55,10 +60,9 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
                     test->channels);
         return false;
     }
-    if (reference->display != test->display) {
-        message_add(messages, MESSAGE_ERROR,
-                    "the images differ in kind: the %s holds display values, the other linear light",
-                    reference->display ? "first" : "second");
+    if (strcmp(image_kind(reference), image_kind(test)) != 0) {
+        message_add(messages, MESSAGE_ERROR, "the images differ in kind: the first holds %s, the second %s",
+                    image_kind(reference), image_kind(test));
         return false;
     }
     return true;
@@ -70,7 +74,7 @@ static double *linear_values(const Image *image)
     size_t count = value_count(image);
     double *values = memory_allocate(count, sizeof *values);
     for (size_t i = 0; i < count; i++)
-        values[i] = image->display ? srgb_decode((double)image->values[i]) : (double)image->values[i];
+        values[i] = image->display ? srgb_decode((double)image->values[i]) : image_value(image, i);
     return values;
 }
 
@@ -96,7 +100,7 @@ static size_t nonfinite_pixels(const Image *image)
     for (size_t i = 0; i < pixel_count(image); i++) {
         bool finite = true;
         for (size_t k = 0; k < image->channels; k++)
-            finite &= isfinite(image->values[i * image->channels + k]) != 0;
+            finite &= isfinite(image_value(image, i * image->channels + k)) != 0;
         count += !finite;
     }
     return count;
@@ -165,10 +169,13 @@ ImageMetrics image_metrics(const Image *reference, const Image *test)
     ImageMetrics metrics = {
         .nonfinite_reference = nonfinite_pixels(reference),
         .nonfinite_test = nonfinite_pixels(test),
-        .has_color = reference->channels == 3 || (reference->channels == 1 && reference->display),
+        .has_color = !reference->data &&
+                     (reference->channels == 3 || (reference->channels == 1 && reference->display)),
     };
-    for (size_t i = 0; i < value_count(reference); i++)
-        metrics.differing_count += memcmp(&reference->values[i], &test->values[i], sizeof(float)) != 0;
+    for (size_t i = 0; i < value_count(reference); i++) {
+        double expected = image_value(reference, i), found = image_value(test, i);
+        metrics.differing_count += memcmp(&expected, &found, sizeof expected) != 0;
+    }
     double *expected = linear_values(reference), *found = linear_values(test);
     metrics.linear = error_summarize(expected, found, value_count(reference));
     free(expected);

@@ -18,10 +18,10 @@ typedef struct {
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count);
 
 typedef struct {
-    size_t differing_count;                     // values whose bits differ
+    size_t differing_count;                     // values whose bits differ, at the files' own width
     size_t nonfinite_reference, nonfinite_test; // pixels
-    ErrorSummary linear;
-    uint32_t worst_x, worst_y; // where the largest difference is, or one of a number to none
+    ErrorSummary linear;                        // of light, or of data as they are
+    uint32_t worst_x, worst_y;                  // where the largest difference is, or one of a number to none
     // of colors only
     bool has_color;
     double srgb_psnr;             // of 8-bit display values, dB
@@ -29,6 +29,7 @@ typedef struct {
     double flip_mean, flip_max;
 } ImageMetrics;
 
+const char *image_kind(const Image *image); // what the values are: "display values", "linear light", "data"
 // False, with an error message, where the two differ in size or kind, so that there is nothing to compare.
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages);
 
