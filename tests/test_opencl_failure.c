@@ -11,6 +11,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 #include <cmocka.h>
 
 static struct {
@@ -306,6 +307,38 @@ static void test_dispensable_calls(void **state)
     assert_work_is_right();
 }
 
+static bool disk_is_full;
+
+int __real_statvfs(const char *path, struct statvfs *disk);
+int __wrap_statvfs(const char *path, struct statvfs *disk);
+int __wrap_statvfs(const char *path, struct statvfs *disk)
+{
+    if (!disk_is_full) return __real_statvfs(path, disk);
+    *disk = (struct statvfs){.f_blocks = 25, .f_bavail = 3, .f_frsize = 4096};
+    return 0;
+}
+
+// A build without a log says so, and names the disk where it is full.
+static void test_empty_build_log(void **state)
+{
+    (void)state;
+    for (int full = 0; full < 2; full++) {
+        disk_is_full = full == 1;
+        injected.call = "clBuildProgram";
+        injected.index = EVERY_CALL;
+        Compute compute;
+        Answer answer;
+        assert_false(work(&compute, &answer));
+        char *text = compute_failure_text(&compute);
+        assert_non_null(strstr(text, "the driver gives no build log"));
+        assert_int_equal(strstr(text, "is full (12 KiB free)") != NULL, full);
+        free(text);
+        compute_close_checked(&compute);
+    }
+    disk_is_full = false;
+    assert_work_is_right();
+}
+
 // A cached program that the driver refuses is built from source, without a cache every program is.
 static void test_builds(void **state)
 {
@@ -316,7 +349,8 @@ static void test_builds(void **state)
     char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
     setenv("XDG_CACHE_HOME", "/dev/null", 1);
     calls_fail("clCreateProgramWithSource", false, true);
-    calls_fail("clBuildProgram", false, true);
+    call_fail("clBuildProgram", 0, false, false); // built once more, despite PoCL's cache
+    call_fail("clBuildProgram", EVERY_CALL, false, true);
     assert_work_is_right();
     if (cache[0] != '\0')
         setenv("XDG_CACHE_HOME", cache, 1);
@@ -430,10 +464,10 @@ int main(void)
 {
     // each command is a process of its own, and forks before this one has opened a device
     const struct CMUnitTest command_tests[] = {cmocka_unit_test(test_commands)};
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_needed_calls),
-                                       cmocka_unit_test(test_needed_objects),
-                                       cmocka_unit_test(test_dispensable_calls),
-                                       cmocka_unit_test(test_builds), cmocka_unit_test(test_discovery)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_needed_calls),      cmocka_unit_test(test_needed_objects),
+        cmocka_unit_test(test_dispensable_calls), cmocka_unit_test(test_builds),
+        cmocka_unit_test(test_empty_build_log),   cmocka_unit_test(test_discovery)};
     int failed = cmocka_run_group_tests(command_tests, NULL, NULL);
     return cmocka_run_group_tests(tests, set_up, tear_down) + failed;
 }

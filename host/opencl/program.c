@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -64,34 +65,65 @@ static char *save_text(const char *text)
     return memory_copy_text(written ? path : "could not be saved");
 }
 
-// NULL: failed.
-static cl_program build_from_source(Compute *compute, const char *text, const char *options)
+// Where drivers keep what they compile: PoCL's own variable, then the XDG Base Directory Specification.
+static void describe_cache_disk(Text *text)
+{
+    const char *pocl = getenv("POCL_CACHE_DIR"), *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    const char *folder = pocl ? pocl : cache ? cache : or_empty(home);
+    const uint64_t kibi = 1024, needed_kibi = 1024; // PoCL writes less than this per program
+    struct statvfs disk;
+    if (statvfs(folder, &disk) != 0 || disk.f_blocks == 0) return;
+    uint64_t free_kibi = (uint64_t)disk.f_bavail * disk.f_frsize / kibi;
+    if (free_kibi < needed_kibi)
+        text_appendf(text, "\nthe disk of the driver's cache, %s, is full (%" PRIu64 " KiB free)", folder,
+                     free_kibi);
+}
+
+static void build_fail(Compute *compute, cl_program program, cl_int status, const char *text,
+                       const char *options)
+{
+    char *log = build_log(compute, program), *path = save_text(text);
+    Text reason = {0};
+    text_appendf(&reason, "%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
+    describe_cache_disk(&reason);
+    compute_fail(compute, "clBuildProgram", status, "options \"%s\"\n%s\nthe composed text: %s", options,
+                 text_c(&reason), path);
+    text_free(&reason);
+    free(path);
+    free(log);
+}
+
+// PoCL has a cache of its own, with the options in its key: an option never used before makes it build.
+static void append_unused_option(Text *options)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    text_appendf(options, " -D GLINT_BUILD=%jd%09ld%d", (intmax_t)now.tv_sec, now.tv_nsec, (int)getpid());
+}
+
+// NULL: failed; unless `afresh`, a failed build is no failure of the Compute yet.
+static cl_program build_from_source(Compute *compute, const char *text, const char *options, bool afresh)
 {
     cl_int status;
     cl_program program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
     if (!compute_check_object(compute, program, status, "clCreateProgramWithSource")) return NULL;
-    status = clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL);
+    Text all_options = {0};
+    text_appendf(&all_options, "%s", options);
+    if (afresh) append_unused_option(&all_options);
+    status = clBuildProgram(program, 1, &compute->device->id, text_c(&all_options), NULL, NULL);
+    text_free(&all_options);
     if (status == CL_SUCCESS) return program;
-    char *log = build_log(compute, program), *path = save_text(text);
-    compute_fail(compute, "clBuildProgram", status, "options \"%s\"\n%s\nthe composed text: %s", options, log,
-                 path);
-    free(path);
-    free(log);
+    if (afresh) build_fail(compute, program, status, text, options);
     clReleaseProgram(program);
     return NULL;
 }
 
-// PoCL has a cache of its own, with the options in its key: an option never used before makes it build.
-static cl_program build_afresh(Compute *compute, const char *text, const char *options)
+// Processes that build the same program at once can fail in PoCL's cache (3.1: one removes the file that
+// another reads), so a build counts as failed only if it fails outside that cache, too.
+static cl_program build_with_retry(Compute *compute, const char *text, const char *options)
 {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    Text unique = {0};
-    text_appendf(&unique, "%s -D GLINT_BUILD=%jd%09ld%d", options, (intmax_t)now.tv_sec, now.tv_nsec,
-                 (int)getpid());
-    cl_program program = build_from_source(compute, text, text_c(&unique));
-    text_free(&unique);
-    return program;
+    cl_program program = build_from_source(compute, text, options, false);
+    return program || !compute_ok(compute) ? program : build_from_source(compute, text, options, true);
 }
 
 // NULL if the driver refuses the binary.
@@ -116,13 +148,13 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
     char *text = request_text(request);
     program->text_hash = hash_bytes(HASH_START, text, strlen(text));
     if (request->no_cache) {
-        program->program = build_afresh(compute, text, options);
+        program->program = build_from_source(compute, text, options, true);
     } else {
         char *key = request_key(compute, request, text);
         Text binary = {0};
         if (cache_load(key, &binary)) program->program = build_from_binary(compute, &binary, options);
         program->from_cache = program->program != NULL;
-        if (!program->from_cache) program->program = build_from_source(compute, text, options);
+        if (!program->from_cache) program->program = build_with_retry(compute, text, options);
         text_free(&binary);
         free(key);
     }
