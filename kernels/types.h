@@ -178,8 +178,8 @@ typedef struct {
 
 enum { OPAQUE = 0x7fffffff }; // in optical_depth.x: no light passes
 
-// The largest bounce depth. While one of a ray's two bounces is traced the other is pending, one per depth.
-enum { BOUNCES_MAX = 16 };
+// The largest bounce depth.
+enum { BOUNCES_MAX = 255 };
 
 // The signature of a ray tree: PATH_START, then per ray, depth first and reflected before refracted,
 // 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is that of the object hit,

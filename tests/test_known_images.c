@@ -425,6 +425,58 @@ static double basis_error(const Camera *camera)
 }
 
 // R8: cameras that leave the basis open, or nearly so, still have one, and the same on every device.
+// Between two parallel panes that reflect and transmit all light each hit adds the ambient light, 1/512, and
+// leaves one pending ray to the background, 1/512 too.
+#define PANES                                                                                                \
+    "camera: {position: [0, 0, 0], look_at: [0, 0, 1], up: [0, 1, 0], fov: 0.001}\n"                         \
+    "background: [0.001953125, 0.001953125, 0.001953125]\n"                                                  \
+    "ambient: [0.001953125, 0.001953125, 0.001953125]\n"                                                     \
+    "materials: {pane: {color: [1, 1, 1], ambient: 1, diffuse: 0, reflection: 1%s}}\n"                       \
+    "objects:\n"                                                                                             \
+    "  - plane: {point: [0, 0, 1], normal: [0, 0, -1], material: pane}\n"                                    \
+    "  - plane: {point: [0, 0, -1], normal: [0, 0, 1], material: pane}\n"
+
+static uint64_t panes_render(bool transparent, Precision precision, uint32_t lanes, uint32_t bounces)
+{
+    char text[1024];
+    snprintf(text, sizeof text, PANES, transparent ? ", transmission: 1, ior: 1.5" : "");
+    Scene scene = scene_of(text);
+    RenderSettings settings = film_settings(5, 3, precision);
+    settings.extra_features = 0;
+    settings.lanes = lanes;
+    settings.bounce_count = bounces;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    check(renderer);
+    Film film;
+    check(renderer_render_film(renderer, 0, &film));
+    const double expected = (transparent ? 2 * bounces + 1 : bounces + 1) / 512.0;
+    for (size_t i = 0; i < 3 * film_pixel_count(&film); i++)
+        check(near(film.color[i], expected, 0));
+    uint64_t hash = renderer_report(renderer)->kernel_hash;
+    film_free(&film);
+    renderer_close(renderer);
+    scene_free(&scene);
+    return hash;
+}
+
+// A kernel has room for as many pending rays as the scene's depth asks for, and for none between mirrors.
+static void depth_of_facing_panes(Precision precision)
+{
+    const uint64_t plain = panes_render(true, precision, 0, 5);
+    check(panes_render(true, precision, 0, 16) == plain);
+    check(panes_render(true, precision, 0, 17) != plain);
+    panes_render(true, precision, 0, BOUNCES_MAX);
+    panes_render(true, precision, 1, BOUNCES_MAX);
+    check(panes_render(false, precision, 0, 5) == panes_render(false, precision, 0, BOUNCES_MAX));
+}
+
+static void facing_panes(void **state)
+{
+    (void)state;
+    at_each_precision(depth_of_facing_panes);
+}
+
 static void degenerate_cameras(void **state)
 {
     (void)state;
@@ -525,6 +577,7 @@ int main(void)
         cmocka_unit_test(tilted_plane),
         cmocka_unit_test(inside),
         cmocka_unit_test(ground_horizon),
+        cmocka_unit_test(facing_panes),
         cmocka_unit_test(degenerate_cameras),
         cmocka_unit_test(single_pixel_and_extreme_fields),
         cmocka_unit_test(distance_from_origin_changes_nothing),

@@ -74,6 +74,17 @@ static void upload(Renderer *renderer, CompiledScene *compiled)
     }
 }
 
+// Refracted rays that wait while reflected ones are traced, up to one per depth. Few sizes, so that few
+// kernels are built: 16, which most scenes' depth is below, and doubled from there.
+static uint32_t pending_max(const Renderer *renderer)
+{
+    if (!(renderer->report.features & FEATURE_TRANSMISSION)) return 1;
+    uint32_t count = 16;
+    while (count < renderer->settings.bounce_count)
+        count *= 2;
+    return count;
+}
+
 // The definitions and compiler options that distinguish the variants of the kernels.
 static void variant_set(Renderer *renderer)
 {
@@ -92,6 +103,7 @@ static void variant_set(Renderer *renderer)
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
     text_appendf(text, "#define HAS_FMA %d\n", has_fma);
+    text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
     text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
     text_appendf(text, "#define PERTURB %d\n", seed != 0);
     text_appendf(text, "#define PERTURB_SEED %uu\n", seed);

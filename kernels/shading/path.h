@@ -39,7 +39,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *pa
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 background = vector_of(scene->header->background);
     Color3 color = black, weight = white;
-    Bounce pending[HAS_TRANSMISSION ? BOUNCES_MAX : 1];
+    Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
     for (;;) {
         Hit hit = closest_hit(scene, &ray);
