@@ -52,8 +52,7 @@ enum {
 #define HELP_LANES                                                                                           \
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
 #define HELP_BOUNCES                                                                                         \
-    "      --bounces N       maximum number of reflections and refractions of a ray, up to 255 (default: "   \
-    "5)\n"
+    "      --bounces N       reflections and refractions of a ray: at most N, up to 255 (default: 5)\n"
 #define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
 #define HELP_LENIENT  "      --lenient         skip unknown elements of .rt files with a warning\n"
 #define HELP_PERTURB                                                                                         \
