@@ -7,8 +7,11 @@
 #include "host/base/output.h"
 #include "host/base/text.h"
 
+#include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -221,22 +224,70 @@ static void test_read_failures(void **state)
     text_free(&text);
 }
 
+// In place of libc's.
+static bool modes_are_refused, unnamed_are_refused, syncs_fail, is_killed_at_rename;
+static int sync_count;
+
+int fchmod(int descriptor, mode_t mode) // NOLINT(readability-inconsistent-declaration-parameter-name)
+{
+    if (!modes_are_refused) return (int)syscall(SYS_fchmod, descriptor, mode);
+    errno = EPERM;
+    return -1;
+}
+
+int openat(int at, const char *path, int flags, ...) // NOLINT
+{
+    va_list arguments;
+    va_start(arguments, flags);
+    mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(arguments, mode_t) : 0;
+    va_end(arguments);
+    if (!unnamed_are_refused || (flags & O_TMPFILE) != O_TMPFILE)
+        return (int)syscall(SYS_openat, at, path, flags, mode);
+    errno = EOPNOTSUPP;
+    return -1;
+}
+
+int renameat(int from_at, const char *from, int to_at, const char *to) // NOLINT
+{
+    if (is_killed_at_rename) raise(SIGKILL);
+    return (int)syscall(SYS_renameat2, from_at, from, to_at, to, 0);
+}
+
+int fsync(int descriptor) // NOLINT(readability-inconsistent-declaration-parameter-name)
+{
+    sync_count++;
+    if (!syncs_fail) return (int)syscall(SYS_fsync, descriptor);
+    errno = EIO;
+    return -1;
+}
+
+// Temporaries in the folder.
+static int temporary_count(void)
+{
+    int count = 0;
+    DIR *here = opendir(".");
+    assert_non_null(here);
+    for (const struct dirent *item; (item = readdir(here)) != NULL;)
+        count += strstr(item->d_name, ".glint-") != NULL;
+    closedir(here);
+    return count;
+}
+
 static void test_output_commit(void **state)
 {
     (void)state;
     MessageList messages = {0};
     OutputFile output;
     mode_t mask = umask(027);
+    sync_count = 0;
     assert_true(output_open(&output, "new", &messages));
-    char temporary[64];
-    snprintf(temporary, sizeof temporary, "%s", output.temporary);
-    assert_int_equal(strncmp(temporary, ".new.", 5), 0);
     assert_int_equal(access("new", F_OK), -1);
     assert_true(output_write(&output, "whole", 5, &messages));
     assert_true(output_commit(&output, &messages));
     umask(mask);
     check_content("new", "whole");
-    assert_int_equal(access(temporary, F_OK), -1);
+    assert_int_equal(temporary_count(), 0);
+    assert_int_equal(sync_count, 2); // the file and its folder
     assert_int_equal(mode_of("new"), 0640);
     assert_int_equal(messages.count, 0);
     unlink("new");
@@ -296,16 +347,6 @@ static void test_output_makes_what_a_link_leads_to(void **state)
     rmdir("folder");
 }
 
-// In place of libc's.
-static bool modes_are_refused;
-
-int fchmod(int descriptor, mode_t mode) // NOLINT(readability-inconsistent-declaration-parameter-name)
-{
-    if (!modes_are_refused) return (int)syscall(SYS_fchmod, descriptor, mode);
-    errno = EPERM;
-    return -1;
-}
-
 static void test_output_where_there_are_no_modes(void **state)
 {
     (void)state;
@@ -329,10 +370,15 @@ static void test_output_finish(void **state)
     file_write("kept", "old");
     output_write_new(&output, "kept", &messages);
     assert_true(output_finish(&output, &messages));
-    check_content(output.temporary, "new");
     check_content("kept", "old");
     assert_true(output_commit(&output, &messages));
     check_content("kept", "new");
+    syncs_fail = true;
+    output_write_new(&output, "new", &messages);
+    assert_false(output_finish(&output, &messages));
+    syncs_fail = false;
+    check_only_message(&messages, "cannot write 'new': Input/output error");
+    assert_int_equal(access("new", F_OK), -1);
     assert_true(output_open(&output, "/dev/full", &messages));
     assert_true(output_write(&output, "x", 1, &messages));
     assert_false(output_finish(&output, &messages));
@@ -367,13 +413,67 @@ static void test_output_abandon(void **state)
     MessageList messages = {0};
     OutputFile output;
     file_write("kept", "old");
-    output_write_new(&output, "kept", &messages);
-    char temporary[64];
-    snprintf(temporary, sizeof temporary, "%s", output.temporary);
-    assert_int_equal(access(temporary, F_OK), 0);
-    output_abandon(&output);
-    assert_int_equal(access(temporary, F_OK), -1);
+    for (int named = 0; named < 2; named++) {
+        unnamed_are_refused = named == 1;
+        output_write_new(&output, "kept", &messages);
+        assert_int_equal(temporary_count(), named);
+        output_abandon(&output);
+        assert_int_equal(temporary_count(), 0);
+        check_content("kept", "old");
+    }
+    unnamed_are_refused = false;
+    unlink("kept");
+}
+
+typedef enum { WRITING, WRITING_NAMED, RENAMING } KilledWhile;
+
+static void output_in_killed_process(KilledWhile killed_while)
+{
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        MessageList messages = {0};
+        OutputFile output;
+        unnamed_are_refused = killed_while == WRITING_NAMED;
+        is_killed_at_rename = killed_while == RENAMING;
+        if (!output_open(&output, "kept", &messages) || !output_write(&output, "new", 3, &messages)) _exit(9);
+        fflush(output.file);
+        if (killed_while == RENAMING) output_commit(&output, &messages);
+        raise(SIGKILL);
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFSIGNALED(status));
     check_content("kept", "old");
+}
+
+// Killed while it writes, a process leaves nothing where files need no name. What it leaves elsewhere the
+// next one removes, but not what belongs to a living one.
+static void test_output_of_killed_processes(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    OutputFile living, output;
+    file_write("kept", "old");
+    output_in_killed_process(WRITING);
+    assert_int_equal(temporary_count(), 0);
+    static const KilledWhile leaving[] = {WRITING_NAMED, RENAMING};
+    for (size_t i = 0; i < 2; i++) {
+        output_in_killed_process(leaving[i]);
+        assert_int_equal(temporary_count(), 1);
+        unnamed_are_refused = true;
+        output_write_new(&living, "kept", &messages);
+        assert_int_equal(temporary_count(), 1);
+        output_write_new(&output, "kept", &messages);
+        assert_int_equal(temporary_count(), 2);
+        assert_true(output_commit(&living, &messages));
+        assert_true(output_commit(&output, &messages));
+        unnamed_are_refused = false;
+        assert_int_equal(temporary_count(), 0);
+        check_content("kept", "new");
+        file_write("kept", "old");
+    }
+    assert_int_equal(messages.count, 0);
     unlink("kept");
 }
 
@@ -452,6 +552,7 @@ int main(void)
         cmocka_unit_test(test_output_finish),
         cmocka_unit_test(test_output_failures),
         cmocka_unit_test(test_output_abandon),
+        cmocka_unit_test(test_output_of_killed_processes),
         cmocka_unit_test(test_base64),
         cmocka_unit_test(test_fault_removes_the_temporary),
     };

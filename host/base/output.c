@@ -3,52 +3,47 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 // The temporaries not yet renamed, for the exit handler.
+typedef struct {
+    int folder;
+    const char *name;
+} Pending;
+
 static struct {
-    char **items;
+    Pending *items;
     size_t count, capacity;
 } pending;
 
 static void pending_remove_all(void)
 {
     for (size_t i = 0; i < pending.count; i++)
-        unlink(pending.items[i]);
+        unlinkat(pending.items[i].folder, pending.items[i].name, 0);
     free(pending.items);
 }
 
-static void pending_add(char *temporary)
+static void pending_add(int folder, const char *name)
 {
     static bool is_registered;
     if (!is_registered && atexit(pending_remove_all) != 0) fault("atexit failed");
     is_registered = true;
-    array_push(pending, temporary);
+    array_push(pending, ((Pending){folder, name}));
 }
 
-static void pending_drop(const char *temporary)
+static void pending_drop(const char *name)
 {
     for (size_t i = 0; i < pending.count; i++) {
-        if (pending.items[i] == temporary) pending.items[i--] = pending.items[--pending.count];
+        if (pending.items[i].name == name) pending.items[i--] = pending.items[--pending.count];
     }
-}
-
-// `directory/.name.XXXXXX`: the same file system, so that the rename is one step.
-static char *temporary_name(const char *target)
-{
-    const char *slash = strrchr(target, '/');
-    const char *name = slash ? slash + 1 : target;
-    char *temporary;
-    // A name may have 255 bytes; its start shows what the temporary is for.
-    if (asprintf(&temporary, "%.*s.%.200s.XXXXXX", (int)(name - target), target, name) < 0)
-        fault("out of memory: file name");
-    return temporary;
 }
 
 static mode_t mode_by_umask(void)
@@ -65,6 +60,125 @@ static bool output_failed(OutputFile *output, const char *doing, MessageList *me
     return false;
 }
 
+// A temporary is `.NAME.glint-N` in the folder of NAME, so that the rename is one step, and is locked while
+// its process lives. A name may have 255 bytes; its start shows what the temporary is for.
+#define TEMPORARY_FORMAT ".%.200s.glint-"
+
+static char *temporary_name(const OutputFile *output, unsigned number)
+{
+    char *temporary;
+    if (asprintf(&temporary, TEMPORARY_FORMAT "%u", output->name, number) < 0)
+        fault("out of memory: file name");
+    return temporary;
+}
+
+bool output_is_temporary(const char *file_name, const char *name)
+{
+    char start[256];
+    size_t length = (size_t)snprintf(start, sizeof start, TEMPORARY_FORMAT, name);
+    if (strncmp(file_name, start, length) != 0 || file_name[length] == '\0') return false;
+    return file_name[length + strspn(file_name + length, "0123456789")] == '\0';
+}
+
+// Whether this process holds the lock; false if it lost it to one that removes stale temporaries.
+static bool temporary_lock(int descriptor)
+{
+    struct stat status;
+    // a file system without locks has no stale temporaries removed
+    if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) return errno != EWOULDBLOCK;
+    return fstat(descriptor, &status) == 0 && status.st_nlink > 0;
+}
+
+void output_remove_stale(int folder, const char *file_name)
+{
+    struct stat status;
+    int descriptor = openat(folder, file_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (descriptor < 0) return;
+    // without a link it has been removed meanwhile, and its name may be in use again
+    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && fstat(descriptor, &status) == 0 && status.st_nlink > 0)
+        unlinkat(folder, file_name, 0);
+    close(descriptor);
+}
+
+static void stale_temporaries_remove(const OutputFile *output)
+{
+    int descriptor = openat(output->folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *folder = descriptor < 0 ? NULL : fdopendir(descriptor);
+    if (!folder) {
+        if (descriptor >= 0) close(descriptor);
+        return;
+    }
+    for (const struct dirent *item; (item = readdir(folder)) != NULL;)
+        if (output_is_temporary(item->d_name, output->name))
+            output_remove_stale(output->folder, item->d_name);
+    closedir(folder);
+}
+
+enum { TEMPORARY_TRIES = 1000 };
+
+static int named_open(OutputFile *output)
+{
+    stale_temporaries_remove(output);
+    for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
+        char *name = temporary_name(output, i);
+        int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+        if (descriptor >= 0 && temporary_lock(descriptor)) {
+            output->temporary = name;
+            pending_add(output->folder, name);
+            return descriptor;
+        }
+        free(name);
+        if (descriptor >= 0)
+            close(descriptor);
+        else if (errno != EEXIST)
+            return -1;
+    }
+    return -1;
+}
+
+typedef struct {
+    char path[32];
+} DescriptorPath;
+
+static DescriptorPath descriptor_path(int descriptor)
+{
+    DescriptorPath link;
+    snprintf(link.path, sizeof link.path, "/proc/self/fd/%d", descriptor);
+    return link;
+}
+
+// A file without a name vanishes with its process. -1 where the file system has none, or nothing in /proc to
+// name it by.
+static int unnamed_open(const OutputFile *output)
+{
+    int descriptor = openat(output->folder, ".", O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600);
+    if (descriptor < 0 || access(descriptor_path(descriptor).path, F_OK) == 0) return descriptor;
+    close(descriptor);
+    return -1;
+}
+
+// Gives an unnamed file its target's name if that is free, else a temporary one to be renamed.
+static bool unnamed_link(OutputFile *output)
+{
+    int descriptor = fileno(output->file);
+    DescriptorPath link = descriptor_path(descriptor);
+    if (linkat(AT_FDCWD, link.path, output->folder, output->name, AT_SYMLINK_FOLLOW) == 0) return true;
+    if (errno != EEXIST) return false;
+    stale_temporaries_remove(output);
+    flock(descriptor, LOCK_EX | LOCK_NB);
+    for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
+        char *name = temporary_name(output, i);
+        if (linkat(AT_FDCWD, link.path, output->folder, name, AT_SYMLINK_FOLLOW) == 0) {
+            output->temporary = name;
+            pending_add(output->folder, name);
+            return true;
+        }
+        free(name);
+        if (errno != EEXIST) return false;
+    }
+    return false;
+}
+
 // A device or a pipe cannot be replaced by renaming: it is written directly.
 static bool output_open_directly(OutputFile *output, MessageList *messages)
 {
@@ -72,21 +186,12 @@ static bool output_open_directly(OutputFile *output, MessageList *messages)
     return output->file || output_failed(output, "write", messages);
 }
 
+// For `output->name` in `output->folder`.
 static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *messages)
 {
-    size_t length = strlen(output->target);
-    if (length == 0 || output->target[length - 1] == '/') {
-        errno = ENOENT;
-        return output_failed(output, "create", messages);
-    }
-    output->temporary = temporary_name(output->target);
-    int descriptor = mkostemp(output->temporary, O_CLOEXEC);
-    if (descriptor < 0) {
-        free(output->temporary);
-        output->temporary = NULL;
-        return output_failed(output, "create", messages);
-    }
-    pending_add(output->temporary);
+    int descriptor = unnamed_open(output);
+    if (descriptor < 0) descriptor = named_open(output);
+    if (descriptor < 0) return output_failed(output, "create", messages);
     fchmod(descriptor, mode); // fails where a file system has no modes, which does not matter
     output->file = fdopen(descriptor, "wb");
     if (output->file) return true;
@@ -94,6 +199,35 @@ static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *mes
     close(descriptor);
     errno = error;
     return output_failed(output, "create", messages);
+}
+
+// Opens the target's folder. One that may be written but not listed cannot be synced.
+static bool folder_open(OutputFile *output)
+{
+    char *slash = strrchr(output->target, '/');
+    output->name = slash ? slash + 1 : output->target;
+    if (output->name[0] == '\0') {
+        errno = ENOENT;
+        return false;
+    }
+    char *folder = slash ? strndup(output->target, (size_t)(slash + 1 - output->target)) : strdup(".");
+    if (!folder) fault("out of memory: file name");
+    output->folder = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (output->folder < 0 && errno == EACCES)
+        output->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
+    output->has_folder = output->folder >= 0;
+    free(folder);
+    return output->has_folder;
+}
+
+bool output_open_private(OutputFile *output, int folder, const char *name, MessageList *messages)
+{
+    *output = (OutputFile){.target = memory_copy_text(name), .is_private = true};
+    output->name = output->target;
+    output->folder = fcntl(folder, F_DUPFD_CLOEXEC, 0);
+    output->has_folder = output->folder >= 0;
+    if (!output->has_folder) return output_failed(output, "create", messages);
+    return output_open_beside(output, 0600, messages);
 }
 
 // The end of a chain of symbolic links, whether a file exists there or not; `target` itself if it is no link.
@@ -135,6 +269,7 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     if (exists && !S_ISREG(old.st_mode)) return output_open_directly(output, messages);
     // Renaming would replace a read-only file.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
+    if (!folder_open(output)) return output_failed(output, "create", messages);
     return output_open_beside(output, exists ? old.st_mode & 0777 : mode_by_umask(), messages);
 }
 
@@ -145,28 +280,43 @@ bool output_write(OutputFile *output, const void *bytes, size_t size, MessageLis
     return false;
 }
 
+// False where a write failed; not every file system can sync every file.
+static bool sync_done(int descriptor)
+{
+    return fsync(descriptor) == 0 || errno == EINVAL || errno == ENOSYS || errno == EBADF;
+}
+
 bool output_finish(OutputFile *output, MessageList *messages)
 {
     FILE *file = output->file;
-    output->file = NULL;
-    if (!file || file == stdout) return true;
+    if (!file || file == stdout || output->is_finished) return true;
+    output->is_finished = true;
     errno = EIO; // if an earlier write failed, its error is lost
-    bool written = fflush(file) == 0 && !ferror(file);
-    int error = errno;
-    if (fclose(file) == 0 && written) return true;
-    if (!written) errno = error;
-    return output_failed(output, "write", messages);
+    if (fflush(file) != 0 || ferror(file)) return output_failed(output, "write", messages);
+    bool needs_sync = output->has_folder && !output->is_private;
+    if (needs_sync && !sync_done(fileno(file))) return output_failed(output, "write", messages);
+    return true;
 }
 
 bool output_commit(OutputFile *output, MessageList *messages)
 {
     if (!output_finish(output, messages)) return false;
-    if (output->temporary) {
-        if (rename(output->temporary, output->target) != 0) return output_failed(output, "write", messages);
-        pending_drop(output->temporary);
-        free(output->temporary);
-        output->temporary = NULL;
+    if (output->has_folder) {
+        bool is_named = output->temporary || unnamed_link(output);
+        if (is_named && output->temporary) {
+            is_named = renameat(output->folder, output->temporary, output->folder, output->name) == 0;
+            if (is_named) {
+                pending_drop(output->temporary);
+                free(output->temporary);
+                output->temporary = NULL;
+            }
+        }
+        if (!is_named || (!output->is_private && !sync_done(output->folder)))
+            return output_failed(output, "write", messages);
     }
+    FILE *file = output->file;
+    output->file = NULL;
+    if (file && file != stdout && fclose(file) != 0) return output_failed(output, "write", messages);
     output_abandon(output);
     return true;
 }
@@ -175,9 +325,10 @@ void output_abandon(OutputFile *output)
 {
     if (output->file && output->file != stdout) fclose(output->file);
     if (output->temporary) {
-        unlink(output->temporary);
+        unlinkat(output->folder, output->temporary, 0);
         pending_drop(output->temporary);
     }
+    if (output->has_folder) close(output->folder);
     free(output->temporary);
     free(output->target);
     *output = (OutputFile){0};

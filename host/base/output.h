@@ -1,5 +1,6 @@
-// A file written beside its target and renamed when complete, so that a failure leaves the old file
-// untouched.
+// A file that is put in place of its target only when complete, so that a failure leaves the old file
+// untouched: an unnamed file in the target's folder where the file system has those (O_TMPFILE), else a
+// temporary beside the target.
 #pragma once
 
 #include "host/base/message.h"
@@ -8,18 +9,31 @@
 
 typedef struct {
     FILE *file;
-    char *target, *temporary;
+    char *target;
+    int folder; // of the target; undefined where the target is written directly, a device or a pipe
+    bool has_folder, is_private, is_finished;
+    const char *name; // of the target in its folder
+    char *temporary;  // the name in the folder until the rename; NULL: none
 } OutputFile;
 
-// Opens a file beside `target`, or, for `-`, standard output, whose errors main reports. On failure adds a
-// message and returns false. output_abandon removes the temporary; so does an atexit handler.
+// Opens a file for `target`, or, for `-`, standard output, whose errors main reports. On failure adds a
+// message and returns false. output_abandon removes the temporary; so does an atexit handler, and temporaries
+// of killed processes are removed when the next one is needed.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);
+// Opens a file of mode 0600 for `name` in an open folder, in place of whatever has that name. Not synced: for
+// contents that may be lost.
+bool output_open_private(OutputFile *output, int folder, const char *name, MessageList *messages);
 // On failure adds a message and returns false; the file stays open until it is abandoned.
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);
-// Flushes, checks for write errors (disk full) and closes, which leaves only the renaming to output_commit.
+// Flushes, syncs and checks for write errors (disk full), which leaves only the renaming to output_commit.
 // On failure adds a message and removes the temporary.
 bool output_finish(OutputFile *output, MessageList *messages);
-// Finishes the file if it is not finished, and renames it. On failure adds a message and removes the
-// temporary.
+// Finishes the file if it is not finished, renames it and syncs its folder. On failure adds a message and
+// removes the temporary.
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);
+
+// Whether `file_name` is a temporary for the target `name`.
+bool output_is_temporary(const char *file_name, const char *name);
+// Removes a temporary unless its process lives.
+void output_remove_stale(int folder, const char *file_name);
