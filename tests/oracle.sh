@@ -24,4 +24,5 @@ notices() {
 check 'a distance that is off is noticed' notices S5 1/1125899906842624 'sphere: t'
 check 'a normal that is off is noticed' notices C6 1/1125899906842624 'cone: normal'
 check 'a margin that is too large is noticed' notices S5 2 'sphere: margin'
+check 'so is one of a paraboloid' notices Q3 2 'paraboloid: margin'
 finish

@@ -120,8 +120,9 @@ def check_margin(kind, shape, ray, given, tallies):
     margin, limit = given["margin"] * float(1 + tallies.spoil), BEND * (shape.radius or 1)
     if isinstance(shape, exact.Box):
         limit = BEND * min(shape.half)
-    # of a plane nothing grows, and a paraboloid grows into no paraboloid
-    is_fixed = isinstance(shape, (exact.Plane, exact.Paraboloid))
+    if isinstance(shape, exact.Paraboloid):
+        limit = BEND * shape.least
+    is_fixed = isinstance(shape, exact.Plane)  # nothing of it grows
     # in a face of a box hit or miss is a comparison of given numbers
     is_compared = isinstance(shape, exact.Box) and sum(x == 0 for x in ray.direction) == 2
     if is_fixed or is_compared or margin <= RESOLVED * shape.size:

@@ -54,6 +54,15 @@ def grown(shape, by):
     if isinstance(shape, exact.DoubleCone):
         sine = as_float(shape.slope) / sqrt(1 + as_float(shape.slope) ** 2)
         return exact.DoubleCone(shape.center, shape.axis, shape.slope, -by / sine / length(shape.axis))
+    if isinstance(shape, exact.Paraboloid):
+        # with its apex moved by s and its focal length f by g, the surface at height z moves by (f s + z g) /
+        # sqrt(f (f + z)): by as much at the apex and the rim, and by less between; an infinite one at its apex
+        height = shape.end / shape.unit
+        f, z = as_float(shape.focal_length), as_float(height)
+        wider = 0 if shape.infinite else by * (sqrt(f * (f + z)) - f) / z
+        apex = [c - rational(by) / shape.unit * a for c, a in zip(shape.center, shape.axis)]
+        focal_length = shape.focal_length + rational(wider)
+        return exact.Paraboloid(apex, shape.axis, focal_length, height + 2 * rational(by), shape.infinite, shape.caps)
     ends = rational(by / shape.axis_length)
     slope = (shape.radii[1] - shape.radii[0]) / rational(shape.axis_length)
     wider = rational(by * sqrt(1 + as_float(slope) ** 2))

@@ -286,7 +286,9 @@ class Paraboloid(Shape):
         self.axis_squared = dot(self.axis, self.axis)
         self.unit = middle(arb(self.axis_squared).sqrt())
         self.end, self.infinite, self.caps = rational(height) * self.unit, infinite, caps
-        self.radius = self.size = 2 * float(height if infinite else sqrt(focal_length * height) + height)
+        f, end = floats([self.focal_length, rational(height)])
+        self.radius = self.size = 2 * (end if infinite else sqrt(f * end) + end)
+        self.least = 2 * f if infinite else min(2 * f, end)  # of the apex' radius of curvature and the height
 
     def boundary_ts(self, ray):
         # |p|^2 - h^2 / |w|^2 = 4 f h / |w| with h = p . w
