@@ -1,6 +1,7 @@
 // Checks of spheres and boxes that no table holds.
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/verify/checks.h"
 #include "host/verify/families.h"
 #include "host/verify/run.h"
 #include <math.h>
@@ -66,18 +67,10 @@ static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
 // The far crossing of a ray that starts inside; NAN where it starts outside or runs along the surface.
 static double sphere_exit(const Object *sphere, const TraceRay *ray)
 {
-    const double center[] = {sphere->as.sphere.center.x, sphere->as.sphere.center.y,
-                             sphere->as.sphere.center.z};
-    long double radius = sphere->as.sphere.radius, a = 0, b = 0, c = 0;
-    for (size_t axis = 0; axis < 3; axis++) {
-        long double f = (long double)ray->origin[axis] - center[axis], d = ray->direction[axis];
-        a += d * d;
-        b += f * d;
-        c += f * f;
-    }
-    c -= radius * radius;
-    if (c >= 0 || -b < 0.1L * radius * sqrtl(a)) return NAN;
-    return (double)((sqrtl(b * b - a * c) - b) / a);
+    const ReferenceRay reference_ray = verify_reference_ray(ray);
+    const ReferenceHit hit = reference_hit_object(sphere, &reference_ray);
+    if (!hit.found || hit.entering || hit.cosine < 0.1L) return NAN;
+    return (double)hit.t;
 }
 
 // A ray to each sphere from outside.
