@@ -38,10 +38,10 @@ typedef struct {
             materials, lights, texture_levels, texels, 0                                                     \
     }
 
-// Adds the lanes in `rays` to a counter, in a counting build only.
+// Adds the lanes in `rays` to a counter, in a counting build of the image's kernel only.
 static inline void ray_counter_add(const Scene *scene, uint counter, mask rays)
 {
-    if (!IS_COUNTING) return;
+    if (!IS_COUNTING || !scene->ray_counts) return;
     IntegerLanes counted = {rays};
     uint count = 0;
     for (uint lane = 0; lane < LANES; lane++)

@@ -18,7 +18,7 @@ typedef struct {
     Precision precision;
     uint32_t lanes; // rays per work-item: 1, 4, 8, 16; 0: device_lanes
     BvhChoice bvh;
-    bool counting;             // count rays by kind in a slower build; only for renders without AOVs
+    bool counting;             // count the rays of the image, not those of AOVs, by kind in a slower build
     uint32_t perturb_seed;     // not 0: inject the rounding error OpenCL permits (kernels/numerics/perturb.h)
     uint32_t perturb_scale;    // multiplies that error, up to PERTURB_SCALE_MAX; 0: 1
     FeatureSet extra_features; // built in beyond the scene's own, for tests
