@@ -45,7 +45,7 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT),
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
     const HitLayers layers = {HIT_AOV_LIST(LAYER_VALUE)};
-    for (uint i = 0; i < ITEM_TILES; i++) {
+    for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
         if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &layers, light_count);
     }

@@ -15,16 +15,14 @@ typedef struct {
     uint width;    // of the band
 } Tile;
 
-// Tiles per work-item.
-#define ITEM_TILES (LANES == 1 ? 1 : TILES_PER_ITEM)
-
-// The work-item's tile number `which`, from 0.
+// The work-item's tile number `which`, from 0 to TILES - 1.
 static inline Tile band_tile(const Band *band, uint which)
 {
     Tile tile;
-    uint column = (uint)get_global_id(0) * ITEM_TILES + which;
+    uint column = (uint)get_global_id(0) * MACRO_TILE_COLUMNS + which % MACRO_TILE_COLUMNS;
+    uint row = (uint)get_global_id(1) * MACRO_TILE_ROWS + which / MACRO_TILE_COLUMNS;
     integer x = (integer)((scalar_integer)(column * TILE_WIDTH)) + LANE_X;
-    integer y = (integer)((scalar_integer)(get_global_id(1) * TILE_HEIGHT)) + LANE_Y;
+    integer y = (integer)((scalar_integer)(row * TILE_HEIGHT)) + LANE_Y;
     tile.inside =
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
     tile.index = y * (integer)((scalar_integer)band->width) + x;

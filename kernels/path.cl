@@ -5,8 +5,11 @@
 
 static KERNEL_BODY void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths)
 {
+    Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
+    Seen seen;
+    rays_see(scene, &ray, 1, &seen);
     unsigned_integer signature;
-    ray_color(scene, camera_ray(scene->header, tile->pixels, 0, 0, tile->inside), &signature);
+    ray_tree_color(scene, ray, &seen, &signature);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 
@@ -14,7 +17,7 @@ kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
-    for (uint i = 0; i < ITEM_TILES; i++) {
+    for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
         if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths);
     }

@@ -3,36 +3,52 @@
 #include "film.h"
 #include "shading/path.h"
 
-// Adds samples first_sample .. last_sample - 1 to the film; the last launch divides the sum by the number of
-// samples. `offsets`: x and y of each sample in its pixel, -1 to 1. `compensation`: the rounding error of the
-// sum, compensated in the next addition and kept between launches (Kahan, Further remarks on reducing
-// truncation errors, CACM 8(1), 1965): a plain sum of a million equal samples would be off by 1 %.
-static KERNEL_BODY void tile_render(const Scene *scene, const Tile *tile, global const scalar *offsets,
-                                    global scalar *film, global scalar *compensation, uint first_sample,
-                                    uint last_sample)
+// Adds samples first_sample .. last_sample - 1 of tiles first_tile .. first_tile + PACKETS - 1 to the
+// film; the last launch divides the sum by the number of samples. `offsets`: x and y of each sample in its
+// pixel, -1 to 1. `compensation`: the rounding error of the sum, compensated in the next addition and kept
+// between launches (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965): a plain sum of a
+// million equal samples would be off by 1 %.
+static KERNEL_BODY void tiles_render(const Scene *scene, const Band *band, uint first_tile,
+                                     global const scalar *offsets, global scalar *film,
+                                     global scalar *compensation, uint first_sample, uint last_sample)
 {
-    Color3 sum = {(real)(0), (real)(0), (real)(0)}, lost = sum;
-    if (first_sample > 0) {
-        sum = film_load_color(film, tile);
-        lost = film_load_color(compensation, tile);
+    Tile tiles[PACKETS];
+    Ray rays[PACKETS];
+    Seen seen[PACKETS];
+    Color3 sums[PACKETS], lost[PACKETS];
+    for (uint i = 0; i < PACKETS; i++) {
+        tiles[i] = band_tile(band, first_tile + i);
+        sums[i] = lost[i] = (Color3){(real)(0), (real)(0), (real)(0)};
+        if (first_sample > 0) {
+            sums[i] = film_load_color(film, &tiles[i]);
+            lost[i] = film_load_color(compensation, &tiles[i]);
+        }
     }
     for (uint sample = first_sample; sample < last_sample; sample++) {
-        Ray ray = camera_ray(scene->header, tile->pixels, offsets[2 * sample], offsets[2 * sample + 1],
-                             tile->inside);
-        ray_counter_add(scene, RAYS_CAMERA, ray.active);
-        unsigned_integer path;
-        Color3 color = vector_subtract(ray_color(scene, ray, &path), lost);
-        Color3 next = vector_add(sum, color);
-        lost = vector_subtract(vector_subtract(next, sum), color);
-        sum = next;
+        for (uint i = 0; i < PACKETS; i++) {
+            rays[i] = camera_ray(scene->header, tiles[i].pixels, offsets[2 * sample], offsets[2 * sample + 1],
+                                 tiles[i].inside);
+            ray_counter_add(scene, RAYS_CAMERA, rays[i].active);
+        }
+        rays_see(scene, rays, PACKETS, seen);
+        for (uint i = 0; i < PACKETS; i++) {
+            unsigned_integer path;
+            Color3 color = vector_subtract(ray_tree_color(scene, rays[i], &seen[i], &path), lost[i]);
+            Color3 next = vector_add(sums[i], color);
+            lost[i] = vector_subtract(vector_subtract(next, sums[i]), color);
+            sums[i] = next;
+        }
     }
-    uint count = scene->header->image.z;
-    if (last_sample < count) film_store_color(compensation, tile, lost);
-    if (count > 1 && last_sample == count) {
-        real divisor = (real)((scalar)count);
-        sum = (Color3){real_divide(sum.x, divisor), real_divide(sum.y, divisor), real_divide(sum.z, divisor)};
+    const uint count = scene->header->image.z;
+    for (uint i = 0; i < PACKETS; i++) {
+        if (last_sample < count) film_store_color(compensation, &tiles[i], lost[i]);
+        if (count > 1 && last_sample == count) {
+            real divisor = (real)((scalar)count);
+            sums[i] = (Color3){real_divide(sums[i].x, divisor), real_divide(sums[i].y, divisor),
+                               real_divide(sums[i].z, divisor)};
+        }
+        film_store_color(film, &tiles[i], sums[i]);
     }
-    film_store_color(film, tile, sum);
 }
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar *film,
@@ -42,9 +58,6 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar 
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
-    for (uint i = 0; i < ITEM_TILES; i++) {
-        Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside))
-            tile_render(&scene, &tile, offsets, film, compensation, first_sample, last_sample);
-    }
+    for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
+        tiles_render(&scene, &band, first_tile, offsets, film, compensation, first_sample, last_sample);
 }

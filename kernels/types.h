@@ -193,9 +193,9 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define TILE_WIDTH_OF(lanes)  ((lanes) >= 8 ? 4 : (lanes) == 4 ? 2 : 1)
 #define TILE_HEIGHT_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
 
-// Neighboring tiles along a row that a work-item of several lanes renders in turn. On a CPU each work-item is
-// a work-group of its own, which costs PoCL some hundred cycles to start.
-enum { TILES_PER_ITEM = 8 };
+// The macro-tile that a work-item renders: as many tiles as a packet has lanes, nearly as wide as high.
+#define MACRO_TILE_COLUMNS_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
+#define MACRO_TILE_ROWS_OF(lanes)    ((lanes) / MACRO_TILE_COLUMNS_OF(lanes))
 
 // The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };

@@ -21,12 +21,11 @@ static TileShape tile_shape(uint32_t lanes)
     return (TileShape){TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
 }
 
-// The pixels of all tiles of a work-item (ITEM_TILES in kernels/film.h).
+// The pixels of a work-item: a macro-tile.
 static TileShape item_shape(uint32_t lanes)
 {
-    TileShape shape = tile_shape(lanes);
-    if (lanes > 1) shape.width *= TILES_PER_ITEM;
-    return shape;
+    TileShape tile = tile_shape(lanes);
+    return (TileShape){tile.width * MACRO_TILE_COLUMNS_OF(lanes), tile.height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
 // Work-items along each side of a group, before the device's limits. Square groups are coherent: neighboring

@@ -6,14 +6,56 @@
 #include "shading/bounce.h"
 #include "shading/phong.h"
 
-// Ambient light and each light that reaches the surface, without reflection and refraction.
-static inline Color3 surface_color(const Scene *scene, const Surface *surface)
+// What a packet of rays sees.
+typedef struct {
+    Hit hit;
+    Surface surface; // where any lane hit one
+    Color3 color;    // without reflection and refraction; the background's where nothing was hit
+} Seen;
+
+// Adds each light that reaches the surfaces of `count` packets.
+static inline void surfaces_light(const Scene *scene, uint count, Seen *seen)
 {
-    Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
-    Color3 color = color_multiply(ambient, surface->color);
-    for (uint i = 0; i < scene->header->image.w; i++)
-        color = vector_add(color, phong_shade(scene, surface, i));
-    return color;
+    Ray shadow_rays[PACKETS];
+    LightVisibility lights[PACKETS];
+    Traversal traversals[PACKETS];
+    for (uint index = 0; index < scene->header->image.w; index++) {
+        for (uint i = 0; i < count; i++) {
+            shadow_rays[i].active = lights[i].lit = mask_none();
+            if (lanes_any(hit_found(&seen[i].hit)))
+                lights[i] = light_reach(scene, &seen[i].surface, index, &shadow_rays[i]);
+        }
+        scene_traverse(scene, shadow_rays, count, OCCLUSION, traversals);
+        for (uint i = 0; i < count; i++) {
+            if (!lanes_any(lights[i].lit)) continue;
+            light_occlude(&lights[i], traversal_transmittance(&traversals[i]));
+            if (!lanes_any(lights[i].lit)) continue;
+            Color3 reflected = phong_shade(scene, &seen[i].surface, &lights[i], index);
+            seen[i].color = vector_add(seen[i].color, reflected);
+        }
+    }
+}
+
+// The surfaces that `count` packets of rays hit, and their colors; no colors if COMPUTE_SIGNATURE.
+static OUT_OF_LINE void rays_see(const Scene *scene, Ray *rays, uint count, Seen *seen)
+{
+    Traversal traversals[PACKETS];
+    scene_traverse(scene, rays, count, CLOSEST_HIT, traversals);
+    Color3 background = vector_of(scene->header->background);
+    for (uint i = 0; i < count; i++) {
+        seen[i].hit = traversals[i].hit;
+        mask found = hit_found(&seen[i].hit);
+        seen[i].color = background;
+        if (!lanes_any(found)) continue;
+        seen[i].surface = visible_surface(scene, &rays[i], &seen[i].hit);
+        const Surface *surface = &seen[i].surface;
+        Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
+        seen[i].color = color_multiply(ambient, surface->color);
+    }
+    if (COMPUTE_SIGNATURE) return;
+    surfaces_light(scene, count, seen);
+    for (uint i = 0; i < count; i++)
+        seen[i].color = vector_select(hit_found(&seen[i].hit), seen[i].color, background);
 }
 
 // Adds a ray's hit and its bounces to the signature.
@@ -31,44 +73,34 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
-// Traces a ray tree depth first, reflected before refracted. If COMPUTE_SIGNATURE, *path is its signature
-// (types.h), which in each lane is independent of the other lanes, and the color is undefined.
-static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *path)
+// Traces a ray tree depth first, reflected before refracted, from what its camera ray sees. If
+// COMPUTE_SIGNATURE, *path is its signature (types.h), which in each lane is independent of the other lanes,
+// and the color is undefined.
+static inline Color3 ray_tree_color(const Scene *scene, Ray ray, Seen *seen, unsigned_integer *path)
 {
     *path = (unsigned_integer)(PATH_START);
+    ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&seen->hit));
+    // without secondary rays the color is that of the camera ray: no weights
+    if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
+        if (COMPUTE_SIGNATURE)
+            *path = path_signature_add(*path, &ray, &seen->hit, mask_none(), mask_none(), mask_none());
+        return seen->color;
+    }
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
-    Color3 background = vector_of(scene->header->background);
     Color3 color = black, weight = white;
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
     for (;;) {
-        Hit hit = closest_hit(scene, &ray);
-        Surface surface;
-        surface.found = hit_found(&hit);
-        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, surface.found);
-        Color3 seen = background;
-        bool any_found = lanes_any(surface.found);
-        if (any_found) {
-            surface = visible_surface(scene, &ray, &hit);
-            if (!COMPUTE_SIGNATURE)
-                seen = vector_select(surface.found, surface_color(scene, &surface), background);
-        }
-        // without secondary rays the color is that of the camera ray: no weights
-        if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
-            if (COMPUTE_SIGNATURE)
-                *path = path_signature_add(*path, &ray, &hit, mask_none(), mask_none(), mask_none());
-            return seen;
-        }
-        color = color_add_weighted(color, weight, vector_select(ray.active, seen, black));
+        color = color_add_weighted(color, weight, vector_select(ray.active, seen->color, black));
 
         Bounce reflected = {ray.origin, ray.direction, black, depth + 1, ray.travelled};
         Bounce refracted = reflected;
         mask total = mask_none();
-        if (any_found && depth < scene->header->bounces.x)
-            total = surface_bounce(&surface, vector_renormalize(ray.direction), weight, false, &reflected,
-                                   &refracted);
+        if (lanes_any(hit_found(&seen->hit)) && depth < scene->header->bounces.x)
+            total = surface_bounce(&seen->surface, vector_renormalize(ray.direction), weight, false,
+                                   &reflected, &refracted);
         if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, &ray, &hit, bounce_is_active(&reflected),
+            *path = path_signature_add(*path, &ray, &seen->hit, bounce_is_active(&reflected),
                                        bounce_is_active(&refracted), total);
         ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&reflected));
         ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&refracted));
@@ -84,6 +116,7 @@ static inline Color3 ray_color(const Scene *scene, Ray ray, unsigned_integer *pa
         ray = bounce_ray(&next);
         weight = next.weight;
         depth = next.depth;
+        rays_see(scene, &ray, 1, seen);
     }
 }
 

@@ -68,44 +68,55 @@ typedef struct {
     real fraction;    // of the light's color that arrives
 } LightVisibility;
 
-static inline LightVisibility light_visibility(const Scene *scene, const Surface *surface, uint index)
+// All of that but occlusion, for which the shadow ray is set, active in the lanes that may be lit.
+static inline LightVisibility light_reach(const Scene *scene, const Surface *surface, uint index,
+                                          Ray *shadow_ray)
 {
     Light light = scene->lights[index];
     LightRay to_light = light_ray(&light, surface);
     LightVisibility visibility;
     visibility.direction = to_light.direction;
     visibility.facing = vector_dot(surface->shading_normal, to_light.direction);
-    visibility.fraction = (real)(0);
+    visibility.fraction = to_light.strength;
     visibility.lit = surface->found & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
-    if (!lanes_any(visibility.lit)) return visibility;
-
-    to_light.shadow_ray.active = to_light.shadow_ray.active & visibility.lit;
+    *shadow_ray = to_light.shadow_ray;
+    shadow_ray->active = shadow_ray->active & visibility.lit;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
-        ray_set_common_origin(&to_light.shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
-    ray_counter_add(scene, RAYS_SHADOW, to_light.shadow_ray.active);
-    real passing = transmittance(scene, &to_light.shadow_ray);
-    visibility.lit = visibility.lit & (passing > (real)(0));
-    visibility.fraction = to_light.strength * passing;
+        ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
+    ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
+    return visibility;
+}
+
+static inline void light_occlude(LightVisibility *visibility, real passing)
+{
+    visibility->lit = visibility->lit & (passing > (real)(0));
+    visibility->fraction = visibility->fraction * passing;
+}
+
+static inline LightVisibility light_visibility(const Scene *scene, const Surface *surface, uint index)
+{
+    Ray shadow_ray;
+    LightVisibility visibility = light_reach(scene, surface, index, &shadow_ray);
+    if (lanes_any(visibility.lit)) light_occlude(&visibility, transmittance(scene, &shadow_ray));
     return visibility;
 }
 
 // One light's contribution; black in lanes that it does not reach.
-static inline Color3 phong_shade(const Scene *scene, const Surface *surface, uint index)
+static inline Color3 phong_shade(const Scene *scene, const Surface *surface, const LightVisibility *light,
+                                 uint index)
 {
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
-    LightVisibility light = light_visibility(scene, surface, index);
-    if (!lanes_any(light.lit)) return black;
-    Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light.fraction);
-    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), light.facing);
-    mask glossy = light.lit & (surface->specular > (real)(0));
+    Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light->fraction);
+    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), light->facing);
+    mask glossy = light->lit & (surface->specular > (real)(0));
     if (lanes_any(glossy)) {
-        Vector reflected =
-            vector_fma(surface->shading_normal, light.facing + light.facing, vector_negate(light.direction));
+        Vector reflected = vector_fma(surface->shading_normal, light->facing + light->facing,
+                                      vector_negate(light->direction));
         real highlight =
             surface->specular * phong_highlight(glossy, reflected, surface->to_eye, surface->shininess);
         color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
     }
-    return vector_select(light.lit, color_multiply(color, arriving), black);
+    return vector_select(light->lit, color_multiply(color, arriving), black);
 }
 
 #endif

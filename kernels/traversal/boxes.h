@@ -28,13 +28,25 @@ typedef struct {
     uint negative_x, negative_y, negative_z; // the lanes whose direction is negative, as bits
 } BoxRays;
 
-static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
+// The largest 1-norm of what a ray from this origin meets within the bounds; *farthest: of the way there.
+static inline real bounds_max_norm1(Vector origin, scalar4 bounds, real *farthest)
 {
     Vector center = vector_of(bounds);
-    real farthest = vector_norm1(vector_subtract(ray->origin, center)) + (real)(bounds.w);
-    real max_norm1 = real_fma((real)(2), vector_norm1(center), farthest);
-    real slack = real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), farthest,
-                          (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
+    *farthest = vector_norm1(vector_subtract(origin, center)) + (real)(bounds.w);
+    return real_fma((real)(2), vector_norm1(center), *farthest);
+}
+
+static inline real box_slack(Vector origin, scalar4 bounds)
+{
+    real farthest, max_norm1 = bounds_max_norm1(origin, bounds, &farthest);
+    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), farthest,
+                    (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
+}
+
+static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
+{
+    real farthest, max_norm1 = bounds_max_norm1(ray->origin, bounds, &farthest);
+    real slack = box_slack(ray->origin, bounds);
     const real huge = (real)(1 / SMALLEST_RATIO);
     real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),

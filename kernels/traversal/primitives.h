@@ -24,9 +24,10 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
 // kind: if one function tested all kinds, Mesa, which inlines before it knows the kind asked for, would
 // compile them all at each call.
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
-    static inline void intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
+    static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
                                          uint first, uint last, global const CullSphere *cull_spheres)       \
     {                                                                                                        \
+        bool found_any = false;                                                                              \
         for (uint i = first; i < last; i++) {                                                                \
             if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
             if (i == last) break;                                                                            \
@@ -34,23 +35,27 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
             real t = ray->tmax;                                                                              \
             mask found = name##_hit(&shape, ray, &t);                                                        \
             if (!lanes_any(found)) continue;                                                                 \
+            found_any = true;                                                                                \
             traversal_record(traversal, scene, found, t, shape.id.x);                                        \
             if (traversal->query != OCCLUSION)                                                               \
                 object_prefetch(scene, KIND_##feature, shape.id);                                            \
             else if (!lanes_any(traversal->active))                                                          \
                 break;                                                                                       \
         }                                                                                                    \
+        return found_any;                                                                                    \
     }
 SHAPE_LIST(INTERSECT_SHAPES)
 
 // A leaf is count << 8 | kind (BvhNode.child_kind) and its first primitive.
-static inline void intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
+static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint first)
 {
     uint kind = leaf & 0xff, last = first + (leaf >> 8);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && kind == KIND_##feature) intersect_##names(traversal, scene, ray, first, last, 0);
+    if (HAS_##feature && kind == KIND_##feature)                                                             \
+        return intersect_##names(traversal, scene, ray, first, last, 0);
     SHAPE_LIST(INTERSECT_LEAF)
+    return false;
 }
 
 // Intersects all primitives outside the BVH: the unbounded ones, or all in a scene without a BVH.

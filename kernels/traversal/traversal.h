@@ -3,41 +3,67 @@
 #ifndef TRAVERSAL_H
 #define TRAVERSAL_H
 
+#include "traversal/macro_tile.h"
 #include "traversal/packet.h"
 #include "traversal/single.h"
 
-static OUT_OF_LINE Traversal scene_traverse(const Scene *scene, Ray *ray, Query query)
+// Searches for the rays of `count` packets, up to PACKETS, which are independent of each other; if they have
+// a common origin, all have the same.
+static OUT_OF_LINE void scene_traverse(const Scene *scene, Ray *rays, uint count, Query query,
+                                       Traversal *traversals)
 {
-    Traversal traversal = {query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
-    intersect_outside_bvh(&traversal, scene, ray);
-    if (HAS_BVH) {
+    uint packets = 0; // that search the BVH
+    for (uint i = 0; i < count; i++) {
+        Ray *ray = &rays[i];
+        traversals[i] = (Traversal){query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
+        if (!lanes_any(ray->active)) continue;
+        intersect_outside_bvh(&traversals[i], scene, ray);
+        if (!HAS_BVH || !lanes_any(traversals[i].active)) continue;
         global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
-        if (!cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0)
-            traverse_bvh(&traversal, scene, ray);
+        if (!cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0) packets |= 1u << i;
     }
-    return traversal;
+#if LANES > 1
+    if (HAS_BVH && (packets & (packets - 1)) != 0 &&
+        rays[lowest_bit(packets)].common_origin != COMMON_ORIGIN_NONE)
+        packets = traverse_bvh_by_tile(traversals, scene, rays, packets);
+#endif
+    for (; HAS_BVH && packets != 0; packets &= packets - 1) {
+        uint i = lowest_bit(packets);
+        traverse_bvh(&traversals[i], scene, &rays[i]);
+    }
 }
 
 static inline Hit closest_hit(const Scene *scene, Ray *ray)
 {
-    return scene_traverse(scene, ray, CLOSEST_HIT).hit;
+    Traversal traversal;
+    scene_traverse(scene, ray, 1, CLOSEST_HIT, &traversal);
+    return traversal.hit;
 }
 
 static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
 {
-    return scene_traverse(scene, ray, CLOSEST_OPAQUE_HIT).hit;
+    Traversal traversal;
+    scene_traverse(scene, ray, 1, CLOSEST_OPAQUE_HIT, &traversal);
+    return traversal.hit;
 }
 
-// The fraction of light that passes along each active ray between tmin and tmax: 1 if it is free, 0 behind an
+// The fraction of light that passes where a search for occlusion has ended: 1 if the way is free, 0 behind an
 // opaque object. Each transparent object transmits its fraction, without bending the ray.
+static inline real traversal_transmittance(const Traversal *traversal)
+{
+    const real none = (real)(0), all = (real)(1);
+    if (!HAS_TRANSMISSION) return lanes_select(traversal->active, all, none);
+    const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);
+    real passed = real_exp_negative(real_from_integer(traversal->optical_depth) * ln2_of_step);
+    return lanes_select(traversal->active, passed, none);
+}
+
+// Of each active ray, between tmin and tmax.
 static inline real transmittance(const Scene *scene, Ray *ray)
 {
-    Traversal traversal = scene_traverse(scene, ray, OCCLUSION);
-    const real none = (real)(0), all = (real)(1);
-    if (!HAS_TRANSMISSION) return lanes_select(traversal.active, all, none);
-    const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);
-    real passed = real_exp_negative(real_from_integer(traversal.optical_depth) * ln2_of_step);
-    return lanes_select(traversal.active, passed, none);
+    Traversal traversal;
+    scene_traverse(scene, ray, 1, OCCLUSION, &traversal);
+    return traversal_transmittance(&traversal);
 }
 
 #endif

@@ -1,0 +1,202 @@
+// The culls of macro-tiles attacked: triangles and spheres within a few ulp of where a cull changes its
+// answer. The image must have the same bits with the BVH and without it. run_tests: sanitize-long-only
+#include "host/base/array.h"
+#include "host/compile/random_shape.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+static Random random_state;
+
+enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 300 };
+
+static const double half_tangent = 0.75, floor_y = -3, farthest = 12;
+
+// The camera looks from 0 along -z; all sizes below are in units of the scene's.
+static Vector3 pixel_direction(uint64_t column, uint64_t row)
+{
+    double unit = half_tangent / WIDTH;
+    return (Vector3){(2 * (double)column + 1 - WIDTH) * unit, (HEIGHT - 1 - 2 * (double)row) * unit, -1};
+}
+
+static Vector3 random_pixel_direction(void)
+{
+    return pixel_direction(random_bits(&random_state) % WIDTH, random_bits(&random_state) % HEIGHT);
+}
+
+// What a camera ray meets at the latest.
+static Vector3 point_behind(Vector3 direction)
+{
+    double t = direction.y < 0 ? fmin(floor_y / direction.y, farthest) : farthest;
+    return vector_scale(direction, t);
+}
+
+// Up to 4 ulp of a float away.
+static double nudge(double value)
+{
+    float nudged = (float)value;
+    for (uint64_t steps = random_bits(&random_state) % 5; steps > 0; steps--)
+        nudged = nextafterf(nudged, random_coin(&random_state) ? INFINITY : -INFINITY);
+    return nudged;
+}
+
+static Vector3 vector_nudge(Vector3 v)
+{
+    return (Vector3){nudge(v.x), nudge(v.y), nudge(v.z)};
+}
+
+// The common origins: the eye, one light above all, one among the objects, one at the height of the floor.
+static const Vector3 origins[] = {{0, 0, 0}, {2, 9, 1}, {0.25, -0.5, -6}, {-7, -3, -5}};
+enum { ORIGINS = sizeof origins / sizeof *origins };
+
+// On the ray of a pixel, or on the way from what it sees to a light: at any distance from there.
+static Vector3 point_in_view(size_t origin, Vector3 seen, double along)
+{
+    return vector_add(origins[origin], vector_scale(vector_subtract(seen, origins[origin]), along));
+}
+
+static double *component(Vector3 *v, size_t axis)
+{
+    return axis == 0 ? &v->x : axis == 1 ? &v->y : &v->z;
+}
+
+// Fills a corner of its flat box, whose sides are along the axes: the sides meet at a point in view.
+static Object flat_triangle_in_view(void)
+{
+    static const double layers[] = {0.5, 1, 2, 4}; // few, so that triangles of one share leaves
+    size_t origin = random_bits(&random_state) % ORIGINS;
+    Vector3 seen = point_behind(random_pixel_direction());
+    Vector3 way = vector_subtract(seen, origins[origin]);
+    size_t w_axis = 0;
+    for (size_t axis = 1; axis < 3; axis++)
+        if (fabs(*component(&way, axis)) > fabs(*component(&way, w_axis))) w_axis = axis;
+    double along = layers[random_bits(&random_state) % 4] / fabs(*component(&way, w_axis));
+    Vector3 corner = vector_nudge(point_in_view(origin, seen, along));
+    Object object = {.kind = SHAPE_TRIANGLE, .as.triangle.vertices = {corner, corner, corner}};
+    for (size_t i = 1; i < 3; i++) {
+        double side = random_power(&random_state, -2, 0) * (random_coin(&random_state) ? 1 : -1);
+        *component(&object.as.triangle.vertices[i], (w_axis + i) % 3) += side;
+    }
+    return object;
+}
+
+// The edge from the first to the second vertex is in a plane with the common origin and through pixels; of
+// every third triangle all vertices are, so that it is seen edge-on.
+static Object triangle_in_view(size_t index)
+{
+    size_t origin = random_bits(&random_state) % ORIGINS;
+    Vector3 first = random_pixel_direction(), second = first;
+    if (random_coin(&random_state))
+        second.x = random_pixel_direction().x;
+    else
+        second.y = random_pixel_direction().y;
+    double along = random_between(&random_state, 0.05, 0.95);
+    double size = random_power(&random_state, -2, 0);
+    Vector3 a = point_in_view(origin, point_behind(first), along);
+    Vector3 b = point_in_view(origin, point_behind(second), along + size * 0.1);
+    Vector3 c = index % 3 == 0 ? point_in_view(origin, point_behind(first), along + size * 0.2)
+                               : vector_add(a, vector_scale(random_unit_vector(&random_state), size));
+    return (Object){.kind = SHAPE_TRIANGLE,
+                    .as.triangle.vertices = {vector_nudge(a), vector_nudge(b), vector_nudge(c)}};
+}
+
+// Touches the ray of a pixel.
+static Object sphere_in_view(void)
+{
+    size_t origin = random_bits(&random_state) % ORIGINS;
+    Vector3 seen = point_behind(random_pixel_direction());
+    Vector3 along = vector_normalize(vector_subtract(seen, origins[origin]));
+    Vector3 touched = point_in_view(origin, seen, random_between(&random_state, 0.05, 0.95));
+    Vector3 aside = vector_normalize(vector_cross(along, random_unit_vector(&random_state)));
+    double radius = random_power(&random_state, -2, -0.5);
+    Vector3 center = vector_add(touched, vector_scale(aside, radius));
+    return (Object){.kind = SHAPE_SPHERE, .as.sphere = {vector_nudge(center), nudge(radius), false}};
+}
+
+static void object_scale(Object *object, double scale)
+{
+    if (object->kind == SHAPE_SPHERE) {
+        object->as.sphere.center = vector_scale(object->as.sphere.center, scale);
+        object->as.sphere.radius *= scale;
+        return;
+    }
+    for (size_t i = 0; i < 3; i++)
+        object->as.triangle.vertices[i] = vector_scale(object->as.triangle.vertices[i], scale);
+}
+
+static Scene scene_attacking(double scale)
+{
+    Scene scene = {.camera = {.look_at = {0, 0, -scale},
+                              .up = {0, 1, 0},
+                              .field_axis = FIELD_HORIZONTAL,
+                              .half_tangent = half_tangent}};
+    array_push(scene.materials, material_default());
+    for (size_t i = 1; i < ORIGINS; i++)
+        array_push(scene.lights, ((Light){.kind = LIGHT_POINT,
+                                          .color = {0.5, 0.4, 0.3},
+                                          .position = vector_scale(origins[i], scale)}));
+    for (size_t i = 0; i < OBJECTS; i++) {
+        Object object = i % 4 == 3   ? sphere_in_view()
+                        : i % 4 == 2 ? triangle_in_view(i / 4)
+                                     : flat_triangle_in_view();
+        object_scale(&object, scale);
+        array_push(scene.objects, object);
+    }
+    array_push(scene.objects,
+               ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, floor_y * scale, 0}, {0, 1, 0}}}));
+    return scene;
+}
+
+// How many pixels see an object, and how many of those are in the shadow of a light.
+static void count_seen(const Film *film, size_t *seen, size_t *shadowed)
+{
+    const size_t light_count = ORIGINS - 1;
+    *seen = *shadowed = 0;
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
+        *seen += film->object[i] < OBJECTS;
+        for (size_t light = 0; light < light_count; light++)
+            *shadowed += film->shadow[i * light_count + light] == 1;
+    }
+}
+
+static void no_pixel_depends_on_the_bvh(void **state)
+{
+    (void)state;
+    static const double scales[] = {1, 0x1p-20, 0x1p20};
+    const size_t scene_count = tests_are_long() ? 60 : 12;
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        if (!probe_has(precision) || (!tests_are_long() && precision > PRECISION_SINGLE)) continue;
+        for (size_t i = 0; i < scene_count; i++) {
+            random_state.state = i + 1;
+            Scene scene = scene_attacking(scales[i % 3]);
+            for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+                if (*lanes == 1) continue; // has no macro-tiles
+                RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+                settings.lanes = *lanes;
+                settings.bvh = BVH_OFF;
+                Film expected = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
+                settings.bvh = BVH_ON;
+                Film film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
+                film_assert_same(&film, &expected, precision_names[precision]);
+                size_t seen, shadowed;
+                count_seen(&expected, &seen, &shadowed);
+                assert_in_range(seen, WIDTH * HEIGHT / 8, WIDTH * HEIGHT * 7 / 8);
+                assert_true(shadowed > WIDTH * HEIGHT / 8);
+                film_free(&film);
+                film_free(&expected);
+            }
+            scene_free(&scene);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(no_pixel_depends_on_the_bvh)};
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
