@@ -7,7 +7,7 @@ CFLAGS ?= -O2 -g
 BUILD  ?= build
 PREFIX ?= /usr/local
 
-packages := libfyaml libpng libturbojpeg OpenEXR assimp OpenCL
+packages := libfyaml libpng libturbojpeg OpenEXR assimp libsodium OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
 ifneq ($(shell pkg-config --exists $(packages) && echo found),found)
 $(error Libraries are missing; tools/setup installs or lists them)
@@ -20,7 +20,7 @@ endif
 OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Werror \
             $(patsubst -I%,-isystem %,$(shell pkg-config --cflags $(packages))) $(sanitize)
 # Of OpenEXR only the library with the C interface.
-LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp OpenCL) \
+LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
             $(shell pkg-config --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) -lm -lpthread
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.

@@ -21,6 +21,7 @@ static const struct {
     {"bench", command_bench, "measure speed on a device"},
     {"accuracy", command_accuracy, "measure speed against error"},
     {"verify", command_verify, "run the hard cases on a device"},
+    {"cache", command_cache, "list, check or empty the kernel cache"},
 };
 
 enum { COMMAND_COUNT = sizeof commands / sizeof *commands };

@@ -1,4 +1,5 @@
 // The kernel cache on disk; no device is needed.
+#include "host/base/array.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include "tests/child.h"
@@ -78,6 +79,217 @@ static void test_store_and_load(void **state)
     assert_int_equal(stat(text_c(&path), &status), 0);
     assert_int_equal(status.st_mode & 0777, 0700);
     text_free(&path);
+}
+
+static void entry_set_used(const char *entry_key, time_t when)
+{
+    char *path = cache_entry_path(entry_key);
+    const struct timespec moments[2] = {{when, 0}, {when, 0}};
+    assert_int_equal(utimensat(AT_FDCWD, path, moments, 0), 0);
+    free(path);
+}
+
+static mode_t mode_of(const char *path)
+{
+    struct stat status;
+    assert_int_equal(lstat(path, &status), 0);
+    return status.st_mode & 0777;
+}
+
+// Whatever the umask permits, entries are private.
+static void test_modes(void **state)
+{
+    (void)state;
+    mode_t before = umask(0);
+    store(key);
+    umask(before);
+    char *path = cache_entry_path(key), *cache = cache_folder_path();
+    assert_int_equal(mode_of(path), 0600);
+    assert_int_equal(mode_of(cache), 0700);
+    assert_int_equal(chdir(cache), 0);
+    assert_int_equal(mode_of("hash-key"), 0600);
+    free(path);
+    free(cache);
+}
+
+static void load_twice(void *result)
+{
+    *(bool *)result = loads(key);
+    *(bool *)result |= loads(key);
+}
+
+static void store_and_list(void *result)
+{
+    store(key);
+    MessageList messages = {0};
+    CacheEntries entries;
+    *(bool *)result = cache_list(&entries, &messages) || cache_clear(&messages);
+}
+
+// Loads nothing, and warns once: in a process of its own, as this one must not have warned yet.
+static void assert_refused(const char *reason)
+{
+    bool loaded = true;
+    ChildEnd end = child_run(load_twice, &loaded, sizeof loaded);
+    assert_int_equal(end.status, 0);
+    assert_false(loaded);
+    if (!strstr(end.errors, reason)) print_error("%s", end.errors);
+    assert_non_null(strstr(end.errors, reason));
+    assert_null(strstr(strchr(end.errors, '\n'), "warning"));
+}
+
+// An entry that others may have written is not loaded, and replaced.
+static void test_entry_others_may_access(void **state)
+{
+    (void)state;
+    static const mode_t modes[] = {0620, 0602, 0644};
+    char *path = cache_entry_path(key);
+    for (size_t i = 0; i < sizeof modes / sizeof *modes; i++) {
+        store(key);
+        assert_int_equal(chmod(path, modes[i]), 0);
+        assert_refused("others may access it");
+        store(key);
+        assert_true(loads(key));
+        assert_int_equal(mode_of(path), 0600);
+    }
+    free(path);
+}
+
+// Nothing is loaded from a folder that is not the user's own, or stored in it.
+static void test_folder_of_others(void **state)
+{
+    (void)state;
+    char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
+    assert_true(asprintf(&moved, "%s/moved", folder) > 0);
+    for (int kind = 0; kind < 3; kind++) {
+        store(key);
+        assert_true(loads(key));
+        if (kind == 0) {
+            assert_int_equal(chmod(cache, 0770), 0);
+        } else if (kind == 1) {
+            assert_int_equal(rename(cache, moved), 0);
+            assert_int_equal(symlink(moved, cache), 0);
+        } else if (geteuid() == 0) {
+            assert_int_equal(chown(cache, 65534, 65534), 0);
+        } else {
+            continue;
+        }
+        static const char *const reasons[] = {"others may access it", "a symbolic link", "of another user"};
+        assert_refused(reasons[kind]);
+        assert_int_equal(unlink(path), 0);
+        bool used = true;
+        assert_int_equal(child_run(store_and_list, &used, sizeof used).status, 0);
+        assert_false(used);
+        assert_int_equal(access(path, F_OK), -1);
+        if (kind == 0) {
+            assert_int_equal(chmod(cache, 0700), 0);
+        } else if (kind == 1) {
+            assert_int_equal(unlink(cache), 0);
+            assert_int_equal(rename(moved, cache), 0);
+        }
+    }
+    free(path);
+    free(cache);
+    free(moved);
+}
+
+// Entries are worth nothing without the key of their hash; a key that others may know is replaced.
+static void test_key_of_the_hash(void **state)
+{
+    (void)state;
+    char *cache = cache_folder_path();
+    store(key);
+    assert_int_equal(chdir(cache), 0);
+    assert_int_equal(chmod("hash-key", 0640), 0);
+    assert_refused("the key of its hash cannot be read");
+    store("another key");
+    assert_true(loads("another key"));
+    assert_refused("damaged"); // written with the earlier key
+    assert_int_equal(truncate("hash-key", 31), 0);
+    store(key);
+    assert_true(loads(key));
+    assert_int_equal(mode_of("hash-key"), 0600);
+    free(cache);
+}
+
+// A file of 20 GB without contents is not read, and goes first.
+static void test_too_large(void **state)
+{
+    (void)state;
+    store(key);
+    store("another key");
+    char *path = cache_entry_path(key);
+    assert_int_equal(truncate(path, (off_t)20 << 30), 0);
+    assert_refused("larger than the limit");
+    entry_set_used(key, 1u << 31);
+    cache_trim(CACHE_BYTES_MAX);
+    assert_int_equal(access(path, F_OK), -1);
+    assert_true(loads("another key"));
+
+    Text binary = {0};
+    array_reserve(binary, CACHE_ENTRY_BYTES_MAX);
+    binary.count = CACHE_ENTRY_BYTES_MAX;
+    cache_store(key, &binary);
+    assert_int_equal(access(path, F_OK), -1);
+    binary.count = 0;
+    text_free(&binary);
+    free(path);
+}
+
+// Four processes on an empty cache make one key of the hash: what each stores, all load.
+static void test_race_on_an_empty_cache(void **state)
+{
+    (void)state;
+    enum { PROCESSES = 4, ROUNDS = 20 };
+    for (int round = 0; round < ROUNDS; round++) {
+        char keys[PROCESSES][16];
+        pid_t children[PROCESSES];
+        for (int i = 0; i < PROCESSES; i++) {
+            snprintf(keys[i], sizeof keys[i], "key %d", i);
+            children[i] = fork();
+            if (children[i] == 0) {
+                store(keys[i]);
+                _exit(loads(keys[i]) ? 0 : 1);
+            }
+        }
+        for (int i = 0; i < PROCESSES; i++) {
+            int status;
+            assert_int_equal(waitpid(children[i], &status, 0), children[i]);
+            assert_int_equal(status, 0);
+        }
+        for (int i = 0; i < PROCESSES; i++)
+            assert_true(loads(keys[i]));
+        MessageList messages = {0};
+        assert_true(cache_clear(&messages));
+    }
+}
+
+static void test_list(void **state)
+{
+    (void)state;
+    static const char described[] = "options x\nlaunch render 8x1\ndevice y, z\n";
+    MessageList messages = {0};
+    CacheEntries entries;
+    assert_true(cache_list(&entries, &messages));
+    assert_int_equal(entries.count, 0);
+    store(key);
+    store(described);
+    entry_set_used(described, 1000);
+    char *path = cache_entry_path(key);
+    file_write(path, machine_code, CODE_LENGTH);
+    assert_true(cache_list(&entries, &messages));
+    assert_int_equal(entries.count, 2);
+    assert_null(entries.items[0].fault);
+    assert_string_equal(entries.items[0].device, "y");
+    assert_string_equal(entries.items[1].fault, "damaged");
+    assert_string_equal(entries.items[1].name, strrchr(path, '/') + 1);
+    assert_int_equal(entries.size, entries.items[0].size + CODE_LENGTH);
+    cache_entries_free(&entries);
+    assert_true(cache_clear(&messages));
+    assert_true(cache_list(&entries, &messages));
+    assert_int_equal(entries.count, 0);
+    assert_int_equal(messages.count, 0);
+    free(path);
 }
 
 // Each byte changed, each shorter length, one byte more; then repaired by storing again.
@@ -247,14 +459,6 @@ static void test_many_processes(void **state)
     assert_true(loads(key));
 }
 
-static void entry_set_used(const char *entry_key, time_t when)
-{
-    char *path = cache_entry_path(entry_key);
-    const struct timespec moments[2] = {{when, 0}, {when, 0}};
-    assert_int_equal(utimensat(AT_FDCWD, path, moments, 0), 0);
-    free(path);
-}
-
 // What was used last stays, whenever it was stored.
 static void test_trim(void **state)
 {
@@ -271,24 +475,24 @@ static void test_trim(void **state)
     assert_int_equal(stat(path, &status), 0);
     *strrchr(path, '/') = '\0';
     uint64_t size = (uint64_t)status.st_size;
-    cache_trim(path, KEY_COUNT * size);
+    cache_trim(KEY_COUNT * size);
     for (int i = 1; i < KEY_COUNT; i++) {
         char *kept = cache_entry_path(keys[i]);
         assert_int_equal(access(kept, F_OK), 0);
         free(kept);
     }
-    cache_trim(path, 2 * size + size / 2);
+    cache_trim(2 * size + size / 2);
     assert_false(loads("key b"));
     assert_false(loads("key c"));
     assert_true(loads("key d"));
     assert_true(loads("key a"));
     static const char *const others[] = {"notes", "0123456789abcdef.txt", "0123456789abcdef.bin.old"};
-    static const char left_over[] = ".0123456789abcdef.bin.a1b2c3";
+    static const char left_over[] = ".0123456789abcdef.bin.glint-0";
     int cache = open(path, O_RDONLY | O_DIRECTORY);
     for (size_t i = 0; i < 3; i++)
         close(openat(cache, others[i], O_CREAT | O_WRONLY, 0600));
     close(openat(cache, left_over, O_CREAT | O_WRONLY, 0600));
-    cache_trim(path, 0);
+    cache_trim(0);
     assert_false(loads("key a"));
     assert_int_equal(faccessat(cache, left_over, F_OK, 0), -1);
     for (size_t i = 0; i < 3; i++) {
@@ -296,7 +500,6 @@ static void test_trim(void **state)
         assert_int_equal(unlinkat(cache, others[i], 0), 0);
     }
     close(cache);
-    cache_trim("/nowhere/at/all", 0);
     free(path);
 }
 
@@ -304,6 +507,13 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_store_and_load, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_modes, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_others_may_access, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_folder_of_others, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_key_of_the_hash, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_too_large, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_race_on_an_empty_cache, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_list, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_of_another_key, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_without_rights, set_up, tear_down),

@@ -198,7 +198,7 @@ static int find_entry(const char *path, const struct stat *status, int kind, str
     return 1;
 }
 
-// The one entry of the cache; `key` gets its key, which lies behind a header of 40 bytes with its length
+// The one entry of the cache; `key` gets its key, which lies behind a header of 64 bytes with its length
 // at 16.
 static Text the_entry(char **key)
 {
@@ -210,7 +210,7 @@ static Text the_entry(char **key)
     assert_true(text_read_file(&entry, entry_path_found, &messages));
     uint64_t key_length;
     memcpy(&key_length, entry.items + 16, sizeof key_length);
-    *key = strndup(entry.items + 40, key_length);
+    *key = strndup(entry.items + 64, key_length);
     return entry;
 }
 

@@ -9,3 +9,4 @@ int command_diff(int argument_count, char **arguments);
 int command_bench(int argument_count, char **arguments);
 int command_accuracy(int argument_count, char **arguments);
 int command_verify(int argument_count, char **arguments);
+int command_cache(int argument_count, char **arguments);

@@ -1,5 +1,6 @@
 // An entry is a CacheHeader, the key without its NUL, and the binary. Numbers are in native byte order, as
-// the binary is for this machine.
+// the binary is for this machine. All files are opened relative to the open folder, so that none can be
+// exchanged between check and use.
 #include "host/opencl/cache.h"
 
 #include "host/base/array.h"
@@ -7,191 +8,400 @@
 #include "host/base/memory.h"
 #include "host/base/output.h"
 #include <dirent.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 static const char cache_magic[8] = "glintprg";
-static const uint64_t cache_format = 1;
+static const uint64_t cache_format = 2;
+
+enum { TAG_BYTES = crypto_generichash_BYTES, SECRET_BYTES = crypto_generichash_KEYBYTES };
 
 typedef struct {
     char magic[8];
     uint64_t format, key_length, binary_length;
-    uint64_t checksum; // of the fields above, the key and the binary
+    unsigned char tag[TAG_BYTES]; // of the fields above, the key and the binary
 } CacheHeader;
 
-static CacheHeader entry_header(const char *key, const void *binary, size_t binary_length)
+typedef struct {
+    unsigned char bytes[SECRET_BYTES];
+} Secret;
+
+static CacheHeader header_of(uint64_t key_length, uint64_t binary_length)
 {
-    CacheHeader header = {.format = cache_format, .key_length = strlen(key), .binary_length = binary_length};
+    CacheHeader header = {.format = cache_format, .key_length = key_length, .binary_length = binary_length};
     memcpy(header.magic, cache_magic, sizeof header.magic);
-    header.checksum = hash_bytes(HASH_START, &header, offsetof(CacheHeader, checksum));
-    header.checksum = hash_bytes(header.checksum, key, header.key_length);
-    header.checksum = hash_bytes(header.checksum, binary, binary_length);
     return header;
 }
 
-char *cache_entry_path(const char *key)
+static void entry_tag(unsigned char *tag, const Secret *secret, const CacheHeader *header, const char *key,
+                      const char *binary)
+{
+    crypto_generichash_state state;
+    crypto_generichash_init(&state, secret->bytes, sizeof secret->bytes, TAG_BYTES);
+    crypto_generichash_update(&state, (const unsigned char *)header, offsetof(CacheHeader, tag));
+    crypto_generichash_update(&state, (const unsigned char *)key, header->key_length);
+    crypto_generichash_update(&state, (const unsigned char *)binary, header->binary_length);
+    crypto_generichash_final(&state, tag, TAG_BYTES);
+}
+
+char *cache_folder_path(void)
 {
     const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
     bool has_cache = cache && cache[0] == '/', has_home = home && home[0] == '/';
     if (!has_cache && !has_home) return NULL;
     Text path = {0};
-    text_appendf(&path, "%s%s/glint/%016" PRIx64 ".bin", has_cache ? cache : home, has_cache ? "" : "/.cache",
-                 hash_bytes(HASH_START, key, strlen(key)));
-    char *copy = memory_copy_text(text_c(&path));
-    text_free(&path);
-    return copy;
+    text_appendf(&path, "%s%s/glint", has_cache ? cache : home, has_cache ? "" : "/.cache");
+    return path.items;
 }
 
-// Creates every folder above the entry, private to its owner (XDG Base Directory Specification 0.8,
-// "Referencing this specification"). A failure shows when the entry is written.
-static void make_folders(const char *path)
+typedef struct {
+    char text[24];
+} EntryName;
+
+static EntryName entry_name(const char *key)
 {
-    char *folder = memory_copy_text(path);
-    for (char *slash = strchr(folder + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
+    EntryName name;
+    snprintf(name.text, sizeof name.text, "%016" PRIx64 ".bin", hash_bytes(HASH_START, key, strlen(key)));
+    return name;
+}
+
+char *cache_entry_path(const char *key)
+{
+    char *folder = cache_folder_path();
+    if (!folder) return NULL;
+    Text path = {0};
+    text_appendf(&path, "%s/%s", folder, entry_name(key).text);
+    free(folder);
+    return path.items;
+}
+
+// Why a file or folder cannot be trusted; NULL: it can.
+static const char *distrust(const struct stat *status, mode_t type)
+{
+    if ((status->st_mode & S_IFMT) != type) return type == S_IFDIR ? "not a folder" : "not a regular file";
+    if (status->st_uid != geteuid()) return "of another user";
+    if ((status->st_mode & 077) != 0) return "others may access it";
+    return NULL;
+}
+
+// Creates the folder and every one above it, private to their owner (XDG Base Directory Specification 0.8,
+// "Referencing this specification"). A failure shows when the folder is opened.
+static void make_folders(char *path)
+{
+    for (char *slash = strchr(path + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
         *slash = '\0';
-        mkdir(folder, 0700);
+        mkdir(path, 0700);
         *slash = '/';
     }
-    free(folder);
+    mkdir(path, 0700);
 }
 
-static bool entry_open(const Text *entry, const char *key, Text *binary)
+// -1 without a folder, with a message if there is one that cannot be trusted.
+static int folder_open(bool makes, MessageList *messages)
 {
-    CacheHeader header;
-    size_t key_length = strlen(key), before = sizeof header + key_length;
-    if (entry->count < before) return false;
-    const char *bytes = entry->items + before;
-    size_t length = entry->count - before;
-    header = entry_header(key, bytes, length);
-    if (memcmp(entry->items, &header, sizeof header) != 0) return false;
-    if (memcmp(entry->items + sizeof header, key, key_length) != 0) return false;
-    text_append(binary, bytes, length);
-    return true;
-}
-
-// Loaded code is executed: only regular files of the user are read, and opening never blocks.
-static bool is_own_file(const struct stat *status)
-{
-    return S_ISREG(status->st_mode) && status->st_uid == geteuid();
-}
-
-static bool entry_read(Text *entry, const char *path)
-{
-    int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
-    if (descriptor < 0) return false;
+    char *path = cache_folder_path();
+    if (!path) return -1;
+    if (makes) make_folders(path);
     struct stat status;
-    bool is_own = fstat(descriptor, &status) == 0 && is_own_file(&status);
-    FILE *file = is_own ? fdopen(descriptor, "rb") : NULL;
+    const char *why = NULL;
+    int folder = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (folder >= 0 && fstat(folder, &status) == 0)
+        why = distrust(&status, S_IFDIR);
+    else if (lstat(path, &status) == 0 && S_ISLNK(status.st_mode))
+        why = "a symbolic link";
+    if (why) {
+        message_add(messages, MESSAGE_WARNING, "the kernel cache '%s' is not used: %s", path, why);
+        if (folder >= 0) close(folder);
+        folder = -1;
+    }
+    free(path);
+    return folder;
+}
+
+static const char absent[] = "absent";
+
+// Reads a file of the folder. Returns why it cannot be trusted, `absent` without one; NULL: it can. Opening
+// never blocks.
+static const char *file_read(Text *content, int folder, const char *name, uint64_t bytes_max)
+{
+    int descriptor = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+    if (descriptor < 0)
+        return errno == ENOENT ? absent : errno == ELOOP ? "a symbolic link" : "it cannot be opened";
+    struct stat status;
+    const char *why = fstat(descriptor, &status) == 0 ? distrust(&status, S_IFREG) : "it has no status";
+    if (!why && (uint64_t)status.st_size > bytes_max) why = "larger than the limit";
+    FILE *file = why ? NULL : fdopen(descriptor, "rb");
     if (!file) {
         close(descriptor);
-        return false;
+        return why ? why : "it cannot be opened";
     }
     MessageList ignored = {0};
-    bool read = text_read_open_file(entry, file, path, &ignored);
+    if (!text_read_open_file(content, file, name, &ignored)) why = "it cannot be read";
     message_list_free(&ignored);
     fclose(file);
-    return read;
+    return why;
+}
+
+static const char secret_name[] = "hash-key";
+
+static const char *secret_read(Secret *secret, int folder)
+{
+    Text content = {0};
+    const char *why = file_read(&content, folder, secret_name, SECRET_BYTES);
+    if (!why && content.count != SECRET_BYTES) why = "not as long as it should be";
+    if (!why) memcpy(secret->bytes, content.items, SECRET_BYTES);
+    text_free(&content);
+    return why;
+}
+
+// Reads the hash's key, or replaces one that is absent or cannot be trusted.
+static bool secret_make(Secret *secret, int folder)
+{
+    int locked = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (locked < 0) return false;
+    flock(locked, LOCK_EX); // one process makes it; without locks another's entries may be lost
+    bool has_secret = secret_read(secret, folder) == NULL;
+    if (!has_secret && getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES) {
+        MessageList ignored = {0};
+        OutputFile output;
+        has_secret = output_open_private(&output, folder, secret_name, &ignored) &&
+                     output_write(&output, secret->bytes, SECRET_BYTES, &ignored) &&
+                     output_commit(&output, &ignored);
+        message_list_free(&ignored);
+    }
+    close(locked);
+    return has_secret;
+}
+
+typedef struct {
+    Text content;
+    const char *key, *binary; // into the content; not terminated
+    size_t key_length, binary_length;
+} Entry;
+
+// Returns why the entry cannot be trusted, `absent` for one that an other version wrote; NULL: it can.
+static const char *entry_read(Entry *entry, int folder, const char *name)
+{
+    *entry = (Entry){0};
+    Text *content = &entry->content;
+    const char *why = file_read(content, folder, name, CACHE_ENTRY_BYTES_MAX);
+    if (why) return why;
+    static const char damaged[] = "damaged";
+    CacheHeader header, expected;
+    if (content->count < sizeof header) return damaged;
+    memcpy(&header, content->items, sizeof header);
+    size_t rest = content->count - sizeof header;
+    if (memcmp(header.magic, cache_magic, sizeof header.magic) != 0 || header.key_length > rest)
+        return damaged;
+    if (header.format != cache_format) return absent;
+    entry->key = content->items + sizeof header;
+    entry->key_length = header.key_length;
+    entry->binary = entry->key + header.key_length;
+    entry->binary_length = rest - header.key_length;
+    expected = header_of(entry->key_length, entry->binary_length);
+    Secret secret;
+    if (secret_read(&secret, folder) != NULL) return "the key of its hash cannot be read";
+    entry_tag(expected.tag, &secret, &expected, entry->key, entry->binary);
+    return memcmp(&header, &expected, sizeof header) == 0 ? NULL : damaged;
+}
+
+// At most one warning per process.
+static void warnings_print(MessageList *messages)
+{
+    static bool is_printed;
+    if (messages->count > 0 && !is_printed) {
+        message_list_print(messages, stderr);
+        is_printed = true;
+    }
+    message_list_free(messages);
 }
 
 bool cache_load(const char *key, Text *binary)
 {
-    char *path = cache_entry_path(key);
-    if (!path) return false;
-    Text entry = {0};
-    bool found = entry_read(&entry, path) && entry_open(&entry, key, binary);
-    if (found) utimensat(AT_FDCWD, path, NULL, 0); // most recently used
-    text_free(&entry);
-    free(path);
+    MessageList messages = {0};
+    int folder = folder_open(false, &messages);
+    bool found = false;
+    if (folder >= 0) {
+        EntryName name = entry_name(key);
+        Entry entry;
+        const char *why = entry_read(&entry, folder, name.text);
+        found = !why && entry.key_length == strlen(key) && memcmp(entry.key, key, entry.key_length) == 0;
+        if (found) {
+            text_append(binary, entry.binary, entry.binary_length);
+            utimensat(folder, name.text, NULL, 0); // most recently used
+        } else if (why && why != absent) {
+            char *path = cache_entry_path(key);
+            message_add(&messages, MESSAGE_WARNING, "the cached kernel '%s' is not used: %s", path, why);
+            free(path);
+        }
+        text_free(&entry.content);
+        close(folder);
+    }
+    warnings_print(&messages);
     return found;
 }
 
-typedef struct {
-    char *name;
-    struct timespec used;
-    uint64_t size;
-} CacheFile;
-
-typedef struct {
-    CacheFile *items;
-    size_t count, capacity;
-    uint64_t size;
-} CacheFiles;
-
-static int file_compare(const void *a, const void *b)
+static int entries_compare(const void *a, const void *b)
 {
-    const struct timespec *first = &((const CacheFile *)a)->used, *second = &((const CacheFile *)b)->used;
+    const struct timespec *first = &((const CacheEntry *)a)->used, *second = &((const CacheEntry *)b)->used;
     if (first->tv_sec != second->tv_sec) return first->tv_sec < second->tv_sec ? -1 : 1;
     return first->tv_nsec < second->tv_nsec ? -1 : first->tv_nsec > second->tv_nsec;
 }
 
-// Whether it names an entry, or the temporary that a killed process left: other files are not ours.
-static bool is_entry_name(const char *name)
+static const char ending[] = ".bin";
+enum { ENTRY_NAME_LENGTH = 16 + sizeof ending - 1 };
+
+static bool starts_with_entry_name(const char *name)
 {
-    static const char ending[] = ".bin";
-    bool temporary = *name == '.';
-    name += temporary;
-    if (strspn(name, "0123456789abcdef") != 16 || strncmp(name + 16, ending, strlen(ending)) != 0)
-        return false;
-    const char *rest = name + 16 + strlen(ending);
-    return temporary ? *rest == '.' && strlen(rest) == strlen(".XXXXXX") : *rest == '\0';
+    return strspn(name, "0123456789abcdef") == 16 && strncmp(name + 16, ending, strlen(ending)) == 0;
 }
 
-static void files_list(CacheFiles *files, DIR *folder)
+// Whether it is the temporary of an entry, of which a killed process may leave some.
+static bool is_temporary(const char *name)
 {
-    for (const struct dirent *item; (item = readdir(folder)) != NULL;) {
+    if (name[0] != '.' || !starts_with_entry_name(name + 1)) return false;
+    char *entry = memory_copy_text(name + 1);
+    entry[ENTRY_NAME_LENGTH] = '\0';
+    bool is_of_entry = output_is_temporary(name, entry);
+    free(entry);
+    return is_of_entry;
+}
+
+// Lists the entries, the least recently used first, and removes stale temporaries; other files are not ours.
+static CacheEntries entries_list(int folder)
+{
+    CacheEntries entries = {0};
+    int descriptor = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *items = descriptor < 0 ? NULL : fdopendir(descriptor);
+    if (!items) return entries;
+    for (const struct dirent *item; (item = readdir(items)) != NULL;) {
         struct stat status;
-        if (!is_entry_name(item->d_name)) continue;
-        if (fstatat(dirfd(folder), item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
-        if (!S_ISREG(status.st_mode)) continue;
-        uint64_t size = (uint64_t)status.st_size;
-        array_push(*files, ((CacheFile){memory_copy_text(item->d_name), status.st_mtim, size}));
-        files->size += size;
+        if (is_temporary(item->d_name)) output_remove_stale(folder, item->d_name);
+        if (!starts_with_entry_name(item->d_name) || item->d_name[ENTRY_NAME_LENGTH] != '\0') continue;
+        if (fstatat(folder, item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
+        if (S_ISDIR(status.st_mode)) continue;
+        array_push(entries, ((CacheEntry){.name = memory_copy_text(item->d_name),
+                                          .size = (uint64_t)status.st_size,
+                                          .used = status.st_mtim}));
+        entries.size += (uint64_t)status.st_size;
     }
+    closedir(items);
+    if (entries.count > 0) qsort(entries.items, entries.count, sizeof *entries.items, entries_compare);
+    return entries;
 }
 
-void cache_trim(const char *folder, uint64_t bytes_max)
+void cache_entries_free(CacheEntries *entries)
 {
-    DIR *open_folder = opendir(folder);
-    if (!open_folder) return;
-    CacheFiles files = {0};
-    files_list(&files, open_folder);
-    if (files.size > bytes_max) qsort(files.items, files.count, sizeof *files.items, file_compare);
-    for (size_t i = 0; i < files.count; i++) {
-        if (files.size > bytes_max) {
-            unlinkat(dirfd(open_folder), files.items[i].name, 0);
-            files.size -= files.items[i].size;
-        }
-        free(files.items[i].name);
+    for (size_t i = 0; i < entries->count; i++) {
+        free(entries->items[i].name);
+        free(entries->items[i].device);
     }
-    free(files.items);
-    closedir(open_folder);
+    free(entries->items);
+    *entries = (CacheEntries){0};
+}
+
+// Removes, too, what is too large to be loaded.
+static void folder_trim(int folder, uint64_t bytes_max)
+{
+    CacheEntries entries = entries_list(folder);
+    uint64_t left = entries.size;
+    for (size_t i = 0; i < entries.count; i++)
+        if (entries.items[i].size > CACHE_ENTRY_BYTES_MAX) left -= entries.items[i].size;
+    for (size_t i = 0; i < entries.count; i++) {
+        bool is_too_large = entries.items[i].size > CACHE_ENTRY_BYTES_MAX;
+        if (left <= bytes_max && !is_too_large) continue;
+        unlinkat(folder, entries.items[i].name, 0);
+        if (!is_too_large) left -= entries.items[i].size;
+    }
+    cache_entries_free(&entries);
+}
+
+void cache_trim(uint64_t bytes_max)
+{
+    MessageList messages = {0};
+    int folder = folder_open(false, &messages);
+    if (folder >= 0) {
+        folder_trim(folder, bytes_max);
+        close(folder);
+    }
+    warnings_print(&messages);
+}
+
+static bool entry_write(OutputFile *output, const CacheHeader *header, const char *key, const Text *binary,
+                        MessageList *messages)
+{
+    return output_write(output, header, sizeof *header, messages) &&
+           output_write(output, key, header->key_length, messages) &&
+           output_write(output, binary->items, binary->count, messages) && output_commit(output, messages);
 }
 
 void cache_store(const char *key, const Text *binary)
 {
-    char *path = cache_entry_path(key);
-    if (!path) return;
-    make_folders(path);
-    struct stat status;
-    bool is_own = lstat(path, &status) == 0 && is_own_file(&status);
-    if (!is_own || access(path, R_OK | W_OK) != 0) unlink(path); // output_open would refuse it
-    CacheHeader header = entry_header(key, binary->items, binary->count);
-    MessageList ignored = {0};
-    OutputFile output;
-    if (output_open(&output, path, &ignored)) {
-        if (output_write(&output, &header, sizeof header, &ignored) &&
-            output_write(&output, key, header.key_length, &ignored) &&
-            output_write(&output, binary->items, binary->count, &ignored))
-            output_commit(&output, &ignored);
-        else
+    CacheHeader header = header_of(strlen(key), binary->count);
+    if (sizeof header + header.key_length + header.binary_length > CACHE_ENTRY_BYTES_MAX) return;
+    MessageList messages = {0}, ignored = {0};
+    int folder = folder_open(true, &messages);
+    Secret secret;
+    if (folder >= 0 && secret_make(&secret, folder)) {
+        entry_tag(header.tag, &secret, &header, key, text_c(binary));
+        OutputFile output;
+        if (output_open_private(&output, folder, entry_name(key).text, &ignored) &&
+            !entry_write(&output, &header, key, binary, &ignored))
             output_abandon(&output);
+        folder_trim(folder, CACHE_BYTES_MAX);
     }
+    if (folder >= 0) close(folder);
     message_list_free(&ignored);
-    *strrchr(path, '/') = '\0';
-    cache_trim(path, CACHE_BYTES_MAX);
-    free(path);
+    warnings_print(&messages);
+}
+
+static void entry_describe(CacheEntry *entry, int folder)
+{
+    Entry read;
+    entry->fault = entry_read(&read, folder, entry->name);
+    if (entry->fault == absent) entry->fault = "of another version";
+    if (!entry->fault) {
+        char *key = memory_allocate(read.key_length + 1, 1);
+        memcpy(key, read.key, read.key_length);
+        key[read.key_length] = '\0';
+        static const char start[] = "\ndevice ";
+        char *device = strstr(key, start);
+        if (device) {
+            device += strlen(start);
+            device[strcspn(device, ",\n")] = '\0';
+        }
+        entry->device = memory_copy_text(device ? device : "");
+        free(key);
+    }
+    text_free(&read.content);
+}
+
+bool cache_list(CacheEntries *entries, MessageList *messages)
+{
+    *entries = (CacheEntries){0};
+    int folder = folder_open(false, messages);
+    if (folder < 0) return messages->count == 0;
+    *entries = entries_list(folder);
+    for (size_t i = 0; i < entries->count; i++)
+        entry_describe(&entries->items[i], folder);
+    close(folder);
+    return true;
+}
+
+bool cache_clear(MessageList *messages)
+{
+    int folder = folder_open(false, messages);
+    if (folder < 0) return messages->count == 0;
+    folder_trim(folder, 0);
+    unlinkat(folder, secret_name, 0);
+    close(folder);
+    return true;
 }

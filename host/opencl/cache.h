@@ -1,22 +1,49 @@
 // Compiled programs on disk, in $XDG_CACHE_HOME/glint, else $HOME/.cache/glint; a path that is not absolute
 // is ignored, as the XDG Base Directory Specification requires (0.8, "Basics"); without either there is no
 // cache. An entry is named by the hash of its key and contains the whole key, so that keys are never
-// confused. Safe with many processes: entries are written beside their target and renamed. Nothing here is an
-// error: what cannot be read is absent, what cannot be written is discarded.
+// confused. Safe with many processes: entries are written beside their target and renamed.
+//
+// What is loaded is machine code. The folder and its files are used only if they belong to the user and
+// nobody else may access them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a
+// file of the folder). Nothing here is an error: what cannot be trusted is absent, with one warning per
+// process, and replaced where the folder can be trusted; what cannot be written is discarded.
 #pragma once
 
 #include "host/base/text.h"
 #include <stdint.h>
+#include <time.h>
 
-// Fills `binary`, which must be empty. False without an entry; a damaged one, one of another user and one
-// that is not a regular file are ignored.
+// Fills `binary`, which must be empty. False without an entry that can be trusted.
 bool cache_load(const char *key, Text *binary);
-// Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX.
+// Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX. A larger one than CACHE_ENTRY_BYTES_MAX
+// is discarded.
 void cache_store(const char *key, const Text *binary);
 
-enum { CACHE_BYTES_MAX = 128 << 20 }; // several hundred programs
+enum { CACHE_BYTES_MAX = 128 << 20, CACHE_ENTRY_BYTES_MAX = 32 << 20 }; // several hundred programs
 // Removes the least recently used entries until at most `bytes_max` are left.
-void cache_trim(const char *folder, uint64_t bytes_max);
+void cache_trim(uint64_t bytes_max);
 
-// The path of the key's entry, which the caller frees; NULL: no cache.
+typedef struct {
+    char *name;        // of the file
+    char *device;      // from the entry's key; NULL with a fault
+    const char *fault; // why the entry is not trusted; NULL: it is
+    uint64_t size;
+    struct timespec used;
+} CacheEntry;
+
+typedef struct {
+    CacheEntry *items; // the least recently used first
+    size_t count, capacity;
+    uint64_t size;
+} CacheEntries;
+
+// Lists and checks all entries; without a folder there are none. False, with a message, if the folder cannot
+// be trusted.
+bool cache_list(CacheEntries *entries, MessageList *messages);
+void cache_entries_free(CacheEntries *entries);
+// Removes all entries and the hash's key. False as cache_list.
+bool cache_clear(MessageList *messages);
+
+// The folder and the path of the key's entry, which the caller frees; NULL: no cache.
+char *cache_folder_path(void);
 char *cache_entry_path(const char *key);

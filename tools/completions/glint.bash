@@ -13,6 +13,7 @@ _glint_options() {
     accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
         "--perturb --device --lenient -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --lean --json -h --help" ;;
+    cache) echo "--clear -h --help" ;;
     *) echo "--version --help" ;;
     esac
 }
@@ -21,7 +22,7 @@ _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
     if [ "$COMP_CWORD" -eq 1 ]; then
-        mapfile -t COMPREPLY < <(compgen -W "render trace check devices diff bench accuracy verify $(_glint_options)" -- "$word")
+        mapfile -t COMPREPLY < <(compgen -W "render trace check devices diff bench accuracy verify cache $(_glint_options)" -- "$word")
         return
     fi
     # bash splits --option=value into three words.

@@ -69,6 +69,12 @@ _glint_verify() {
         '(- *)'{-h,--help}'[list the options]'
 }
 
+_glint_cache() {
+    _arguments \
+        '--clear[remove all programs]' \
+        '(- *)'{-h,--help}'[list the options]'
+}
+
 _glint_diff() {
     _arguments \
         '--heatmap[image of the differences]:image:_files -g "*.(png|ppm|exr|npy)"' \
@@ -125,6 +131,7 @@ _glint() {
         'bench:benchmark scenes on this device'
         'accuracy:report time and error of every configuration'
         'verify:run the hard cases on a device'
+        'cache:list, check or empty the kernel cache'
     )
     if ((CURRENT == 2)); then
         _describe -o option "('--version:print the version' '--help:list the subcommands')"

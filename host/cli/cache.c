@@ -1,0 +1,83 @@
+// glint cache: the kernel cache, listed and checked, or emptied.
+#include "host/opencl/cache.h"
+#include "host/base/fault.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { OPTION_CLEAR = OPTION_OWN };
+
+static const struct option long_options[] = {
+    {"clear", no_argument, NULL, OPTION_CLEAR},
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] = "usage: glint cache [OPTIONS]\n\n"
+                                "Lists and checks the programs of the kernel cache, the least recently used "
+                                "first.\nExit status 3: one is damaged or not private.\n\n"
+                                "      --clear           remove them all\n" //
+    HELP_HELP;
+
+static const double mebi = 1024 * 1024;
+
+// Returns whether all entries can be trusted.
+static bool entries_print(const CacheEntries *entries)
+{
+    bool trusted = true;
+    for (size_t i = 0; i < entries->count; i++) {
+        const CacheEntry *entry = &entries->items[i];
+        char used[32] = "?";
+        struct tm local;
+        if (localtime_r(&entry->used.tv_sec, &local)) strftime(used, sizeof used, "%Y-%m-%d %H:%M", &local);
+        printf("  %s  %7.2f MiB  %s  %s%s\n", entry->name, (double)entry->size / mebi, used,
+               entry->fault ? "not used: " : "", entry->fault ? entry->fault : entry->device);
+        trusted = trusted && !entry->fault;
+    }
+    return trusted;
+}
+
+static int cache_print(const char *folder)
+{
+    MessageList messages = {0};
+    CacheEntries entries;
+    int status = EXIT_USER;
+    if (cache_list(&entries, &messages)) {
+        printf("%s: %zu programs, %.1f of at most %.0f MiB\n", folder, entries.count,
+               (double)entries.size / mebi, CACHE_BYTES_MAX / mebi);
+        status = entries_print(&entries) ? EXIT_DONE : EXIT_CHECK;
+        cache_entries_free(&entries);
+    }
+    messages_print(&messages, NULL);
+    return status;
+}
+
+int command_cache(int argument_count, char **arguments)
+{
+    bool clears = false;
+    int option;
+    while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
+        if (option == 'h') return option_help(help_text);
+        if (option == '?') return EXIT_USER;
+        clears = true;
+    }
+    if (optind != argument_count) return option_usage_fault("cache", "takes no arguments");
+    char *folder = cache_folder_path();
+    if (!folder) {
+        fputs("glint: there is no kernel cache: neither XDG_CACHE_HOME nor HOME is an absolute path\n",
+              stderr);
+        return EXIT_USER;
+    }
+    int status = EXIT_DONE;
+    if (clears) {
+        MessageList messages = {0};
+        status = cache_clear(&messages) ? EXIT_DONE : EXIT_USER;
+        messages_print(&messages, NULL);
+    } else {
+        status = cache_print(folder);
+    }
+    free(folder);
+    return status;
+}
