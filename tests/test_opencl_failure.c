@@ -355,7 +355,7 @@ static void test_builds(void **state)
     free(cache);
 }
 
-// A list without the devices that cannot be described, and a message where none is left.
+// The list says which call failed first, and so does the message where no device is left.
 static void test_discovery(void **state)
 {
     (void)state;
@@ -370,8 +370,12 @@ static void test_discovery(void **state)
             device_list_open(&list);
             const Device *chosen = device_choose(&list, NULL, &messages);
             assert_int_equal(messages.count, chosen == NULL);
-            if (messages.count > 0 && list.count == 0)
-                assert_non_null(strstr(messages.items[0].text, queries[i]));
+            if (injected.call) assert_string_equal(list.failed_call, queries[i]);
+            if (messages.count > 0) {
+                char failure[64];
+                snprintf(failure, sizeof failure, "(%s: CL_OUT_OF_RESOURCES (-5))", queries[i]);
+                assert_non_null(strstr(messages.items[0].text, failure));
+            }
             message_list_free(&messages);
             device_list_close(&list);
             if (!injected.call) {
@@ -382,6 +386,30 @@ static void test_discovery(void **state)
         }
     }
     injected.call = NULL;
+}
+
+// A device whose memory is unknown has room until a buffer cannot be created.
+static void test_unknown_memory(void **state)
+{
+    (void)state;
+    const Device *known = device;
+    Device unknown = *device;
+    unknown.memory_bytes = unknown.largest_buffer_bytes = 0;
+    device = &unknown;
+    assert_work_is_right();
+    injected.call = "clCreateBuffer";
+    injected.index = 0;
+    memset(counts, 0, sizeof counts);
+    Compute compute;
+    Answer answer;
+    assert_false(work(&compute, &answer));
+    char *text = compute_failure_text(&compute);
+    assert_non_null(strstr(text, "the device does not report its memory"));
+    assert_null(strstr(text, "0.0 MiB"));
+    free(text);
+    compute_close_checked(&compute);
+    injected.call = NULL;
+    device = known;
 }
 
 static int set_up(void **state)
@@ -465,7 +493,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_needed_calls),      cmocka_unit_test(test_needed_objects),
         cmocka_unit_test(test_dispensable_calls), cmocka_unit_test(test_builds),
-        cmocka_unit_test(test_empty_build_log),   cmocka_unit_test(test_discovery)};
+        cmocka_unit_test(test_empty_build_log),   cmocka_unit_test(test_discovery), cmocka_unit_test(test_unknown_memory)};
     int failed = cmocka_run_group_tests(command_tests, NULL, NULL);
     return cmocka_run_group_tests(tests, set_up, tear_down) + failed;
 }

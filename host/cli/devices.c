@@ -84,7 +84,9 @@ typedef struct {
 static void size_append(Text *text, uint64_t bytes)
 {
     double mebi = (double)bytes / (1024.0 * 1024.0);
-    if (mebi < 1024)
+    if (bytes == 0)
+        text_appendf(text, "unknown");
+    else if (mebi < 1024)
         text_appendf(text, "%.0f MiB", mebi);
     else
         text_appendf(text, "%.1f GiB", mebi / 1024);
@@ -163,9 +165,12 @@ int command_devices(int argument_count, char **arguments)
         devices_print_json(&list, chosen);
     else if (list.count > 0)
         devices_print_table(&list, chosen);
+    char *failure = device_list_failure_text(&list);
+    if (chosen && failure) message_add(&messages, MESSAGE_WARNING, "%s", failure);
     message_list_print(&messages, stderr);
     message_list_free(&messages);
-    int status = list.count > 0 ? EXIT_DONE : EXIT_USER;
+    int status = chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
+    free(failure);
     device_list_close(&list);
     return status;
 }

@@ -43,12 +43,17 @@ static void arithmetic_measure(Peak *peak, Compute *compute, cl_kernel kernel, u
     buffer_release(results);
 }
 
+// A limit of 0 is unknown.
+static uint64_t limited(uint64_t size, uint64_t limit)
+{
+    return limit > 0 && size > limit ? limit : size;
+}
+
 static void copy_measure(Peak *peak, Compute *compute, cl_kernel kernel)
 {
     const Device *device = compute->device;
-    uint64_t size = COPY_BYTES_MAX;
-    if (size > device->largest_buffer_bytes / 4) size = device->largest_buffer_bytes / 4;
-    if (size > device->memory_bytes / 16) size = device->memory_bytes / 16;
+    uint64_t size =
+        limited(limited(COPY_BYTES_MAX, device->largest_buffer_bytes / 4), device->memory_bytes / 16);
     size_t items = (size_t)size / COPY_BYTES_OF_ITEM, bytes = items * COPY_BYTES_OF_ITEM;
     cl_mem buffers[2];
     for (cl_uint i = 0; i < 2; i++)

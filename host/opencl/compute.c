@@ -87,10 +87,14 @@ static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_m
     if (status != CL_SUCCESS || !buffer) {
         const Device *device = compute->device;
         const double mebi = 1024.0 * 1024.0;
-        compute_fail(compute, "clCreateBuffer", status,
-                     "%.1f MiB requested; the device has %.1f MiB, at most %.1f MiB in one buffer",
-                     (double)size / mebi, (double)device->memory_bytes / mebi,
-                     (double)device->largest_buffer_bytes / mebi);
+        if (device->memory_bytes > 0 && device->largest_buffer_bytes > 0)
+            compute_fail(compute, "clCreateBuffer", status,
+                         "%.1f MiB requested; the device has %.1f MiB, at most %.1f MiB in one buffer",
+                         (double)size / mebi, (double)device->memory_bytes / mebi,
+                         (double)device->largest_buffer_bytes / mebi);
+        else
+            compute_fail(compute, "clCreateBuffer", status,
+                         "%.1f MiB requested; the device does not report its memory", (double)size / mebi);
         return NULL;
     }
     return buffer;

@@ -10,42 +10,67 @@
 #include <string.h>
 #include <strings.h>
 
-static char *platform_text(cl_platform_id platform, cl_platform_info what)
+// Whether a call succeeded; keeps the first failure. No device and no platform is none, and neither is a
+// property that the runtime does not know (CL_INVALID_VALUE), such as the format of double without fp64.
+static bool list_check(DeviceList *list, cl_int status, const char *call)
+{
+    bool is_absent = status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR ||
+                     status == CL_INVALID_VALUE;
+    if (status != CL_SUCCESS && !is_absent && !list->failed_call) {
+        list->failed_call = call;
+        list->failed_status = status;
+    }
+    return status == CL_SUCCESS;
+}
+
+static bool device_query(DeviceList *list, cl_device_id id, cl_device_info what, size_t size, void *value,
+                         size_t *needed)
+{
+    return list_check(list, clGetDeviceInfo(id, what, size, value, needed), "clGetDeviceInfo");
+}
+
+static bool platform_query(DeviceList *list, cl_platform_id platform, cl_platform_info what, size_t size,
+                           void *value, size_t *needed)
+{
+    return list_check(list, clGetPlatformInfo(platform, what, size, value, needed), "clGetPlatformInfo");
+}
+
+static char *platform_text(DeviceList *list, cl_platform_id platform, cl_platform_info what)
 {
     size_t size = 0;
-    if (clGetPlatformInfo(platform, what, 0, NULL, &size) != CL_SUCCESS) size = 0;
+    if (!platform_query(list, platform, what, 0, NULL, &size)) size = 0;
     char *text = memory_allocate_zeroed(size + 1, 1);
-    if (size > 0 && clGetPlatformInfo(platform, what, size, text, NULL) != CL_SUCCESS) text[0] = '\0';
+    if (size > 0 && !platform_query(list, platform, what, size, text, NULL)) text[0] = '\0';
     return text;
 }
 
-static char *device_text(cl_device_id id, cl_device_info what)
+static char *device_text(DeviceList *list, cl_device_id id, cl_device_info what)
 {
     size_t size = 0;
-    if (clGetDeviceInfo(id, what, 0, NULL, &size) != CL_SUCCESS) size = 0;
+    if (!device_query(list, id, what, 0, NULL, &size)) size = 0;
     char *text = memory_allocate_zeroed(size + 1, 1);
-    if (size > 0 && clGetDeviceInfo(id, what, size, text, NULL) != CL_SUCCESS) text[0] = '\0';
+    if (size > 0 && !device_query(list, id, what, size, text, NULL)) text[0] = '\0';
     return text;
 }
 
 // The same for numbers: `value` is zero before, and after a failure.
-#define device_number(id, what, value)                                                                       \
+#define device_number(list, id, what, value)                                                                       \
     do {                                                                                                     \
-        if (clGetDeviceInfo((id), (what), sizeof *(value), (value), NULL) != CL_SUCCESS) *(value) = 0;       \
+        if (!device_query((list), (id), (what), sizeof *(value), (value), NULL)) *(value) = 0;       \
     } while (0)
 
 // The first three of up to eight dimensions.
-static void device_sides(cl_device_id id, size_t longest[3])
+static void device_sides(DeviceList *list, cl_device_id id, size_t longest[3])
 {
     size_t sides[8] = {0};
-    if (clGetDeviceInfo(id, CL_DEVICE_MAX_WORK_ITEM_SIZES, sizeof sides, sides, NULL) != CL_SUCCESS) return;
+    if (!device_query(list, id, CL_DEVICE_MAX_WORK_ITEM_SIZES, sizeof sides, sides, NULL)) return;
     memcpy(longest, sides, 3 * sizeof *sides);
 }
 
-static bool device_flag(cl_device_id id, cl_device_info what)
+static bool device_flag(DeviceList *list, cl_device_id id, cl_device_info what)
 {
     cl_bool flag = CL_FALSE;
-    device_number(id, what, &flag);
+    device_number(list, id, what, &flag);
     return flag != CL_FALSE;
 }
 
@@ -60,53 +85,53 @@ static bool extensions_have(const char *extensions, const char *name)
     return false;
 }
 
-static void device_describe(Device *device)
+static void device_describe(DeviceList *list, Device *device)
 {
     cl_device_id id = device->id;
-    device->platform_name = platform_text(device->platform, CL_PLATFORM_NAME);
-    device->platform_version = platform_text(device->platform, CL_PLATFORM_VERSION);
-    device->name = device_text(id, CL_DEVICE_NAME);
-    device->vendor = device_text(id, CL_DEVICE_VENDOR);
-    device->version = device_text(id, CL_DEVICE_VERSION);
-    device->driver = device_text(id, CL_DRIVER_VERSION);
-    device->extensions = device_text(id, CL_DEVICE_EXTENSIONS);
+    device->platform_name = platform_text(list, device->platform, CL_PLATFORM_NAME);
+    device->platform_version = platform_text(list, device->platform, CL_PLATFORM_VERSION);
+    device->name = device_text(list, id, CL_DEVICE_NAME);
+    device->vendor = device_text(list, id, CL_DEVICE_VENDOR);
+    device->version = device_text(list, id, CL_DEVICE_VERSION);
+    device->driver = device_text(list, id, CL_DRIVER_VERSION);
+    device->extensions = device_text(list, id, CL_DEVICE_EXTENSIONS);
 
-    device_number(id, CL_DEVICE_TYPE, &device->type);
-    device_number(id, CL_DEVICE_MAX_COMPUTE_UNITS, &device->compute_units);
-    device_number(id, CL_DEVICE_MAX_CLOCK_FREQUENCY, &device->clock_mhz);
-    device_number(id, CL_DEVICE_MAX_WORK_GROUP_SIZE, &device->largest_work_group);
-    device_sides(id, device->longest_group_sides);
-    device_number(id, CL_DEVICE_GLOBAL_MEM_SIZE, &device->memory_bytes);
-    device_number(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE, &device->largest_buffer_bytes);
-    device_number(id, CL_DEVICE_LOCAL_MEM_SIZE, &device->local_memory_bytes);
+    device_number(list, id, CL_DEVICE_TYPE, &device->type);
+    device_number(list, id, CL_DEVICE_MAX_COMPUTE_UNITS, &device->compute_units);
+    device_number(list, id, CL_DEVICE_MAX_CLOCK_FREQUENCY, &device->clock_mhz);
+    device_number(list, id, CL_DEVICE_MAX_WORK_GROUP_SIZE, &device->largest_work_group);
+    device_sides(list, id, device->longest_group_sides);
+    device_number(list, id, CL_DEVICE_GLOBAL_MEM_SIZE, &device->memory_bytes);
+    device_number(list, id, CL_DEVICE_MAX_MEM_ALLOC_SIZE, &device->largest_buffer_bytes);
+    device_number(list, id, CL_DEVICE_LOCAL_MEM_SIZE, &device->local_memory_bytes);
 
     size_t timer_nanoseconds = 0;
-    device_number(id, CL_DEVICE_PROFILING_TIMER_RESOLUTION, &timer_nanoseconds);
+    device_number(list, id, CL_DEVICE_PROFILING_TIMER_RESOLUTION, &timer_nanoseconds);
     device->timer_resolution_seconds = 1e-9 * (double)timer_nanoseconds;
 
     cl_device_fp_config fp32 = 0, fp64 = 0;
-    device_number(id, CL_DEVICE_SINGLE_FP_CONFIG, &fp32);
-    device_number(id, CL_DEVICE_DOUBLE_FP_CONFIG, &fp64);
+    device_number(list, id, CL_DEVICE_SINGLE_FP_CONFIG, &fp32);
+    device_number(list, id, CL_DEVICE_DOUBLE_FP_CONFIG, &fp64);
     device->denormals = (fp32 & CL_FP_DENORM) != 0;
     device->fma_in_hardware = (fp32 & CL_FP_FMA) != 0;
     device->correctly_rounded = (fp32 & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
     device->fp64 = fp64 != 0 || extensions_have(device->extensions, "cl_khr_fp64");
 
-    device_number(id, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, &device->native_float_width);
+    device_number(list, id, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, &device->native_float_width);
     if (device->native_float_width == 0) device->native_float_width = 1;
-    device_number(id, CL_DEVICE_NATIVE_VECTOR_WIDTH_DOUBLE, &device->native_double_width);
+    device_number(list, id, CL_DEVICE_NATIVE_VECTOR_WIDTH_DOUBLE, &device->native_double_width);
     if (!device->fp64) device->native_double_width = 0;
     if (device->fp64 && device->native_double_width == 0) device->native_double_width = 1;
 
-    device->compiler = device_flag(id, CL_DEVICE_COMPILER_AVAILABLE);
-    device->available = device_flag(id, CL_DEVICE_AVAILABLE);
-    device->little_endian = device_flag(id, CL_DEVICE_ENDIAN_LITTLE);
+    device->compiler = device_flag(list, id, CL_DEVICE_COMPILER_AVAILABLE);
+    device->available = device_flag(list, id, CL_DEVICE_AVAILABLE);
+    device->little_endian = device_flag(list, id, CL_DEVICE_ENDIAN_LITTLE);
 }
 
 static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device_id id)
 {
     Device device = {.platform = platform, .id = id, .index = (unsigned)list->count};
-    device_describe(&device);
+    device_describe(list, &device);
     for (size_t i = 0; i < list->count; i++) {
         const Device *other = &list->items[i];
         if (other->platform == platform && strcmp(other->name, device.name) == 0) device.same_name_index++;
@@ -120,17 +145,6 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
 static void pocl_compile_once(void)
 {
     setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", false);
-}
-
-// Whether a call that counts or lists platforms or devices succeeded; keeps the first failure.
-static bool list_check(DeviceList *list, cl_int status, const char *call)
-{
-    bool is_empty = status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR;
-    if (status != CL_SUCCESS && !is_empty && !list->failed_call) {
-        list->failed_call = call;
-        list->failed_status = status;
-    }
-    return status == CL_SUCCESS;
 }
 
 // The platform's devices, which the caller frees.
@@ -256,39 +270,42 @@ static bool selector_is_index(const DeviceList *list, const char *selector, size
     return *index < list->count;
 }
 
+char *device_list_failure_text(const DeviceList *list)
+{
+    Text failure = {0};
+    if (list->failed_call)
+        text_appendf(&failure, "%s: %s (%d)", list->failed_call, cl_status_name(list->failed_status),
+                     list->failed_status);
+    return failure.items;
+}
+
 static void report_no_match(const DeviceList *list, const char *selector, MessageList *messages)
 {
-    if (list->count == 0) {
-        Text failure = {0};
-        if (list->failed_call)
-            text_appendf(&failure, " (%s: %s (%d))", list->failed_call, cl_status_name(list->failed_status),
-                         list->failed_status);
-        message_add(
-            messages, MESSAGE_ERROR,
-            "no OpenCL device on %u platforms%s; PoCL runs on any CPU: `apt install pocl-opencl-icd` on "
-            "Debian and Ubuntu%s",
-            list->platform_count, text_c(&failure),
-            list->platform_count == 0 ? ""
-                                      : "; if it is installed, its cache needs a writable folder: set HOME, "
-                                        "XDG_CACHE_HOME or POCL_CACHE_DIR");
-        text_free(&failure);
-        return;
+    char *failure = device_list_failure_text(list);
+    Text text = {0};
+    if (list->count > 0) {
+        text_appendf(&text, "no usable device");
+        if (selector) text_appendf(&text, " matches \"%s\"", selector);
+    } else {
+        text_appendf(&text, "no OpenCL device on %u platforms", list->platform_count);
     }
-    Text devices = {0};
+    if (failure) text_appendf(&text, " (%s)", failure);
     for (size_t i = 0; i < list->count; i++) {
         const Device *device = &list->items[i];
         const char *why;
-        text_appendf(&devices, "%s%u (%s, %s", i ? "; " : "", device->index, device->name,
+        text_appendf(&text, "%s%u (%s, %s", i ? "; " : "; there are: ", device->index, device->name,
                      device_type_name(device->type));
-        if (!device_usable(device, &why)) text_appendf(&devices, ", unusable: %s", why);
-        text_append(&devices, ")", 1);
+        if (!device_usable(device, &why)) text_appendf(&text, ", unusable: %s", why);
+        text_append(&text, ")", 1);
     }
-    if (selector)
-        message_add(messages, MESSAGE_ERROR, "no usable device matches \"%s\"; there are: %s", selector,
-                    text_c(&devices));
-    else
-        message_add(messages, MESSAGE_ERROR, "no usable device; there are: %s", text_c(&devices));
-    text_free(&devices);
+    if (list->count == 0)
+        text_appendf(&text, "; PoCL runs on any CPU: `apt install pocl-opencl-icd` on Debian and Ubuntu");
+    if (list->count == 0 && list->platform_count > 0)
+        text_appendf(&text, "; if it is installed, its cache needs a writable folder: set HOME, XDG_CACHE_HOME "
+                            "or POCL_CACHE_DIR");
+    message_add(messages, MESSAGE_ERROR, "%s", text_c(&text));
+    text_free(&text);
+    free(failure);
 }
 
 const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages)

@@ -18,7 +18,7 @@ typedef struct {
     char *extensions;
     unsigned compute_units, clock_mhz;
     unsigned native_float_width, native_double_width; // at least 1; double 0 without fp64
-    uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes;
+    uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes; // 0: unknown
     size_t largest_work_group, longest_group_sides[3];
     double timer_resolution_seconds;
     bool fp64, denormals, fma_in_hardware;
@@ -30,7 +30,7 @@ typedef struct {
     Device *items;
     size_t count, capacity;
     unsigned platform_count, empty_platform_count; // empty: without a device, which is no error
-    const char *failed_call; // the first call that found no devices because it failed, or NULL
+    const char *failed_call; // the first call that failed, or NULL
     cl_int failed_status;
 } DeviceList;
 
@@ -38,6 +38,8 @@ typedef struct {
 // POCL_WORK_GROUP_SPECIALIZATION unless it is set.
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
+// "CALL: STATUS (CODE)", or NULL if no call failed. Caller frees.
+char *device_list_failure_text(const DeviceList *list);
 
 // `selector`: an index, a part of the device's or platform's name (any case; a number only as a whole),
 // "cpu", "gpu", or NULL for the default: a GPU if there is one, else a CPU, else any device. Considers only

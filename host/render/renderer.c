@@ -40,7 +40,8 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
     return true;
 }
 
-// False with a message where the arrays exceed the memory that the device reports.
+// False with a message where the arrays exceed the memory that the device reports; if it does not, buffers
+// fail when they are created.
 static bool device_has_room(const CompiledScene *compiled, const Device *device, bool is_double,
                             MessageList *messages)
 {
@@ -50,7 +51,8 @@ static bool device_has_room(const CompiledScene *compiled, const Device *device,
         sum += size;
         if (size > largest) largest = size;
     }
-    if (sum <= device->memory_bytes && largest <= device->largest_buffer_bytes) return true;
+    bool is_known = device->memory_bytes > 0 && device->largest_buffer_bytes > 0;
+    if (!is_known || (sum <= device->memory_bytes && largest <= device->largest_buffer_bytes)) return true;
     const double mebi = 1024.0 * 1024.0;
     message_add(messages, MESSAGE_ERROR,
                 "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
