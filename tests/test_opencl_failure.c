@@ -11,7 +11,9 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <unistd.h>
 #include <cmocka.h>
 
 static struct {
@@ -261,22 +263,26 @@ static void calls_fail(const char *call, bool returns_null, bool is_needed)
 static void test_needed_calls(void **state)
 {
     (void)state;
-    static const char *const needed[] = {"clCreateContext",
-                                         "clCreateCommandQueue",
-                                         "clCreateBuffer",
-                                         "clSetMemObjectDestructorCallback",
-                                         "clCreateKernel",
-                                         "clSetKernelArg",
-                                         "clFinish",
-                                         "clEnqueueWriteBuffer",
-                                         "clEnqueueReadBuffer",
-                                         "clEnqueueMapBuffer",
-                                         "clGetEventInfo",
-                                         "clEnqueueUnmapMemObject",
-                                         "clEnqueueNDRangeKernel",
-                                         "clWaitForEvents"};
+    static const char *const needed[] = {
+        "clCreateContext",     "clCreateCommandQueue", "clCreateBuffer", "clSetMemObjectDestructorCallback",
+        "clCreateKernel",      "clSetKernelArg",       "clFinish",       "clEnqueueWriteBuffer",
+        "clEnqueueReadBuffer", "clEnqueueMapBuffer",   "clGetEventInfo", "clEnqueueNDRangeKernel",
+        "clWaitForEvents"};
     for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
         calls_fail(needed[i], false, true);
+    assert_work_is_right();
+}
+
+// Needed where a launch follows; the last two, of the trace, come after all results.
+static void test_unmaps(void **state)
+{
+    (void)state;
+    static const char call[] = "clEnqueueUnmapMemObject";
+    assert_work_is_right();
+    size_t count = counted(call)->count;
+    assert_true(count > 2);
+    for (size_t i = 0; i < count; i++)
+        call_fail(call, i, false, i + 2 < count);
     assert_work_is_right();
 }
 
@@ -486,14 +492,34 @@ static void test_commands(void **state)
         }
 }
 
+// An image that is complete is written whatever a release says.
+static void test_release_after_the_output(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/glint-test-XXXXXX.png";
+    assert_true(close(mkstemps(path, 4)) == 0);
+    Command command = {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", path}};
+    failing_call = "clEnqueueUnmapMemObject";
+    ChildEnd end = child_run(command_fail, &command, sizeof command);
+    static const char expected[] = "glint: warning: clEnqueueUnmapMemObject: CL_OUT_OF_RESOURCES (-5) on ";
+    assert_memory_equal(end.errors, expected, strlen(expected));
+    assert_int_equal(end.status, EXIT_DONE);
+    struct stat status;
+    assert_int_equal(stat(path, &status), 0);
+    assert_true(status.st_size > 0);
+    unlink(path);
+}
+
 int main(void)
 {
     // each command is a process of its own, and forks before this one has opened a device
-    const struct CMUnitTest command_tests[] = {cmocka_unit_test(test_commands)};
+    const struct CMUnitTest command_tests[] = {cmocka_unit_test(test_commands),
+                                               cmocka_unit_test(test_release_after_the_output)};
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_needed_calls),      cmocka_unit_test(test_needed_objects),
-        cmocka_unit_test(test_dispensable_calls), cmocka_unit_test(test_builds),
-        cmocka_unit_test(test_empty_build_log),   cmocka_unit_test(test_discovery), cmocka_unit_test(test_unknown_memory)};
+        cmocka_unit_test(test_needed_calls),   cmocka_unit_test(test_unmaps),
+        cmocka_unit_test(test_needed_objects), cmocka_unit_test(test_dispensable_calls),
+        cmocka_unit_test(test_builds),         cmocka_unit_test(test_empty_build_log),
+        cmocka_unit_test(test_discovery),      cmocka_unit_test(test_unknown_memory)};
     int failed = cmocka_run_group_tests(command_tests, NULL, NULL);
     return cmocka_run_group_tests(tests, set_up, tear_down) + failed;
 }

@@ -233,6 +233,9 @@ bool device_open(OpenDevice *open, const char *selector)
 int device_close(OpenDevice *open, int status)
 {
     Compute *compute = &open->compute;
+    char *unmap_failure = compute_unmap_failure_text(compute);
+    if (compute_ok(compute) && unmap_failure) fprintf(stderr, "glint: warning: %s\n", unmap_failure);
+    free(unmap_failure);
     if (!compute_ok(compute)) {
         char *failure = compute_failure_text(compute);
         fprintf(stderr, "glint: %s\n", failure);

@@ -63,9 +63,15 @@ bool compute_check_object(Compute *compute, const void *object, cl_int status, c
     return compute_ok(compute);
 }
 
-char *compute_failure_text(const Compute *compute)
+void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped)
 {
-    const ComputeFailure *failure = &compute->failure;
+    cl_int status = clEnqueueUnmapMemObject(compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL);
+    if (status != CL_SUCCESS && compute->unmap_failure.status == CL_SUCCESS)
+        compute->unmap_failure = (ComputeFailure){.call = "clEnqueueUnmapMemObject", .status = status};
+}
+
+static char *failure_text(const Compute *compute, const ComputeFailure *failure)
+{
     Text text = {0};
     text_appendf(&text, "%s: ", failure->call);
     if (failure->status == CL_SUCCESS)
@@ -75,6 +81,16 @@ char *compute_failure_text(const Compute *compute)
     text_appendf(&text, " on %s", compute->device->name);
     if (failure->detail) text_appendf(&text, ": %s", failure->detail);
     return text.items;
+}
+
+char *compute_failure_text(const Compute *compute)
+{
+    return failure_text(compute, &compute->failure);
+}
+
+char *compute_unmap_failure_text(const Compute *compute)
+{
+    return compute->unmap_failure.status ? failure_text(compute, &compute->unmap_failure) : NULL;
 }
 
 // OpenCL 1.2 takes the bytes as a pointer to non-const, and only reads them here (section 5.2.1).

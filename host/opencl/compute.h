@@ -17,8 +17,9 @@ typedef struct {
 typedef struct {
     const Device *device; // outlives the Compute
     cl_context context;
-    cl_command_queue queue; // in order, profiling on
-    ComputeFailure failure; // the first
+    cl_command_queue queue;       // in order, profiling on
+    ComputeFailure failure;       // the first
+    ComputeFailure unmap_failure; // the first of an unmap; a failure of the Compute at the next launch
 } Compute;
 
 // False: it failed. Closed by compute_close either way.
@@ -40,8 +41,12 @@ bool compute_check(Compute *compute, cl_int status, const char *call);
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call);
 void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
     __attribute__((format(printf, 4, 5)));
+// Unmaps a buffer that was only read. A failure matters only if a launch follows, which could write to it.
+void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped);
 // "CALL: STATUS (CODE) on DEVICE: detail", after a failure. Caller frees.
 char *compute_failure_text(const Compute *compute);
+// The same for an unmap that failed with no launch after it; NULL: none did. Caller frees.
+char *compute_unmap_failure_text(const Compute *compute);
 
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"

@@ -14,8 +14,8 @@
 // property that the runtime does not know (CL_INVALID_VALUE), such as the format of double without fp64.
 static bool list_check(DeviceList *list, cl_int status, const char *call)
 {
-    bool is_absent = status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR ||
-                     status == CL_INVALID_VALUE;
+    bool is_absent =
+        status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR || status == CL_INVALID_VALUE;
     if (status != CL_SUCCESS && !is_absent && !list->failed_call) {
         list->failed_call = call;
         list->failed_status = status;
@@ -54,9 +54,9 @@ static char *device_text(DeviceList *list, cl_device_id id, cl_device_info what)
 }
 
 // The same for numbers: `value` is zero before, and after a failure.
-#define device_number(list, id, what, value)                                                                       \
+#define device_number(list, id, what, value)                                                                 \
     do {                                                                                                     \
-        if (!device_query((list), (id), (what), sizeof *(value), (value), NULL)) *(value) = 0;       \
+        if (!device_query((list), (id), (what), sizeof *(value), (value), NULL)) *(value) = 0;               \
     } while (0)
 
 // The first three of up to eight dimensions.
@@ -301,8 +301,9 @@ static void report_no_match(const DeviceList *list, const char *selector, Messag
     if (list->count == 0)
         text_appendf(&text, "; PoCL runs on any CPU: `apt install pocl-opencl-icd` on Debian and Ubuntu");
     if (list->count == 0 && list->platform_count > 0)
-        text_appendf(&text, "; if it is installed, its cache needs a writable folder: set HOME, XDG_CACHE_HOME "
-                            "or POCL_CACHE_DIR");
+        text_appendf(&text,
+                     "; if it is installed, its cache needs a writable folder: set HOME, XDG_CACHE_HOME "
+                     "or POCL_CACHE_DIR");
     message_add(messages, MESSAGE_ERROR, "%s", text_c(&text));
     text_free(&text);
     free(failure);

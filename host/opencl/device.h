@@ -17,7 +17,7 @@ typedef struct {
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
     unsigned compute_units, clock_mhz;
-    unsigned native_float_width, native_double_width; // at least 1; double 0 without fp64
+    unsigned native_float_width, native_double_width;                // at least 1; double 0 without fp64
     uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes; // 0: unknown
     size_t largest_work_group, longest_group_sides[3];
     double timer_resolution_seconds;
@@ -30,7 +30,7 @@ typedef struct {
     Device *items;
     size_t count, capacity;
     unsigned platform_count, empty_platform_count; // empty: without a device, which is no error
-    const char *failed_call; // the first call that failed, or NULL
+    const char *failed_call;                       // the first call that failed, or NULL
     cl_int failed_status;
 } DeviceList;
 

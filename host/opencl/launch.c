@@ -92,7 +92,8 @@ static void work_group_fit_kernel(const Device *device, cl_kernel kernel, cl_uin
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
                          const size_t *group)
 {
-    if (!compute_ok(compute)) return (LaunchTime){0};
+    if (!compute_check(compute, compute->unmap_failure.status, compute->unmap_failure.call))
+        return (LaunchTime){0};
     size_t global[3], local[3];
     for (cl_uint i = 0; i < dimensions; i++)
         local[i] = group ? group[i] : 1;

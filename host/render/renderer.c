@@ -240,10 +240,7 @@ void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
 
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped)
 {
-    if (!mapped) return;
-    cl_int status =
-        clEnqueueUnmapMemObject(renderer->compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL);
-    compute_check(renderer->compute, status, "clEnqueueUnmapMemObject");
+    if (mapped) compute_unmap(renderer->compute, buffer, mapped);
 }
 
 const RenderReport *renderer_report(const Renderer *renderer)
