@@ -2,6 +2,7 @@
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
+#include "host/cli/progress.h"
 #include "host/cli/version.h"
 #include <errno.h>
 #include <signal.h>
@@ -74,6 +75,7 @@ int main(int argument_count, char **arguments)
     // a failed write is reported like a full disk, and no partial output is left
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
+    progress_catch_signals();
     int status = command_run(argument_count, arguments);
     // a report that did not get out whole must not look like one that did
     if (fflush(stdout) == 0 && !ferror(stdout)) return status;

@@ -211,6 +211,27 @@ class Failures(CliTestCase):
                 self.assertEqual(read("long.png"), "an earlier image")
                 self.nothing_left("long.png.*")
 
+    def test_signals_before_the_render(self):
+        """A signal while the scene is read ends glint like later ones; one that is ignored stays ignored."""
+        os.mkfifo("slow.yaml")
+        command = [PROGRAM, *f"render slow.yaml {SMALL} -o slow.png".split()]
+        for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:
+            for ignored in False, True:
+                with self.subTest(number=number, ignored=ignored):
+                    before = signal.signal(number, signal.SIG_IGN if ignored else signal.SIG_DFL)
+                    render = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+                    signal.signal(number, before)
+                    with open("slow.yaml", "w", encoding="utf-8") as scene:  # waits until glint reads
+                        render.send_signal(number)
+                        if ignored:
+                            scene.write(SPHERE)
+                        else:
+                            render.wait(timeout=120)
+                    errors = render.communicate(timeout=120)[1]
+                    self.assertEqual(render.returncode, 0 if ignored else 130, errors)
+                    self.assertEqual(errors, "" if ignored else "glint: interrupted\n")
+        self.nothing_left("slow.png.*")
+
     def test_scene_files_are_not_overwritten(self):
         write("globe.png", "P3 1 1 255 9 9 9\n")
         write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")

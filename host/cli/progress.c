@@ -1,18 +1,36 @@
 #include "host/cli/progress.h"
 
 #include "host/base/clock.h"
+#include "host/base/fault.h"
 #include <signal.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t interrupted;
+static volatile sig_atomic_t interrupted, is_flag_read;
 
 // Two often arrive together, for the process and its group; a third means the user insists.
 static void interrupt_note(int signal_number)
 {
+    if (!is_flag_read) {
+        static const char text[] = "glint: interrupted\n";
+        ssize_t ignored = write(STDERR_FILENO, text, sizeof text - 1);
+        (void)ignored;
+        _exit(EXIT_INTERRUPTED);
+    }
     if (interrupted) signal(signal_number, SIG_DFL);
     interrupted = 1;
+}
+
+void progress_catch_signals(void)
+{
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    const struct sigaction action = {.sa_handler = interrupt_note};
+    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++) {
+        struct sigaction before;
+        if (sigaction(signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            sigaction(signals[i], &action, NULL);
+    }
 }
 
 void progress_open(Progress *progress, bool quiet)
@@ -20,13 +38,7 @@ void progress_open(Progress *progress, bool quiet)
     double now = clock_seconds();
     *progress =
         (Progress){.visible = !quiet && isatty(STDERR_FILENO), .start_seconds = now, .shown_seconds = now};
-    const struct sigaction action = {.sa_handler = interrupt_note};
-    struct sigaction before;
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    // nohup ignores it
-    if (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
-        sigaction(SIGHUP, &action, NULL);
+    is_flag_read = 1;
 }
 
 void progress_show(Progress *progress, double fraction_done)
