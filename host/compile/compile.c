@@ -12,7 +12,8 @@ const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
 {
-    if (!lights_fit(compiled, scene, settings, messages) || !textures_load(compiled, scene, messages))
+    if (!lights_fit(compiled, scene, settings, messages) ||
+        !textures_load(compiled, scene, settings, messages))
         return false;
     const bool is_double = settings->precision == PRECISION_DOUBLE;
     const Rounding rounding = {settings->shift_to_eye ? scene->camera.position : (Vector3){0}, is_double};

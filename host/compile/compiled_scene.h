@@ -34,7 +34,7 @@ typedef enum {
 } FlatKind;
 
 // A texture's full size, and its levels in FLAT_TEXTURE_LEVELS.
-typedef struct {
+typedef struct CompiledTexture {
     uint32_t width, height, first_level, level_count;
 } CompiledTexture;
 

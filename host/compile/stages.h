@@ -18,7 +18,8 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
 // textures.c: reads the scene's images, makes them linear (display values are sRGB; a scene of display colors
 // takes all values as they are) and halves them level by level: FLAT_TEXTURE_LEVELS, FLAT_TEXELS and
 // `textures`. False with a message, at the place in the scene file, where an image cannot be used.
-bool textures_load(CompiledScene *compiled, const Scene *scene, MessageList *messages);
+bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                   MessageList *messages);
 
 // objects.c, materials.c, lights.c: the arrays of each shape, FLAT_TRIANGLE_NORMALS, FLAT_TRIANGLE_UVS,
 // FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS.

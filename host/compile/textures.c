@@ -158,10 +158,15 @@ static void levels_flatten(CompiledScene *compiled, const LevelList *list)
     }
 }
 
-bool textures_load(CompiledScene *compiled, const Scene *scene, MessageList *messages)
+bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                   MessageList *messages)
 {
     LevelList list = {0};
     compiled->textures = memory_allocate_zeroed(scene->textures.count + 1, sizeof *compiled->textures);
+    if (settings->textures) {
+        memcpy(compiled->textures, settings->textures, scene->textures.count * sizeof *compiled->textures);
+        return true;
+    }
     bool done = true;
     for (size_t i = 0; i < scene->textures.count && done; i++)
         done = texture_add(&list, &compiled->textures[i], scene, &scene->textures.items[i], messages);

@@ -1,11 +1,14 @@
 // Renders the region band by band. Each launch is short, so that a desktop stays responsive and an interrupt
 // takes effect soon; memory is that of a band.
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/render/pace.h"
 #include "host/render/renderer_state.h"
-#include "host/render/sample_pattern.h"
+#include <math.h>
 #include <stdlib.h>
+
+static const double PASS_SECONDS = 0.1; // of renderer_accumulate, about
 
 enum {
     BAND_BYTES_MAX = 4 << 20, // color and shadow, the one layer that grows with the lights
@@ -41,7 +44,7 @@ static size_t group_side(const Renderer *renderer)
 // The device buffers a band is rendered into.
 typedef struct {
     uint32_t rows;
-    cl_mem offsets, ray_counts, compensation, layers[LAYER_COUNT];
+    cl_mem ray_counts, compensation, layers[LAYER_COUNT];
 } BandBuffers;
 
 // The film of these rows, without its layers.
@@ -67,7 +70,6 @@ static bool layer_in(unsigned layers, Layer layer)
 
 static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, uint32_t rows)
 {
-    const uint32_t sample_count = renderer->settings.sample_count;
     const Film film = film_of_rows(renderer, 0, rows);
     // a kernel fills all of its layers, but computes shadows only on request
     unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & AOVS_OF_PATH);
@@ -79,15 +81,10 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
     }
     buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
-    void *offsets = sample_pattern(sample_count, renderer->report.is_double);
-    buffers->offsets =
-        buffer_create(renderer->compute, 2 * sample_count * film.real_size, offsets, CL_MEM_READ_ONLY);
-    free(offsets);
 }
 
 static void buffers_close(BandBuffers *buffers)
 {
-    buffer_release(buffers->offsets);
     buffer_release(buffers->ray_counts);
     buffer_release(buffers->compensation);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
@@ -138,7 +135,7 @@ static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRo
                           uint32_t last)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &buffers->offsets);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &renderer->offsets);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->compensation);
     band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
@@ -178,20 +175,34 @@ static void *lengths_restored(const Renderer *renderer, void *lengths, size_t co
     return restored;
 }
 
-static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigned aovs, BandRows rows,
-                         BandSink sink, void *context)
+// Where a band goes: to a BandSink, or to a PassSink with its number of samples.
+typedef struct {
+    BandSink sink;
+    PassSink pass_sink;
+    uint32_t samples;
+    void *context;
+} Delivery;
+
+static bool deliver(const Delivery *delivery, const Film *band, double fraction_done)
+{
+    return delivery->sink ? delivery->sink(delivery->context, band, fraction_done)
+                          : delivery->pass_sink(delivery->context, band, delivery->samples);
+}
+
+static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigned layers, BandRows rows,
+                         const Delivery *delivery)
 {
     Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
     void *mapped[LAYER_COUNT] = {NULL};
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         size_t size = film_layer_size(&band, layer);
-        if (!layer_in(aovs | AOV_COLOR, layer) || size == 0) continue;
+        if (!layer_in(layers, layer) || size == 0) continue;
         band.layers[layer] = mapped[layer] = renderer_map(renderer, buffers->layers[layer], size);
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
             band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
     }
     double done = (double)(rows.first_row + rows.row_count) / renderer->settings.region_height;
-    bool go_on = compute_ok(renderer->compute) && sink(context, &band, done);
+    bool go_on = compute_ok(renderer->compute) && deliver(delivery, &band, done);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
         renderer_unmap(renderer, buffers->layers[layer], mapped[layer]);
@@ -214,11 +225,11 @@ static uint32_t rows_min(const Renderer *renderer)
     return (wanted + of_row - 1) / of_row * rows_step(renderer);
 }
 
-static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t most)
+static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t sample_count, uint32_t most)
 {
     const RenderSettings *settings = &renderer->settings;
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
-    uint64_t row_samples = (uint64_t)settings->region_width * settings->sample_count;
+    uint64_t row_samples = (uint64_t)settings->region_width * sample_count;
     uint64_t rows = pace_band_samples(pace) / row_samples;
     uint32_t least = rows_min(renderer);
     if (rows < least) rows = least;
@@ -239,36 +250,127 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
 
+// Samples first..end-1 of a band, in launches of the pace. False: failed or stopped.
+static bool band_sample(Renderer *renderer, const BandBuffers *buffers, BandRows rows, Pace *pace,
+                        uint32_t first, uint32_t end)
+{
+    const RenderSettings *settings = &renderer->settings;
+    uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
+    bool go_on = true;
+    pace_begin_band(pace);
+    while (go_on && first < end) {
+        uint32_t samples = pace_launch_samples(pace, pixels, end - first);
+        double seconds = band_render(renderer, buffers, rows, first, first + samples);
+        pace_note_launch(pace, pixels, samples, seconds);
+        first += samples;
+        go_on = compute_ok(renderer->compute) && !(settings->stop && settings->stop());
+    }
+    return go_on;
+}
+
+// One ray per pixel.
+static void band_fill_aovs(Renderer *renderer, const BandBuffers *buffers, unsigned aovs, BandRows rows)
+{
+    if (aovs & AOVS_OF_HIT) band_fill(renderer, KERNEL_AOV, AOVS_OF_HIT, buffers, aovs, rows);
+    if (aovs & AOVS_OF_PATH) band_fill(renderer, KERNEL_PATH, AOVS_OF_PATH, buffers, aovs, rows);
+}
+
+static Pace pace_start(const RenderSettings *settings)
+{
+    return (Pace){.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
+}
+
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
 {
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
+    const Delivery delivery = {.sink = sink, .context = context};
     BandBuffers buffers = {0};
     buffers_open(&buffers, renderer, aovs, rows_max(renderer, aovs));
-    Pace pace = {.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
+    Pace pace = pace_start(settings);
     bool go_on = compute_ok(compute);
     BandRows rows = {0};
     while (go_on && rows.first_row < settings->region_height) {
         uint32_t left = settings->region_height - rows.first_row;
-        rows.row_count = band_rows(renderer, &pace, left < buffers.rows ? left : buffers.rows);
-        uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
-        pace_begin_band(&pace);
-        for (uint32_t first = 0; go_on && first < settings->sample_count;) {
-            uint32_t samples = pace_launch_samples(&pace, pixels, settings->sample_count - first);
-            double seconds = band_render(renderer, &buffers, rows, first, first + samples);
-            pace_note_launch(&pace, pixels, samples, seconds);
-            first += samples;
-            go_on = compute_ok(compute) && !(settings->stop && settings->stop());
-        }
+        rows.row_count =
+            band_rows(renderer, &pace, settings->sample_count, left < buffers.rows ? left : buffers.rows);
+        go_on = band_sample(renderer, &buffers, rows, &pace, 0, settings->sample_count);
         if (!go_on) break;
-        // one ray per pixel, as the band's first launch had
-        if (aovs & AOVS_OF_HIT) band_fill(renderer, KERNEL_AOV, AOVS_OF_HIT, &buffers, aovs, rows);
-        if (aovs & AOVS_OF_PATH) band_fill(renderer, KERNEL_PATH, AOVS_OF_PATH, &buffers, aovs, rows);
-        go_on = band_deliver(renderer, &buffers, aovs, rows, sink, context);
+        band_fill_aovs(renderer, &buffers, aovs, rows);
+        go_on = band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
         rows.first_row += rows.row_count;
     }
     buffers_close(&buffers);
     return go_on && compute_ok(compute);
+}
+
+typedef struct {
+    BandRows rows;
+    BandBuffers buffers;
+} PassBand;
+
+typedef struct {
+    PassBand *items;
+    size_t count, capacity;
+} PassBands;
+
+// The first pass divides the image into bands, each with buffers of its own.
+static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Pace *pace, Delivery *delivery)
+{
+    const uint32_t height = renderer->settings.region_height;
+    const uint32_t most = rows_max(renderer, aovs);
+    bool go_on = compute_ok(renderer->compute);
+    delivery->samples = 1;
+    for (uint32_t row = 0; go_on && row < height;) {
+        uint32_t left = height - row;
+        PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
+        buffers_open(&band.buffers, renderer, aovs, band.rows.row_count);
+        array_push(*bands, band);
+        go_on = band_sample(renderer, &band.buffers, band.rows, pace, 0, 1) &&
+                band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);
+        row += band.rows.row_count;
+    }
+    return go_on;
+}
+
+static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, const Delivery *delivery)
+{
+    const RenderSettings *settings = &renderer->settings;
+    bool go_on = true;
+    for (size_t i = 0; go_on && i < bands->count; i++) {
+        const PassBand *band = &bands->items[i];
+        band_fill_aovs(renderer, &band->buffers, aovs, band->rows);
+        go_on = band_deliver(renderer, &band->buffers, aovs, band->rows, delivery) &&
+                !(settings->stop && settings->stop());
+    }
+    return go_on;
+}
+
+bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void *context)
+{
+    const uint32_t count = renderer->settings.sample_count;
+    Delivery delivery = {.pass_sink = sink, .context = context};
+    PassBands bands = {0};
+    Pace pace = pace_start(&renderer->settings);
+    double start = clock_seconds(), seconds_of_sample;
+    bool go_on = first_pass(renderer, &bands, aovs, &pace, &delivery);
+    seconds_of_sample = clock_seconds() - start;
+    if (go_on && aovs) go_on = aov_pass(renderer, &bands, aovs, &delivery);
+    while (go_on && delivery.samples < count) {
+        uint32_t first = delivery.samples;
+        delivery.samples += (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
+        start = clock_seconds();
+        for (size_t i = 0; go_on && i < bands.count; i++) {
+            const PassBand *band = &bands.items[i];
+            go_on = band_sample(renderer, &band->buffers, band->rows, &pace, first, delivery.samples) &&
+                    band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);
+        }
+        seconds_of_sample = (clock_seconds() - start) / (delivery.samples - first);
+    }
+    for (size_t i = 0; i < bands.count; i++)
+        buffers_close(&bands.items[i].buffers);
+    free(bands.items);
+    return go_on && compute_ok(renderer->compute);
 }
 
 static bool film_take_band(void *film, const Film *band, double fraction_done)

@@ -3,6 +3,7 @@
 #include "host/base/memory.h"
 #include "host/compile/compile.h"
 #include "host/render/renderer_state.h"
+#include "host/render/sample_pattern.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -62,18 +63,83 @@ static bool device_has_room(const CompiledScene *compiled, const Device *device,
     return false;
 }
 
-// Frees each host array after its upload, so that the scene is never in memory twice.
+// Frees each host array after its upload, so that the scene is never in memory twice. Textures that are on
+// the device stay there.
 static void upload(Renderer *renderer, CompiledScene *compiled)
 {
     bool is_double = renderer->report.is_double;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        bool is_kept = (kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS) && renderer->textures;
+        if (is_kept) continue;
         size_t size = flat_array_size(&compiled->arrays[kind], is_double);
         void *bytes = buffer_bytes_allocate(size);
         flat_array_write(&compiled->arrays[kind], is_double, bytes);
         free(compiled->arrays[kind].items);
         compiled->arrays[kind].items = NULL;
+        buffer_release(renderer->arrays[kind]);
         renderer->arrays[kind] = buffer_take(renderer->compute, size, bytes);
     }
+    free(renderer->textures);
+    renderer->textures = compiled->textures;
+    compiled->textures = NULL;
+}
+
+static void offsets_upload(Renderer *renderer)
+{
+    const uint32_t count = renderer->settings.sample_count;
+    void *offsets = sample_pattern(count, renderer->report.is_double);
+    buffer_release(renderer->offsets);
+    renderer->offsets = buffer_create(renderer->compute, 2 * count * renderer_scalar_size(renderer), offsets,
+                                      CL_MEM_READ_ONLY);
+    free(offsets);
+}
+
+static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
+{
+    for (cl_uint i = 0; i < FLAT_COUNT; i++)
+        kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
+}
+
+// Compiles and uploads the scene. False, with nothing changed, as renderer_open.
+static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
+                       MessageList *messages)
+{
+    const Device *device = renderer->compute->device;
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
+    const CompileSettings compile_settings = {
+        .width = settings->width,
+        .height = settings->height,
+        .sample_count = settings->sample_count,
+        .bounce_count = settings->bounce_count,
+        .precision = settings->precision,
+        .lanes = settings->lanes ? settings->lanes : device_lanes(device, is_double),
+        .bvh = settings->bvh,
+        .extra_features = settings->extra_features,
+        .shift_to_eye = settings->shift_to_eye,
+        .textures = renderer->textures,
+    };
+    CompiledScene compiled;
+    if (!scene_compile(&compiled, scene, &compile_settings, messages)) return false;
+    if (!device_has_room(&compiled, device, is_double, messages)) {
+        compiled_scene_free(&compiled);
+        return false;
+    }
+    renderer->settings = *settings;
+    renderer->light_count = scene->lights.count;
+    renderer->unit = compiled.unit;
+    renderer->report.features = compiled.features;
+    renderer->report.lanes = compile_settings.lanes;
+    renderer->report.is_double = is_double;
+    renderer->report.flatten_seconds = compiled.flatten_seconds;
+    renderer->report.bvh_seconds = compiled.bvh_seconds;
+    double start = clock_seconds();
+    upload(renderer, &compiled);
+    offsets_upload(renderer);
+    for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
+        if (renderer->kernels[kind].kernel) scene_arguments_set(renderer, renderer->kernels[kind].kernel);
+    renderer->report.upload_seconds = clock_seconds() - start;
+    compiled_scene_free(&compiled);
+    return compute_ok(renderer->compute);
 }
 
 // Refracted rays that wait while reflected ones are traced, up to one per depth. Few sizes, so that few
@@ -122,47 +188,21 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
                         MessageList *messages)
 {
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const CompileSettings compile_settings = {
-        .width = settings->width,
-        .height = settings->height,
-        .sample_count = settings->sample_count,
-        .bounce_count = settings->bounce_count,
-        .precision = settings->precision,
-        .lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, is_double),
-        .bvh = settings->bvh,
-        .extra_features = settings->extra_features,
-        .shift_to_eye = settings->shift_to_eye,
-    };
-    CompiledScene compiled;
-    if (!scene_compile(&compiled, scene, &compile_settings, messages)) return NULL;
-    if (!device_has_room(&compiled, compute->device, is_double, messages)) {
-        compiled_scene_free(&compiled);
-        return NULL;
-    }
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
-    renderer->settings = *settings;
-    renderer->light_count = scene->lights.count;
-    renderer->unit = compiled.unit;
-    renderer->report = (RenderReport){
-        .features = compiled.features,
-        .lanes = compile_settings.lanes,
-        .is_double = is_double,
-        .flatten_seconds = compiled.flatten_seconds,
-        .bvh_seconds = compiled.bvh_seconds,
-        .build_from_cache = true,
-    };
-    double start = clock_seconds();
-    upload(renderer, &compiled);
-    renderer->report.upload_seconds = clock_seconds() - start;
-    compiled_scene_free(&compiled);
-    if (!compute_ok(compute)) {
+    renderer->report.build_from_cache = true;
+    if (!scene_take(renderer, scene, settings, messages)) {
         renderer_close(renderer);
         return NULL;
     }
     variant_set(renderer);
     return renderer;
+}
+
+bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
+                   MessageList *messages)
+{
+    return compute_ok(renderer->compute) && scene_take(renderer, scene, settings, messages);
 }
 
 void renderer_close(Renderer *renderer)
@@ -179,6 +219,8 @@ void renderer_close(Renderer *renderer)
     }
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
         buffer_release(renderer->arrays[kind]);
+    buffer_release(renderer->offsets);
+    free(renderer->textures);
     text_free(&renderer->prelude);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
@@ -206,8 +248,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
     slot->kernel = program_kernel(renderer->compute, &slot->program, kernel_sources[kind].name);
-    for (cl_uint i = 0; i < FLAT_COUNT; i++)
-        kernel_argument(renderer->compute, slot->kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
+    scene_arguments_set(renderer, slot->kernel);
     return slot->kernel;
 }
 

@@ -41,6 +41,11 @@ typedef struct Renderer Renderer;
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
 void renderer_close(Renderer *renderer);
+// Takes another camera, size, region, samples or bounces; all else in `scene` and `settings` is what the
+// renderer was opened with. Kernels and textures stay on the device. False as where renderer_open returns
+// NULL; the renderer is then as it was, unless the device failed.
+bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
+                   MessageList *messages);
 
 // Called for each band from the top, whose layers are valid until it returns; returns false to stop.
 typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
@@ -48,8 +53,17 @@ typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
 // Renders the color and the AOVs of the set in bands of about band_seconds each. False: the device failed
 // (compute_ok says so), else settings.stop or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
-// The same into one film in double, which film_free frees. False: the device failed, or settings.stop ended
-// it; there is nothing to free.
+// Called for each band of a pass. Its color is the sum of `samples` samples, or their mean where they are
+// all; a band of AOVs has no color.
+typedef bool (*PassSink)(void *context, const Film *band, uint32_t samples);
+
+// Renders the image in passes over all of it, so that a preview sharpens: after the first, every pixel has
+// one sample, after the last all. The AOVs of the set follow the first pass. The bits are renderer_render's.
+// False as there.
+bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void *context);
+
+// renderer_render into one film in double, which film_free frees. False: the device failed, or settings.stop
+// ended it; there is nothing to free.
 bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 
 // Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders. False: the

@@ -19,6 +19,8 @@ struct Renderer {
     Text prelude;
     const char *options;
     cl_mem arrays[FLAT_COUNT];
+    CompiledTexture *textures; // of the scene, once uploaded
+    cl_mem offsets;            // of a pixel's samples
     size_t light_count;
     double unit; // scene lengths per device length, a power of two
     KernelSlot kernels[KERNEL_COUNT];

@@ -1,0 +1,133 @@
+// An image rendered in passes, and by a renderer whose camera was moved, has the bits of one rendered at
+// once. run_tests: sanitize-long-only
+#include "tests/film.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { WIDTH = 53, HEIGHT = 37, SAMPLES = 7, AOVS = AOV_T | AOV_OBJECT | AOV_SHADOW };
+
+typedef struct {
+    Film film;
+    uint32_t samples; // of the last band of color
+    uint32_t first_samples;
+    unsigned color_bands, aov_bands;
+} Taken;
+
+static bool take(void *context, const Film *band, uint32_t samples)
+{
+    Taken *taken = context;
+    film_copy_band(&taken->film, band);
+    if (!band->color) {
+        assert_int_equal(samples, 1);
+        taken->aov_bands++;
+        return true;
+    }
+    assert_true(samples >= taken->samples);
+    if (taken->color_bands++ == 0) taken->first_samples = samples;
+    taken->samples = samples;
+    return true;
+}
+
+static void passes_give_the_bits_of_one_render(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_file("scenes/globe.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.sample_count = SAMPLES;
+    Film expected = film_render(&probe_compute, &scene, &settings, AOVS);
+    settings.band_rows = 8;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    assert_non_null(renderer);
+    Taken taken = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
+    assert_true(renderer_accumulate(renderer, AOVS, take, &taken));
+    assert_int_equal(taken.first_samples, 1);
+    assert_int_equal(taken.samples, SAMPLES);
+    assert_int_equal(taken.aov_bands, 5);
+    assert_true(taken.color_bands >= 10 && taken.color_bands % 5 == 0);
+    film_assert_same(&taken.film, &expected, "passes");
+    film_free(&taken.film);
+    film_free(&expected);
+    renderer_close(renderer);
+    scene_free(&scene);
+}
+
+static unsigned stop_countdown;
+
+static bool stop(void)
+{
+    return stop_countdown-- == 0;
+}
+
+static void passes_stop(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_file("scenes/globe.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.sample_count = SAMPLES;
+    settings.band_rows = 8;
+    settings.stop = stop;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    for (unsigned launches = 0; launches < 9; launches++) {
+        Taken taken = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
+        stop_countdown = launches;
+        assert_false(renderer_accumulate(renderer, AOVS, take, &taken));
+        // the band of the launch after which it stops is not delivered
+        if (launches < 5) assert_int_equal(taken.color_bands, launches);
+        assert_true(taken.color_bands <= launches);
+        film_free(&taken.film);
+    }
+    renderer_close(renderer);
+    scene_free(&scene);
+}
+
+static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_file("scenes/globe.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    Film film;
+    assert_true(renderer_render_film(renderer, AOVS, &film)); // its kernels take the new arrays
+    film_free(&film);
+    double build_seconds = renderer_report(renderer)->build_seconds;
+
+    scene.camera.position = vector_add(scene.camera.position, (Vector3){0.3, 0.2, -0.1});
+    settings.width = settings.region_width = HEIGHT;
+    settings.sample_count = SAMPLES;
+    assert_true(renderer_move(renderer, &scene, &settings, &messages));
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    assert_true(renderer_report(renderer)->build_seconds == build_seconds);
+    Film expected = film_render(&probe_compute, &scene, &settings, AOVS);
+    film_assert_same(&film, &expected, "moved");
+    film_free(&film);
+
+    // a camera that does not fit leaves the renderer as it was
+    scene.camera.half_tangent = 1e300;
+    assert_false(renderer_move(renderer, &scene, &settings, &messages));
+    assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
+    message_list_free(&messages);
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    film_assert_same(&film, &expected, "after a camera that does not fit");
+    film_free(&film);
+    film_free(&expected);
+    renderer_close(renderer);
+    scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(passes_give_the_bits_of_one_render),
+        cmocka_unit_test(passes_stop),
+        cmocka_unit_test(moved_renderer_gives_the_bits_of_a_new_one),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
