@@ -14,15 +14,22 @@ $(error Libraries are missing; tools/setup installs or lists them)
 endif
 endif
 
+# Of the window; without them glint is built without one.
+window_packages := sdl2 SDL2_ttf fontconfig
+has_window      := $(shell pkg-config --exists $(window_packages) && echo 1)
+window_flags    := $(if $(has_window),$(shell pkg-config --cflags $(window_packages)))
+
 ifneq ($(filter %-sanitize,$(BUILD)),)
 sanitize := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Werror \
-            $(patsubst -I%,-isystem %,$(shell pkg-config --cflags $(packages))) $(sanitize)
+            $(patsubst -I%,-isystem %,$(shell pkg-config --cflags $(packages)) $(window_flags)) \
+            -DHAS_WINDOW=$(or $(has_window),0) $(sanitize)
 # Of OpenEXR only the library with the C interface.
 LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
             $(shell pkg-config --libs-only-L OpenEXR) \
-            $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) -lm -lpthread
+            $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) \
+            $(if $(has_window),$(shell pkg-config --libs $(window_packages))) -lm -lpthread
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
@@ -31,7 +38,8 @@ GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe
 # (tools/numerics/textbook), never to ship.
 kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h)),$(or \
            $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
-sources := $(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))
+sources := $(filter-out $(if $(has_window),,host/view/window.c host/view/caption.c), \
+           $(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c)))
 pages   := $(sort $(wildcard host/cli/page/*))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))

@@ -15,6 +15,7 @@ static const struct {
     const char *purpose;
 } commands[] = {
     {"render", command_render, "render a scene file to an image"},
+    {"view", command_view, "show a scene in a window"},
     {"trace", command_trace, "trace explicit rays"},
     {"check", command_check, "read a scene and report its contents"},
     {"devices", command_devices, "list OpenCL devices"},

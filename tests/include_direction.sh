@@ -1,7 +1,7 @@
 #!/bin/sh
 # Includes run one way: main, cli, {measure, verify, view}, render, compile, {import, then scene; opencl; image}, base. A room
 # includes itself and the rooms below it; only compile and render include the kernels' shared headers, each its own;
-# only opencl and render include OpenCL's.
+# only opencl and render include OpenCL's, only view those of the window.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -26,6 +26,7 @@ forbidden_includes() {
                 } else if (!(room in level)) wrong("no room is called " room)
                 else if ($3 ~ /</) {
                     if (target[1] == "CL" && room != "opencl" && room != "render") wrong(room " includes OpenCL")
+                    if (file ~ /^(SDL|fontconfig)/ && room != "view") wrong(room " includes the window\047s libraries")
                 } else if (target[1] == "kernels") {
                     if (!((room " " file) in shared)) wrong(room " includes " file)
                 } else if (target[1] != "host" || !(target[2] in level)) wrong(file " is in no room")
@@ -63,6 +64,7 @@ expect allowed host/compile/features.h '#include "kernels/features.h"'
 expect allowed host/render/film.h '#include "kernels/aovs.h"'
 expect allowed host/render/launch.c '#include <CL/cl.h>'
 expect allowed host/scene/scene.c '#include <stdio.h>'
+expect allowed host/view/window.c '#include <SDL.h>'
 expect allowed kernels/render.cl '#include "numerics/lanes.h"'
 expect forbidden host/cli/render.c '#include "host/main.c"'
 expect forbidden host/measure/report.c '  #  include "host/cli/commands.h"'
@@ -79,6 +81,7 @@ expect forbidden host/compile/flatten.c '#include <CL/cl.h>'
 expect forbidden host/measure/report.c '#include <CL/cl.h>'
 expect forbidden host/render/renderer.c '#include "kernels/types.h"'
 expect forbidden host/measure/report.c '#include "kernels/aovs.h"'
+expect forbidden host/cli/view.c '#include <SDL_ttf.h>'
 expect forbidden host/compile/flatten.c '#include "kernels/shapes/sphere.h"'
 expect forbidden host/extra/thing.c '#include "host/base/text.h"'
 expect forbidden kernels/types.h '#include "host/base/text.h"'

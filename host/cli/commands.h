@@ -2,6 +2,7 @@
 #pragma once
 
 int command_render(int argument_count, char **arguments);
+int command_view(int argument_count, char **arguments);
 int command_trace(int argument_count, char **arguments);
 int command_check(int argument_count, char **arguments);
 int command_devices(int argument_count, char **arguments);

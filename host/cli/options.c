@@ -215,13 +215,19 @@ void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
     *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
 }
 
+const Device *device_find(DeviceList *devices, const char *selector)
+{
+    device_list_open(devices);
+    MessageList messages = {0};
+    const Device *device = device_choose(devices, device_selector(selector), &messages);
+    messages_print(&messages, NULL);
+    return device;
+}
+
 bool device_open(OpenDevice *open, const char *selector)
 {
     *open = (OpenDevice){0};
-    device_list_open(&open->devices);
-    MessageList messages = {0};
-    const Device *device = device_choose(&open->devices, device_selector(selector), &messages);
-    messages_print(&messages, NULL);
+    const Device *device = device_find(&open->devices, selector);
     if (!device) {
         device_list_close(&open->devices);
         return false;

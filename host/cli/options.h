@@ -114,7 +114,9 @@ typedef struct {
     Compute compute;
 } OpenDevice;
 
-// Chooses and opens a device. False, with a message, if there is none; nothing to close then. A device that
+// Chooses a device. NULL, with a message, if there is none. The list must be closed either way.
+const Device *device_find(DeviceList *devices, const char *selector);
+// The same, and opens it. False, with a message, if there is none; nothing to close then. A device that
 // fails, now or later, is reported by device_close.
 bool device_open(OpenDevice *open, const char *selector);
 // At the end of a command. Returns the exit status: EXIT_MACHINE, with a message, if the device failed, else

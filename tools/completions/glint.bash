@@ -4,6 +4,7 @@ _glint_options() {
     case ${1-} in
     render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
         "--timing --transfer --bits --no-cache --lenient --perturb --quiet -h --help" ;;
+    view) echo "--size --samples --bounces --device --precision --lanes --bvh --no-cache --lenient -h --help" ;;
     trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --perturb -h --help" ;;
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
@@ -22,7 +23,7 @@ _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
     if [ "$COMP_CWORD" -eq 1 ]; then
-        mapfile -t COMPREPLY < <(compgen -W "render trace check devices diff bench accuracy verify cache $(_glint_options)" -- "$word")
+        mapfile -t COMPREPLY < <(compgen -W "render view trace check devices diff bench accuracy verify cache $(_glint_options)" -- "$word")
         return
     fi
     # bash splits --option=value into three words.

@@ -28,6 +28,21 @@ _glint_render() {
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
 
+_glint_view() {
+    _arguments \
+        '--size[width and height in pixels]:WxH:' \
+        '--samples[rays for each pixel at rest]:number:' \
+        '--device[device to render on]:device:(cpu gpu)' \
+        '--precision[arithmetic]:precision:(fast single strict double)' \
+        '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
+        '--bvh[use a BVH]:choice:(auto on off)' \
+        '--bounces[reflections and refractions at most]:number:' \
+        '--no-cache[build the kernel anew]' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
+}
+
 _glint_trace() {
     _arguments \
         '--rays[file of rays]:rays:_files' \
@@ -124,6 +139,7 @@ _glint_accuracy() {
 _glint() {
     local -a subcommands=(
         'render:render an image'
+        'view:show a scene in a window'
         'trace:shoot explicit rays'
         'check:read a scene without rendering it'
         'devices:list the OpenCL devices'

@@ -1,0 +1,81 @@
+#include "host/view/camera_moves.h"
+
+#include "host/compile/camera_basis.h"
+
+static const double POLE_ANGLE = M_PI / 180; // between the view and `up`, at least
+
+static void camera_shift(Camera *camera, Vector3 by)
+{
+    camera->position = vector_add(camera->position, by);
+    camera->look_at = vector_add(camera->look_at, by);
+}
+
+Vector3 camera_ray(const Camera *camera, ImageSize size, double x, double y)
+{
+    CameraBasis basis = camera_basis(camera, size.width, size.height);
+    Vector3 right = vector_scale(basis.right, 2 * x + 1 - size.width);
+    Vector3 up = vector_scale(basis.up, size.height - 1 - 2 * y);
+    return vector_normalize(vector_add(basis.forward, vector_add(right, up)));
+}
+
+// About a unit axis, right-handed (Rodrigues).
+static Vector3 rotated(Vector3 v, Vector3 axis, double angle)
+{
+    Vector3 along = vector_scale(axis, vector_dot(axis, v) * (1 - cos(angle)));
+    Vector3 across = vector_scale(vector_cross(axis, v), sin(angle));
+    return vector_add(vector_add(vector_scale(v, cos(angle)), across), along);
+}
+
+static void camera_rotate(Camera *camera, Vector3 pivot, Vector3 axis, double angle)
+{
+    Vector3 position = vector_subtract(camera->position, pivot);
+    Vector3 look_at = vector_subtract(camera->look_at, pivot);
+    camera->position = vector_add(pivot, rotated(position, axis, angle));
+    camera->look_at = vector_add(pivot, rotated(look_at, axis, angle));
+}
+
+// A camera without a usable `up` gets the one that its image has.
+static void camera_set_upright(Camera *camera)
+{
+    CameraBasis basis = camera_basis(camera, 1, 1);
+    Vector3 up = vector_normalize(camera->up);
+    bool is_usable = vector_length(vector_cross(basis.forward, up)) > 1e-9;
+    camera->up = is_usable ? up : vector_normalize(basis.up);
+}
+
+void camera_orbit(Camera *camera, Vector3 pivot, double yaw, double pitch)
+{
+    camera_set_upright(camera);
+    camera_rotate(camera, pivot, camera->up, yaw);
+    CameraBasis basis = camera_basis(camera, 1, 1);
+    double to_up = acos(fmax(-1, fmin(vector_dot(basis.forward, camera->up), 1)));
+    double most = fmax(0, to_up - POLE_ANGLE), least = fmin(0, to_up - (M_PI - POLE_ANGLE));
+    camera_rotate(camera, pivot, vector_normalize(basis.right), fmax(least, fmin(pitch, most)));
+}
+
+void camera_pan(Camera *camera, ImageSize size, double distance, const double from[2], const double to[2])
+{
+    CameraBasis basis = camera_basis(camera, size.width, size.height);
+    double depth = distance * vector_dot(basis.forward, camera_ray(camera, size, from[0], from[1]));
+    Vector3 right = vector_scale(basis.right, 2 * depth * (from[0] - to[0]));
+    Vector3 up = vector_scale(basis.up, 2 * depth * (to[1] - from[1]));
+    camera_shift(camera, vector_add(right, up));
+}
+
+void camera_dolly(Camera *camera, Vector3 pivot, double factor)
+{
+    camera_shift(camera, vector_scale(vector_subtract(pivot, camera->position), 1 - factor));
+}
+
+void camera_fly(Camera *camera, double forward, double right, double up)
+{
+    CameraBasis basis = camera_basis(camera, 1, 1);
+    Vector3 sideways = vector_add(vector_scale(vector_normalize(basis.right), right),
+                                  vector_scale(vector_normalize(basis.up), up));
+    camera_shift(camera, vector_add(vector_scale(basis.forward, forward), sideways));
+}
+
+void camera_look_at(Camera *camera, Vector3 point)
+{
+    if (!vector_is_zero(vector_subtract(point, camera->position))) camera->look_at = point;
+}

@@ -1,0 +1,71 @@
+#include "host/view/camera_yaml.h"
+
+#include <stdlib.h>
+
+// The fewest digits that read back as the same number.
+static void number_write(Text *text, double value)
+{
+    char word[32];
+    int digits = 6; // fewer would give 5e+01
+    do
+        snprintf(word, sizeof word, "%.*g", digits, value);
+    while (digits++ < 17 && strtod(word, NULL) != value);
+    text_appendf(text, "%s", word);
+}
+
+static void vector_write(Text *text, const char *name, Vector3 v)
+{
+    text_appendf(text, "%s: [", name);
+    number_write(text, v.x);
+    text_appendf(text, ", ");
+    number_write(text, v.y);
+    text_appendf(text, ", ");
+    number_write(text, v.z);
+    text_appendf(text, "], ");
+}
+
+// As the reader has it.
+static double half_tangent_of(double degrees)
+{
+    return tan(degrees * (M_PI / 360));
+}
+
+// The fewest digits that give the same half_tangent; rounded to 17 digits, a neighbor may.
+static double field_of_view(double half_tangent)
+{
+    double near = 360 / M_PI * atan(half_tangent);
+    for (int digits = 6; digits <= 17; digits++) {
+        char word[32];
+        snprintf(word, sizeof word, "%.*g", digits, near);
+        double degrees = strtod(word, NULL);
+        if (half_tangent_of(degrees) == half_tangent) return degrees;
+    }
+    double below = near, above = near;
+    for (int i = 0; i < 8; i++) {
+        below = nextafter(below, 0);
+        above = nextafter(above, 180);
+        if (half_tangent_of(below) == half_tangent) return below;
+        if (half_tangent_of(above) == half_tangent) return above;
+    }
+    return near;
+}
+
+void camera_write_yaml(Text *text, const Camera *camera, double aspect)
+{
+    text_appendf(text, "camera: {");
+    vector_write(text, "position", camera->position);
+    vector_write(text, "look_at", camera->look_at);
+    vector_write(text, "up", camera->up);
+    if (camera->field_axis == FIELD_VERTICAL) {
+        text_appendf(text, "fov: ");
+        number_write(text, field_of_view(camera->half_tangent));
+    } else {
+        double width = 2 * camera->half_tangent;
+        text_appendf(text, "focal_length: 1, frame: [");
+        number_write(text, width);
+        text_appendf(text, ", ");
+        number_write(text, width / aspect);
+        text_appendf(text, "]");
+    }
+    text_appendf(text, "}\n");
+}

@@ -1,0 +1,10 @@
+// A camera as a scene file in YAML has it.
+#pragma once
+
+#include "host/base/text.h"
+#include "host/scene/scene.h"
+
+// One line, `camera: {…}`, from which the reader gets the same camera bit for bit; but for an angle of view
+// that no number of degrees gives, which other formats may have: the nearest. `aspect`: width over height of
+// the image.
+void camera_write_yaml(Text *text, const Camera *camera, double aspect);

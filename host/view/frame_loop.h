@@ -1,0 +1,50 @@
+// Renders what the window shows, on a thread of its own: while the camera moves coarse frames in time, at
+// rest the image in passes, until it has all samples. A new request ends the work on the last.
+#pragma once
+
+#include "host/image/image.h"
+#include "host/render/renderer.h"
+#include "host/view/camera_moves.h"
+
+typedef struct {
+    const Device *device;
+    const Scene *scene;      // outlives the loop, which leaves it unchanged
+    RenderSettings settings; // all but the size
+    Transfer transfer;
+    // Called on the loop's thread when there is something to take.
+    void (*notify)(void *context);
+    void *notify_context;
+    // Writes a complete image: its color, in the precision that it was rendered in. False with a message if
+    // it cannot.
+    bool (*save)(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
+                 const Renderer *renderer, const Film *film, MessageList *messages);
+    void *save_context;
+} FrameLoopOptions;
+
+typedef struct {
+    unsigned number; // of the request
+    uint32_t width, height;
+    uint8_t *pixels; // display values, RGB, from the top left
+    // Distance from the eye to each pixel's hit point, infinite where nothing is hit; NULL: not known yet.
+    float *distances;
+    uint32_t samples; // per pixel; 0: a coarse frame
+    bool complete;
+} Frame;
+
+void frame_free(Frame *frame); // and zeroes
+
+typedef struct FrameLoop FrameLoop;
+
+FrameLoop *frame_loop_open(const FrameLoopOptions *options);
+// Ends the work and waits for it.
+void frame_loop_close(FrameLoop *loop);
+
+// Asks for an image; `is_moving`: a coarse one first. Returns the request's number, from 1.
+unsigned frame_loop_request(FrameLoop *loop, const Camera *camera, ImageSize size, bool is_moving);
+// Asks for the image of the last request to be saved when it is complete.
+void frame_loop_save(FrameLoop *loop, const char *path);
+
+// Exchanges `frame` for the newest one. False: there is none that was not taken before.
+bool frame_loop_take(FrameLoop *loop, Frame *frame);
+// What went wrong, or was saved, since the last call: caller frees; NULL: nothing.
+char *frame_loop_take_message(FrameLoop *loop);

@@ -1,0 +1,17 @@
+// What mouse and keys do, for glint view --help, the window's help and docs/view.md.
+#pragma once
+
+// KEY(input, effect)
+#define VIEW_KEY_LIST(KEY)                                                                                   \
+    KEY("drag", "orbit about the point under the cursor")                                                    \
+    KEY("Shift drag", "pan; so does the middle button")                                                      \
+    KEY("wheel", "move towards the point under the cursor, or away")                                         \
+    KEY("double click", "look at that point")                                                                \
+    KEY("right drag", "look around; W A S D fly, Q and E sink and rise")                                     \
+    KEY("arrows", "orbit about the point looked at, by 5 degrees")                                           \
+    KEY("R", "reset the camera")                                                                             \
+    KEY("C", "print the camera as YAML")                                                                     \
+    KEY("S", "save the image, once complete, as PNG; Shift S: EXR")                                          \
+    KEY("F", "full screen")                                                                                  \
+    KEY("H", "show or hide this list")                                                                       \
+    KEY("Escape", "close the window")

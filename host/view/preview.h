@@ -1,0 +1,21 @@
+// How coarse the frames of a moving camera are, so that each takes at most PREVIEW_SECONDS.
+#pragma once
+
+#include <stdint.h>
+
+// Of a frame, which leaves some of 33 ms for the display and for a launch that the frame had to wait for.
+#define PREVIEW_SECONDS 0.022
+
+// Initially zero.
+typedef struct {
+    double fixed_seconds;    // of the last frame, whatever its size
+    double seconds_of_pixel; // beyond them
+    uint32_t divisor;        // of the last frame
+} Preview;
+
+// By how much both sides of the image are divided in the next frame: 1 to 16.
+uint32_t preview_divisor(const Preview *preview, uint32_t width, uint32_t height);
+
+// The times of a frame of this divisor: to move the camera, and to render its pixels.
+void preview_note(Preview *preview, uint32_t divisor, double move_seconds, double render_seconds,
+                  double pixels);

@@ -1,0 +1,16 @@
+// The window of glint view: shows what a FrameLoop renders, and turns mouse and keys into requests.
+#pragma once
+
+#include "host/view/frame_loop.h"
+
+typedef struct {
+    FrameLoopOptions frames; // but for notify
+    const char *scene_path;
+    ImageSize size;     // of the window, reduced to fit the display
+    bool (*stop)(void); // true ends it: an interrupt
+} WindowOptions;
+
+typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT } WindowEnd;
+
+// Opens the window and returns when it is closed. WINDOW_ABSENT: it could not be opened, and why was printed.
+WindowEnd window_run(const WindowOptions *options);

@@ -1,0 +1,191 @@
+// The camera's movements, its YAML, and the pace of coarse frames: without a window or a device.
+#include "host/view/camera_moves.h"
+#include "host/view/camera_yaml.h"
+#include "host/view/preview.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static const ImageSize size = {640, 360};
+
+static Camera camera_make(FieldAxis axis)
+{
+    return (Camera){.position = {3, 2, -5},
+                    .look_at = {0.5, 1, 0.25},
+                    .up = {0.1, 2, 0},
+                    .field_axis = axis,
+                    .half_tangent = 0.4};
+}
+
+static Vector3 point_along(const Camera *camera, const double pixel[2], double distance)
+{
+    Vector3 ray = camera_ray(camera, size, pixel[0], pixel[1]);
+    return vector_add(camera->position, vector_scale(ray, distance));
+}
+
+// That the point is seen in the pixel.
+static void check_pixel(const Camera *camera, Vector3 point, const double pixel[2])
+{
+    Vector3 seen = vector_normalize(vector_subtract(point, camera->position));
+    Vector3 ray = camera_ray(camera, size, pixel[0], pixel[1]);
+    assert_vector(seen, ray.x, ray.y, ray.z);
+}
+
+static double distance_to(const Camera *camera, Vector3 point)
+{
+    return vector_length(vector_subtract(point, camera->position));
+}
+
+static void grabbed_point_stays_under_the_cursor(void **state)
+{
+    (void)state;
+    static const double from[2] = {100, 50}, to[2] = {420, 333};
+    for (int axis = 0; axis < 2; axis++) {
+        Camera start = camera_make((FieldAxis)axis), camera = start;
+        Vector3 point = point_along(&start, from, 4);
+
+        camera_orbit(&camera, point, 0.7, -0.3);
+        check_pixel(&camera, point, from);
+        assert_number(distance_to(&camera, point), 4);
+        assert_true(distance_to(&camera, start.position) > 0.5);
+
+        camera = start;
+        camera_dolly(&camera, point, 0.25);
+        check_pixel(&camera, point, from);
+        assert_number(distance_to(&camera, point), 1);
+
+        camera = start;
+        camera_pan(&camera, size, 4, from, to);
+        check_pixel(&camera, point, to);
+    }
+}
+
+static void view_does_not_turn_over(void **state)
+{
+    (void)state;
+    const double one_degree = M_PI / 180;
+    Camera camera = camera_make(FIELD_VERTICAL);
+    Vector3 pivot = {1, 1, 1};
+    for (int step = 0; step < 40; step++) {
+        camera_orbit(&camera, pivot, 0.1, step < 20 ? 0.5 : -0.5);
+        Vector3 forward = vector_normalize(vector_subtract(camera.look_at, camera.position));
+        double angle = acos(vector_dot(forward, camera.up));
+        assert_true(angle > 0.99 * one_degree && angle < M_PI - 0.99 * one_degree);
+        if (step == 19) assert_true(fabs(angle - one_degree) < 1e-9);
+    }
+}
+
+// A scene may look straight down, or have no `up`.
+static void useless_up_is_replaced(void **state)
+{
+    (void)state;
+    static const Vector3 ups[] = {{0, 0, 0}, {0, 1, 0}, {0, -3, 0}};
+    for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
+        Camera camera = {.position = {0, 5, 0}, .up = ups[i], .half_tangent = 1};
+        camera_orbit(&camera, camera.look_at, 0, -0.2);
+        assert_number(vector_length(camera.position), 5);
+        assert_number(acos(camera.position.y / 5), 0.2);
+    }
+}
+
+static void camera_turns_and_flies(void **state)
+{
+    (void)state;
+    Camera camera = {.look_at = {0, 0, 1}, .up = {0, 1, 0}, .half_tangent = 1};
+    camera_fly(&camera, 2, 0, 0);
+    assert_vector(camera.position, 0, 0, 2);
+    camera_fly(&camera, 0, 1, 3); // right is -x where the view is along z
+    assert_vector(camera.position, -1, 3, 2);
+    assert_vector(camera.look_at, -1, 3, 3);
+    camera_orbit(&camera, camera.position, M_PI / 2, 0); // to the left
+    assert_vector(camera.position, -1, 3, 2);
+    assert_vector(camera.look_at, 0, 3, 2);
+    camera_look_at(&camera, (Vector3){-1, 3, 9});
+    assert_vector(camera.look_at, -1, 3, 9);
+    camera_look_at(&camera, camera.position);
+    assert_vector(camera.look_at, -1, 3, 9);
+}
+
+static void check_yaml(const Camera *camera)
+{
+    Text text = {0};
+    camera_write_yaml(&text, camera, 1.5);
+    text_appendf(&text, "lights: [{point: {position: [0, 0, 0]}}]\n"
+                        "objects: [{sphere: {center: [0, 0, 0], radius: 1}}]\n");
+    Scene scene = scene_of_text("camera.yaml", text_c(&text));
+    const Camera *read = &scene.camera;
+    assert_memory_equal(&read->position, &camera->position, sizeof(Vector3));
+    assert_memory_equal(&read->look_at, &camera->look_at, sizeof(Vector3));
+    assert_memory_equal(&read->up, &camera->up, sizeof(Vector3));
+    assert_int_equal(read->field_axis, camera->field_axis);
+    if (read->half_tangent != camera->half_tangent)
+        fail_msg("%.17g read as %.17g from %s", camera->half_tangent, read->half_tangent, text_c(&text));
+    scene_free(&scene);
+    text_free(&text);
+}
+
+static void yaml_gives_the_same_camera(void **state)
+{
+    (void)state;
+    Camera camera = camera_make(FIELD_HORIZONTAL);
+    check_yaml(&camera);
+    camera.field_axis = FIELD_VERTICAL;
+    for (int i = 1; i < 2000; i++) {
+        double degrees = i % 2 ? 0.09 * i : i / 11.3;
+        camera.half_tangent = tan(degrees * (M_PI / 360));
+        camera.position = vector_scale(camera.position, 1.0 + 1.0 / i);
+        check_yaml(&camera);
+    }
+    camera.half_tangent = tan(50 * (M_PI / 360));
+    camera.position = (Vector3){0.1, 1e300, -40};
+    Text text = {0};
+    camera_write_yaml(&text, &camera, 1.5);
+    assert_string_equal(text_c(&text), "camera: {position: [0.1, 1e+300, -40], look_at: [0.5, 1, 0.25], "
+                                       "up: [0.1, 2, 0], fov: 50}\n");
+    text_free(&text);
+}
+
+// A scene that takes this long to move and per pixel: every frame after the first few is in time, the
+// resolution settles, and is the best there is.
+static void check_pace(double move_seconds, double seconds_of_pixel, uint32_t expected)
+{
+    Preview preview = {0};
+    uint32_t divisor = 0;
+    for (int frame = 0; frame < 20; frame++) {
+        uint32_t before = divisor;
+        divisor = preview_divisor(&preview, size.width, size.height);
+        double pixels = (double)size.width / divisor * size.height / divisor;
+        double seconds = pixels * seconds_of_pixel;
+        preview_note(&preview, divisor, move_seconds, seconds, pixels);
+        if (frame >= 1 && divisor < 16) assert_true(move_seconds + seconds <= PREVIEW_SECONDS);
+        if (frame >= 2) assert_int_equal(divisor, before);
+    }
+    assert_int_equal(divisor, expected);
+}
+
+static void coarse_frames_are_in_time(void **state)
+{
+    (void)state;
+    check_pace(0.0001, 1e-9, 1);
+    check_pace(0.001, 1e-7, 2);
+    check_pace(0.001, 1e-6, 4);
+    check_pace(0.010, 1e-6, 5);
+    check_pace(0.001, 1e-4, 16);
+    check_pace(0.1, 1e-7, 16);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(grabbed_point_stays_under_the_cursor),
+        cmocka_unit_test(view_does_not_turn_over),
+        cmocka_unit_test(useless_up_is_replaced),
+        cmocka_unit_test(camera_turns_and_flies),
+        cmocka_unit_test(yaml_gives_the_same_camera),
+        cmocka_unit_test(coarse_frames_are_in_time),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

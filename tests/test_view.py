@@ -1,0 +1,296 @@
+#!/usr/bin/env -S python3 -B
+"""glint view, in a display of Xvfb with xdotool's mouse and keys: what the display shows and what is saved are the bits
+that glint render writes with the camera that is printed.
+
+Nothing here depends on time: a test waits until glint has printed or shown what it must.
+"""
+import os
+import queue
+import random
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from glint import IS_LONG, PROGRAM, TestCase, main, need_device, png_read, run, skip_all, write
+
+SCENE = """\
+camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
+background: [0.1, 0.2, 0.4]
+lights: [{point: {position: [3, 4, -5]}}]
+objects:
+  - sphere: {center: [0, 0, 0], radius: 1}
+"""
+WIDTH, HEIGHT = 160, 120
+SAMPLES = 3
+DEADLINE = 120  # seconds until a test gives up what it waits for
+
+
+def display_open():
+    """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process."""
+    read, write_end = os.pipe()
+    folder = os.environ["VIEW_FOLDER"]
+    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "640x480x24", "-fbdir", folder]
+    process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(write_end)
+    with os.fdopen(read) as file:
+        number = file.readline().strip()
+    if not number:
+        skip_all("Xvfb does not start")
+    os.environ["DISPLAY"] = f":{number}"
+    return process
+
+
+def screen():
+    """Width of a row in bytes, and the pixels of the display: blue, green, red, and one unused."""
+    data = Path(os.environ["VIEW_FOLDER"], "Xvfb_screen0").read_bytes()
+    head = struct.unpack(">25I", data[:100])
+    size, row, colors = head[0], head[12], head[19]
+    return row, data[size + 12 * colors :]
+
+
+def xdotool(*arguments):
+    return subprocess.run(["xdotool", *map(str, arguments)], check=True, capture_output=True, text=True).stdout
+
+
+def png_rows(path):
+    """Rows of RGB of an 8-bit image, unfiltered."""
+    (width, height, _, _), data, _, _ = png_read(path)
+    stride, rows, above = 3 * width, [], bytes(3 * width)
+    for y in range(height):
+        kind, line = data[y * (stride + 1)], bytearray(data[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
+        for x in range(stride):
+            left = line[x - 3] if x >= 3 else 0
+            corner = above[x - 3] if x >= 3 else 0
+            guess = left + above[x] - corner
+            paeth = min((abs(guess - left), 0, left), (abs(guess - above[x]), 1, above[x]), (abs(guess - corner), 2, corner))
+            line[x] = line[x] + [0, left, above[x], (left + above[x]) // 2, paeth[2]][kind] & 255
+        above = bytes(line)
+        rows.append(above)
+    return rows
+
+
+class Window:
+    """A running glint view; its lines of output are read as they come."""
+
+    def __init__(self, test, scene="scene.yaml", options=""):
+        self.test, self.lines = test, queue.Queue()
+        command = [PROGRAM, "view", scene, "--size", f"{WIDTH}x{HEIGHT}", "--samples", str(SAMPLES), *options.split()]
+        # the libraries that SDL loads and unloads leak
+        sanitizer = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0"
+        environment = os.environ | {
+            "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", "ASAN_OPTIONS": sanitizer}
+        self.process = subprocess.Popen(
+            command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
+        test.addCleanup(self.kill)
+        self.id = xdotool("search", "--sync", "--onlyvisible", "--pid", self.process.pid).split()[0]
+        xdotool("windowfocus", "--sync", self.id, "windowmove", self.id, 0, 0)
+
+    def read(self):
+        for line in self.process.stdout:
+            self.lines.put(line)
+        self.lines.put("")
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.reader.join()
+        self.process.stdout.close()
+
+    def line(self, pattern):
+        """The next line that matches."""
+        seen = []
+        while True:
+            line = self.lines.get(timeout=DEADLINE)
+            seen.append(line)
+            if match := re.search(pattern, line):
+                return match
+            if line == "":
+                self.test.fail(f"glint view ended without printing {pattern}: {''.join(seen)}")
+
+    def mouse(self, x, y, *more):
+        xdotool("mousemove", "--window", self.id, x, y, *more)
+
+    def key(self, *keys):
+        xdotool("key", *keys)
+
+    def drag(self, button, start, *path):
+        """Presses a button at the first point, releases it at the last."""
+        moves = [word for point in path for word in ("mousemove", "--window", self.id, *point)]
+        self.mouse(*start, "mousedown", button, *moves, "mouseup", button)
+
+    def camera(self):
+        self.key("c")
+        return self.line("^camera: .*")[0]
+
+    def saved(self, key="s"):
+        """Saves the image once it is complete; the file's name."""
+        self.key(key)
+        return self.line("^saved (.*)$")[1]
+
+    def rendered(self, camera, ending="png", size=None):
+        """The file that glint render writes with the camera."""
+        os.makedirs("rendered", exist_ok=True)
+        write("rendered/scene.yaml", re.sub("^camera: .*", camera, SCENE))
+        path = f"rendered/image.{ending}"
+        width, height = size or (WIDTH, HEIGHT)
+        self.test.glint(f"render rendered/scene.yaml --size {width}x{height} --samples {SAMPLES} -o {path}")
+        return path
+
+    def check(self, size=None):
+        """The saved image and the display are what glint render makes of the printed camera, which is returned."""
+        camera = self.camera()
+        path = self.rendered(camera, size=size)
+        self.test.assertSameBytes(self.saved(), path)
+        self.key("x")  # hides the message
+        rows = png_rows(path)
+        end = time.monotonic() + DEADLINE
+        while not self.shows(rows):
+            self.test.assertLess(time.monotonic(), end, "the display does not show the image")
+        return camera
+
+    def shows(self, rows):
+        stride, pixels = screen()
+        for y, row in enumerate(rows):
+            line = pixels[y * stride : y * stride + len(row) // 3 * 4]
+            if (line[2::4], line[1::4], line[0::4]) != (row[0::3], row[1::3], row[2::3]):
+                return False
+        return True
+
+    def close(self, status=0):
+        self.key("Escape")
+        self.test.assertEqual(self.process.wait(DEADLINE), status)
+
+
+def numbers(camera, name):
+    return [float(word) for word in re.search(rf"\b{name}: \[(.*?)\]", camera)[1].split(",")]
+
+
+class View(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("scene.yaml", SCENE)
+
+    def test_movement(self):
+        window = Window(self)
+        first = window.check()
+        self.assertEqual(first, re.match("camera: .*(?=})", SCENE)[0].replace(", fov", ", up: [0, 1, 0], fov") + "}")
+        steps = {
+            "orbit": lambda: window.drag(1, (80, 60), (90, 62), (100, 70)),
+            "pan": lambda: (xdotool("keydown", "shift"), window.drag(1, (80, 60), (70, 50)), xdotool("keyup", "shift")),
+            "dolly": lambda: window.mouse(80, 60, "click", 4),
+            "look at": lambda: window.mouse(90, 50, "click", "--repeat", 2, "--delay", 10, 1),
+            "look around": lambda: window.drag(3, (80, 60), (60, 50)),
+            "arrows": lambda: window.key("Left", "Up"),
+        }
+        cameras = {"first": first}
+        for name, act in steps.items():
+            with self.subTest(name):
+                act()
+                cameras[name] = window.check()
+        self.assertEqual(len(set(cameras.values())), len(cameras), "a step does not move the camera")
+        # the sphere's surface at the center: orbits keep the distance to it, a notch takes a tenth of it
+        self.assertEqual(numbers(cameras["look around"], "position"), numbers(cameras["look at"], "position"))
+        self.assertEqual(numbers(cameras["arrows"], "look_at"), numbers(cameras["look around"], "look_at"))
+        window.key("r")
+        self.assertEqual(window.camera(), first)
+        xdotool("mousemove", "--window", window.id, 80, 60, "mousedown", 3, "keydown", "w")
+        position = numbers(first, "position")
+        while numbers(window_camera_in_flight(window), "position") == position:
+            pass
+        window.close()
+
+    def test_resize_and_save(self):
+        window = Window(self)
+        xdotool("windowsize", window.id, 101, 73)
+        end = time.monotonic() + DEADLINE
+        while "101x73" not in xdotool("getwindowname", window.id):
+            self.assertLess(time.monotonic(), end)
+        camera = window.check((101, 73))
+        path = window.saved("shift+s")
+        self.assertEqual(path, "scene-1.exr")
+        self.assertSameBytes(path, window.rendered(camera, "exr", (101, 73)))
+        self.assertEqual(window.saved(), "scene-2.png")
+        xdotool("windowunmap", "--sync", window.id, "windowmap", "--sync", window.id, "windowfocus", window.id)
+        window.check((101, 73))
+        window.close()
+
+    def test_help(self):
+        window = Window(self)
+        window.check()
+        before = screen()
+        window.key("h")
+        end = time.monotonic() + DEADLINE
+        while screen() == before:
+            self.assertLess(time.monotonic(), end, "no help is shown")
+        window.key("h")
+        window.check()
+        window.close()
+
+    def test_interrupt(self):
+        window = Window(self)
+        window.process.send_signal(signal.SIGINT)
+        self.assertEqual(window.process.wait(DEADLINE), 130)
+
+    def test_faults(self):
+        environment = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+        self.refuses("view scene.yaml", "no display", env=environment)
+        self.refuses("view", "no scene")
+        write("bad.yaml", "camera: 5\n")
+        self.refuses("view bad.yaml", "^bad.yaml:1:9: error")
+
+    def test_random_events(self):
+        """Nothing that a user does ends the program, and afterwards the image is right."""
+        draw = random.Random(19)
+        window = Window(self)
+        for _ in range(10000 // 50 if IS_LONG else 6):
+            words = []
+            for _ in range(50):
+                x, y = draw.randrange(WIDTH), draw.randrange(HEIGHT)
+                button, key = draw.randint(1, 5), draw.choice(["r", "c", "h", "w", "a", "d", "e", "Left", "Up", "shift"])
+                words += draw.choice([
+                    ["mousemove", "--window", window.id, x, y],
+                    ["mousedown", button], ["mouseup", button],
+                    ["keydown", key], ["keyup", key],
+                    ["click", button],
+                    ["windowsize", window.id, draw.randint(1, WIDTH), draw.randint(1, HEIGHT)],
+                ])
+            xdotool(*words)
+        xdotool(*[word for button in range(1, 6) for word in ("mouseup", button)])
+        xdotool(*[word for key in ("r", "c", "h", "w", "a", "d", "e", "Left", "Up", "shift") for word in ("keyup", key)])
+        xdotool("windowsize", "--sync", window.id, WIDTH, HEIGHT)
+        path = window.saved()
+        self.assertEqual(png_read(path)[0][:2], (WIDTH, HEIGHT))
+        window.close()
+
+
+def window_camera_in_flight(window):
+    """Keys fly while the right button is held: releases it, and presses it again after the camera is printed."""
+    xdotool("mouseup", 3)
+    camera = window.camera()
+    xdotool("mousedown", 3)
+    return camera
+
+
+if __name__ == "__main__":
+    for tool in "Xvfb", "xdotool":
+        if not shutil.which(tool):
+            skip_all(f"there is no {tool}")
+    need_device()
+    if "built without a window" in run("view scenes/demo.yaml", env={"DISPLAY": ""}).stderr:
+        skip_all("glint is built without a window")
+    with tempfile.TemporaryDirectory() as display_folder:
+        os.environ["VIEW_FOLDER"] = display_folder
+        display = display_open()
+        try:
+            main()
+        finally:
+            display.terminate()
+            display.wait()
