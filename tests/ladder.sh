@@ -6,7 +6,7 @@ is_sanitized && skip_all "the plain build measures the same kernels"
 build=${BUILD:-build}
 make=${MAKE:-make}
 check "the ladder builds" $make -s BUILD="$build" ladder
-for shape in sphere plane disc box cylinder cone triangle torus; do
+for shape in sphere plane disc box cylinder cone triangle torus paraboloid; do
     check "$shape" "$build/tools/numerics/ladder" --rays 1500 --check --shape $shape
 done
 finish

@@ -11,7 +11,7 @@ ${MAKE:-make} -s BUILD="$build" "$build/peers/embree" >"$scratch/make.log" 2>&1 
 
 bench() { # EMBREE RUNG…
     "$python" tools/peers/bench --glint "$GLINT" --scenes "$scratch/scenes" --rounds 1 --seconds 0.02 --size 240x136 \
-        --json "$scratch/bench.json" --only glint,Embree --embree "$@"
+        --precisions single --json "$scratch/bench.json" --only glint,Embree --embree "$@"
 }
 agree() { # ROW…
     "$python" - "$scratch/bench.json" "$@" <<'PYTHON'

@@ -1,6 +1,8 @@
 #!/usr/bin/env -S python3 -B
 """glint accuracy on tiny images: its figures against those computed here by docs/accuracy.md's definitions from the saved
-arrays, a reference from a file, and what is refused. Nothing is asked of the times themselves."""
+arrays, a reference from a file, and what is refused. Nothing is asked of the times themselves.
+
+run_tests: sanitize-long-only"""
 import json
 import math
 import tempfile
@@ -233,7 +235,7 @@ class Accuracy(TestCase):
 
     def test_samples(self):
         """Fewer samples are an error like any other."""
-        scene = self.json(f"accuracy {SPHERES} {SMALL} --precision double --lanes 1 --samples 1,8 --json")["scenes"][0]
+        scene = self.json(f"accuracy {SPHERES} {SMALL} --precision double --samples 1,8 --json")["scenes"][0]
         self.assertEqual(scene["reference"]["samples"], 8)
         for variant in scene["variants"]:
             if variant["status"] == "measured":

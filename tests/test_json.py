@@ -24,7 +24,7 @@ objects:
 STRONG = PLAIN.replace("[3, 5, -3]", "[3, 5, -3], intensity: 1e30, color: [1e30, 1, 1]")  # beyond float
 WARNED = PLAIN + "  - triangle: {vertices: [[0, 0, 0], [1, 1, 1], [2, 2, 2]]}\n"
 SMALL = "--size 48x32"
-QUICK = "--lanes 1 --seconds 0.1"
+QUICK = "--seconds 0.1"
 
 
 PAGE = ROOT / "docs/json.md"
@@ -97,7 +97,7 @@ class Json(TestCase):
 
     def test_render(self):
         self.check_members("glint render --timing=json", self.json(
-            f"render plain.yaml {SMALL} --lanes 1 --aov t,path --timing=json"))
+            f"render plain.yaml {SMALL} --aov t,path --timing=json"))
 
     def test_check(self):
         write("warned.yaml", WARNED)
@@ -109,8 +109,8 @@ class Json(TestCase):
         self.check_members("glint devices", self.json("devices --json"))
 
     def test_diff(self):
-        self.glint(f"render plain.yaml {SMALL} --lanes 1 --aov t -o a.png")
-        self.glint(f"render plain.yaml {SMALL} --lanes 1 --bounces 0 -o b.png")
+        self.glint(f"render plain.yaml {SMALL} --aov t -o a.png")
+        self.glint(f"render plain.yaml {SMALL} --bounces 0 -o b.png")
         self.check_members("glint diff", self.json("diff a.png b.png --heatmap map.png --json", status=3),
                            self.json("diff a.t.npy a.t.npy --json"))
 
@@ -123,8 +123,8 @@ class Json(TestCase):
 
     def test_verify(self):
         """Cases with a measure and without, one of them an image."""
-        self.check_members("glint verify", self.json("verify S5 P4 P6 --precision single --lanes 1 --lean --json"),
-                           self.json("verify P4 --precision single --lanes 1 --lean --json --perturb 1"))
+        self.check_members("glint verify", self.json("verify S5 P4 P6 --precision single --json"),
+                           self.json("verify P4 --precision single --json --perturb 7"))
 
     @unittest.skipUnless(need_device()["fp64"], "the device has no 64-bit floating point for a reference")
     def test_accuracy(self):
@@ -133,9 +133,8 @@ class Json(TestCase):
         common = f"--size 96x64 {QUICK} --bounces 16 --json"
         self.check_members(
             "glint accuracy",
-            self.json(f"accuracy planet.yaml {mirrors} strong.yaml {common} --precision single,double --perturb 1 "
-                      "--save saved"),
-            self.json(f"accuracy plain.yaml {common} --precision double"),
+            self.json(f"accuracy planet.yaml {mirrors} strong.yaml {common} --precision single,double --save saved"),
+            self.json(f"accuracy plain.yaml {common} --precision double --perturb 1:1000"),
             self.json(f"accuracy planet.yaml {common} --precision single --reference saved/0-planet-reference.color.npy"))
 
 

@@ -1,5 +1,6 @@
 // What must not change an image, bit for bit: lanes, features built in without need, bands, the region, a
 // repeated run; and what must change it in a known way: the scene's scale, its mirror image.
+// run_tests: sanitize-long-only
 #include "host/compile/transform.h"
 #include "host/import/load.h"
 #include "tests/film.h"
@@ -92,6 +93,8 @@ static void lanes_agree_on_aovs(void **state)
     "background: [0.1, 0.2, 0.4]\nambient: [0.5, 0.5, 0.5]\n"
 #define BALL "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1}}]\n"
 
+enum { LONG_SCENES = 5 }; // the last ones
+
 // For each feature a scene that needs it and as little else as can be.
 static const struct {
     FeatureSet features;
@@ -118,10 +121,6 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_TRANSMISSION,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9}}},\n"
                 "  {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
-    {FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n"},
-    {FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n"},
-    {FEATURE_SPOT_LIGHTS,
-     SCENE_HEAD "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0, 0], angle: 20}}]\n"},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" BALL},
     {FEATURE_SPHERES | FEATURE_DIRECTIONAL_LIGHTS,
      SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" BALL},
@@ -130,16 +129,21 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_CHECKERS,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
                 "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
+    {FEATURE_SPHERES | FEATURE_IMAGES, SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
+                                                  "  material: {image: scenes/images/globe.png}}}]\n"},
+    {FEATURE_TRIANGLES | FEATURE_IMAGES, SCENE_HEAD "objects: [{mesh: {file: tests/textures/quad.obj,\n"
+                                                    "  material: {image: scenes/images/globe.png}}}]\n"},
+    // where tests are long
+    {FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n"},
+    {FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n"},
+    {FEATURE_SPOT_LIGHTS,
+     SCENE_HEAD "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0, 0], angle: 20}}]\n"},
     {FEATURE_PLANES | FEATURE_CHECKERS,
      SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0],\n"
                 "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
-    {FEATURE_SPHERES | FEATURE_IMAGES, SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-                                                  "  material: {image: scenes/images/globe.png}}}]\n"},
     {FEATURE_PLANES | FEATURE_IMAGES,
      SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0],\n"
                 "  material: {image: scenes/images/globe.png, size: 0.7}}}]\n"},
-    {FEATURE_TRIANGLES | FEATURE_IMAGES, SCENE_HEAD "objects: [{mesh: {file: tests/textures/quad.obj,\n"
-                                                    "  material: {image: scenes/images/globe.png}}}]\n"},
 };
 
 static Scene scene_with_warnings(const char *text)
@@ -158,7 +162,8 @@ static void features_alone_and_all_together_agree(void **state)
     (void)state;
     FeatureSet seen = 0;
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    for (size_t i = 0; i < sizeof feature_scenes / sizeof *feature_scenes; i++) {
+    const size_t count = sizeof feature_scenes / sizeof *feature_scenes;
+    for (size_t i = 0; i < count - (tests_are_long() ? 0 : LONG_SCENES); i++) {
         Scene scene = scene_with_warnings(feature_scenes[i].text);
         assert_int_equal(features_of(&scene), feature_scenes[i].features);
         seen |= feature_scenes[i].features;

@@ -121,7 +121,9 @@ static Scene scene_of(Object *objects, size_t count, Material *material)
     return scene;
 }
 
-static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision precision)
+// For times the kernels of the shape alone; for errors those with every feature, which answer the same bits
+// and serve all shapes.
+static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision precision, FeatureSet features)
 {
     const RenderSettings settings = {.width = 1,
                                      .height = 1,
@@ -129,7 +131,8 @@ static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision pre
                                      .region_height = 1,
                                      .sample_count = 1,
                                      .bvh = BVH_OFF,
-                                     .precision = precision};
+                                     .precision = precision,
+                                     .extra_features = features};
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     message_list_print(&messages, stderr);
@@ -236,7 +239,7 @@ static double test_seconds(Compute *compute, const RandomShape *shape, Precision
             copies[i] = object;
         Material material;
         Scene scene = scene_of(copies, many ? 1 + COPIES : 1, &material);
-        Renderer *renderer = renderer_of(compute, &scene, precision);
+        Renderer *renderer = renderer_of(compute, &scene, precision, 0);
         seconds[many] = trace_seconds(renderer, &all);
         renderer_close(renderer);
     }
@@ -276,7 +279,7 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
     if (!*renderer) {
         Material material;
         Scene scene = scene_of(object, 1, &material);
-        *renderer = renderer_of(compute, &scene, precision);
+        *renderer = renderer_of(compute, &scene, precision, FEATURE_ALL);
     }
     rays_trace(*renderer, rays);
 }
