@@ -45,6 +45,8 @@ WRONG_COMMAND_LINES = [
     (r'device.* "(toaster|99)".*: 0 \(', "{render|trace --rays rays} sphere.yaml --device {toaster|99}"),
     (r"missing\.yaml.*No such file", "{render|trace --rays rays|check} missing.yaml"),
     (r"sphere\.txt", "{render|trace --rays rays|check} sphere.txt"),
+    (r"one scene, not also 'b\.yaml'", "{render|trace --rays rays|check} sphere.yaml b.yaml"),
+    (r"writes CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
     ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
     (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o image.{jpg|PNGX|}"),
     (r"nowhere/image\.png", f"render sphere.yaml {SMALL} -o nowhere/image.png"),

@@ -176,6 +176,39 @@ static void materials_come_from_the_file(void **state)
     scene_free(&scene);
 }
 
+static void assert_warnings(const char *first, const char *second)
+{
+    Text text = {0};
+    text_appendf(&text, CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n");
+    MessageList messages = {0};
+    Scene scene;
+    assert_true(scene_read_text(&scene, "scene.yaml", &text, false, &messages));
+    assert_int_equal(messages.count, first ? second ? 2 : 1 : 0);
+    if (first) assert_string_equal(messages.items[0].text, first);
+    if (second) assert_string_equal(messages.items[1].text, second);
+    message_list_free(&messages);
+    scene_free(&scene);
+    text_free(&text);
+}
+
+static void unused_parts_of_materials_are_reported(void **state)
+{
+    (void)state;
+    file_write("a.mtl", "newmtl red\nKd 1 0 0\nmap_Kd red.png\nmap_Bump bump.png\n");
+    file_write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nf 1 3 2\n");
+    assert_warnings(
+        "a.obj: the texture 'red.png' of material 'red' is not used: give the mesh a material with an "
+        "image",
+        "a.obj: the texture 'bump.png' of material 'red' is not used: give the mesh a material with an "
+        "image");
+    file_write("a.obj", "mtllib missing.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n");
+    file_write("a.mtl", "newmtl red\nKd 1 0 0\n");
+    assert_warnings(NULL, NULL); // assimp reads the file of the mesh's own name instead
+    unlink("a.mtl");
+    assert_warnings("a.obj: the material file 'missing.mtl' cannot be read: the default material is used",
+                    NULL);
+}
+
 static void numbers_of_materials_are_finite(void **state)
 {
     (void)state;
@@ -631,6 +664,7 @@ int main(void)
         cmocka_unit_test(normals_do_not_see_the_cut_of_a_polygon),
         cmocka_unit_test(normals_of_the_file_are_taken),
         cmocka_unit_test(materials_come_from_the_file),
+        cmocka_unit_test(unused_parts_of_materials_are_reported),
         cmocka_unit_test(numbers_of_materials_are_finite),
         cmocka_unit_test(material_is_white_where_the_file_has_none),
         cmocka_unit_test(every_format_is_read),

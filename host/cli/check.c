@@ -177,8 +177,7 @@ int command_check(int argument_count, char **arguments)
             return EXIT_USER;
         }
     }
-    if (optind + 1 != argument_count)
-        return option_usage_fault("check", optind == argument_count ? "no scene given" : "takes one scene");
+    if (!option_only_scene("check", argument_count, arguments)) return EXIT_USER;
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};

@@ -3,6 +3,7 @@
 
 #include "host/base/fault.h"
 #include "host/base/text.h"
+#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -162,6 +163,17 @@ int option_usage_fault(const char *command, const char *what)
 {
     fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
     return EXIT_USER;
+}
+
+bool option_only_scene(const char *command, int argument_count, char **arguments)
+{
+    if (optind + 1 == argument_count) return true;
+    if (optind == argument_count)
+        option_usage_fault(command, "no scene given");
+    else
+        fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", command,
+                arguments[optind + 1], command);
+    return false;
 }
 
 void messages_print(MessageList *messages, const char *path)

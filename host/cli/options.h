@@ -97,6 +97,9 @@ int option_help(const char *text);
 // Prints a usage error that points to --help; returns EXIT_USER.
 int option_usage_fault(const char *command, const char *what);
 
+// Whether one argument is left, from getopt's `optind`; else prints what is missing or too much.
+bool option_only_scene(const char *command, int argument_count, char **arguments);
+
 // Loads the scene and prints its messages. False if it cannot be read; nothing to free then.
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
 // Prints and frees messages; errors in an .rt file follow the line `Error` that miniRT's testers expect.

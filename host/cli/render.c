@@ -137,8 +137,7 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
         if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
-    if (optind + 1 != argument_count)
-        return option_usage_fault("render", optind == argument_count ? "no scene given" : "takes one scene");
+    if (!option_only_scene("render", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
     return OPTIONS_READ;
 }

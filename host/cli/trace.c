@@ -6,6 +6,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/image/image.h"
 #include "host/import/report.h"
 #include <float.h>
 #include <getopt.h>
@@ -116,11 +117,25 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
     return report_close(&report);
 }
 
+// NumPy's format description, version 1.0: a file starts with this.
+static bool is_npy(const Text *text)
+{
+    return text->count >= 6 && memcmp(text->items, "\x93NUMPY", 6) == 0;
+}
+
 static bool rays_load(RayList *rays, const TraceOptions *options)
 {
     MessageList messages = {0};
     Text text = {0};
     bool read = text_read_file(&text, options->rays, &messages);
+    if (read && is_npy(&text)) {
+        message_add(
+            &messages, MESSAGE_ERROR,
+            "%s: a NumPy array; rays are text, six or eight numbers a line: origin, direction and, if "
+            "given, tmin and tmax",
+            options->rays);
+        read = false;
+    }
     if (read) {
         Source source = {options->rays, text_c(&text), text.count};
         read = rays_read(rays, &source, &options->common, &messages);
@@ -205,9 +220,10 @@ static int options_read(TraceOptions *options, int argument_count, char **argume
         else if (option_common(&options->common, option, optarg, &valid) && !valid)
             return EXIT_USER;
     }
-    if (optind + 1 != argument_count)
-        return option_usage_fault("trace", optind == argument_count ? "no scene given" : "takes one scene");
+    if (!option_only_scene("trace", argument_count, arguments)) return EXIT_USER;
     if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
+    if (image_format_of(options->output) != IMAGE_UNKNOWN)
+        return option_usage_fault("trace", "writes CSV: the output's name must not be an image's or array's");
     options->scene = arguments[optind];
     return OPTIONS_READ;
 }

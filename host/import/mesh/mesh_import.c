@@ -249,6 +249,35 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
 }
 
 // glint's highlights have the light's color; only the strength of the file's specular color is kept.
+// One warning for each texture of the material: meshes get theirs from the scene.
+static void warn_of_textures(const Importer *importer, const struct aiMaterial *material, const char *name)
+{
+    char previous[MAXLEN] = "";
+    for (int type = aiTextureType_DIFFUSE; type <= AI_TEXTURE_TYPE_MAX; type++) {
+        struct aiString path = {0};
+        if (aiGetMaterialTextureCount(material, (enum aiTextureType)type) == 0) continue;
+        aiGetMaterialTexture(material, (enum aiTextureType)type, 0, &path, NULL, NULL, NULL, NULL, NULL,
+                             NULL);
+        path.data[strcspn(path.data, "\r\n")] = '\0';
+        // assimp lists a glTF base color under two types
+        if (strcmp(path.data, previous) == 0) continue;
+        report_warning(importer->report, importer->offset,
+                       "%s: the texture '%.100s' of material '%.40s' is not used: give the mesh a material "
+                       "with an image",
+                       importer->import->path, path.data, name);
+        memcpy(previous, path.data, sizeof previous);
+    }
+}
+
+static void warn_of_missing_material_file(const Importer *importer)
+{
+    char name[200];
+    if (obj_find_missing_material_file(importer->import->path, name, sizeof name))
+        report_warning(importer->report, importer->offset,
+                       "%s: the material file '%s' cannot be read: the default material is used",
+                       importer->import->path, name);
+}
+
 static Material material_of(const Importer *importer, const struct aiMaterial *file_material)
 {
     Material material = material_default();
@@ -271,7 +300,10 @@ static uint32_t material_index(Importer *importer, unsigned index)
     aiGetMaterialString(file_material, AI_MATKEY_NAME, &name);
     Material material = material_default();
     // assimp's default where the file has none
-    if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) material = material_of(importer, file_material);
+    if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) {
+        material = material_of(importer, file_material);
+        warn_of_textures(importer, file_material, name.data);
+    }
     *known = scene_add_material(importer->scene, &material, name.data);
     return *known;
 }
@@ -426,6 +458,7 @@ static bool mesh_reserve(Importer *importer)
         mesh->normals = memory_allocate_zeroed(vertex_count + 1, sizeof *mesh->normals);
     if (has_uvs) mesh->uvs = memory_allocate_zeroed(vertex_count + 1, sizeof *mesh->uvs);
     if (importer->import->own_materials) {
+        warn_of_missing_material_file(importer);
         mesh->materials = memory_allocate(triangle_count + 1, sizeof *mesh->materials);
         importer->materials = memory_allocate(importer->file->mNumMaterials + 1, sizeof *importer->materials);
         memset(importer->materials, 0xff, importer->file->mNumMaterials * sizeof *importer->materials);

@@ -31,6 +31,10 @@ bool mesh_import(Scene *scene, const MeshImport *import, Report *report, size_t 
 // first. False if there is none or the file cannot be read.
 bool obj_find_fault(const char *path, char *fault, size_t size);
 
+// Writes the name of the first material file (mtllib) that an OBJ file names and that cannot be read. False
+// if there is none, or one of the OBJ file's own name, which assimp reads instead.
+bool obj_find_missing_material_file(const char *path, char *name, size_t size);
+
 // Writes what would make assimp crash or never finish on a glTF file. False if there is nothing.
 bool gltf_find_fault(const char *path, char *fault, size_t size);
 

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 
 typedef struct {
     Line line;
@@ -121,5 +122,43 @@ bool obj_find_fault(const char *path, char *fault, size_t size)
     }
     text_free(&text);
     message_list_free(&messages);
+    return found;
+}
+
+static bool is_readable(const char *folder, size_t folder_length, const char *name)
+{
+    Text path = {0};
+    text_append(&path, folder, folder_length);
+    text_appendf(&path, "%s", name);
+    bool readable = access(text_c(&path), R_OK) == 0;
+    text_free(&path);
+    return readable;
+}
+
+bool obj_find_missing_material_file(const char *path, char *name, size_t size)
+{
+    size_t length = strlen(path);
+    FILE *file = length < 4 || strcasecmp(path + length - 4, ".obj") != 0 ? NULL : fopen(path, "rbe");
+    if (!file) return false;
+    const char *slash = strrchr(path, '/');
+    size_t folder_length = slash ? (size_t)(slash + 1 - path) : 0;
+    char *line = NULL;
+    size_t capacity = 0;
+    bool found = false;
+    while (!found && getline(&line, &capacity, file) > 0) {
+        static const char keyword[] = "mtllib";
+        const char *start = line + strspn(line, " \t");
+        if (strncmp(start, keyword, strlen(keyword)) != 0) continue;
+        start += strlen(keyword) + strspn(start + strlen(keyword), " \t");
+        snprintf(name, size, "%.*s", (int)strcspn(start, "\r\n"), start);
+        found = name[0] != '\0' && !is_readable(path, name[0] == '/' ? 0 : folder_length, name);
+    }
+    free(line);
+    fclose(file);
+    Text fallback = {0};
+    text_append(&fallback, path, length - strlen("obj"));
+    text_appendf(&fallback, "mtl");
+    found = found && access(text_c(&fallback), R_OK) != 0;
+    text_free(&fallback);
     return found;
 }
