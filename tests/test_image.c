@@ -459,6 +459,28 @@ static void test_png_that_declares_too_much(void **state)
     assert_true(peak_kibibytes() - before < 64 * 1024);
 }
 
+// 2 x 2 pixels are fewer than 5, 3 x 2 are not.
+static void test_pixels_are_limited(void **state)
+{
+    (void)state;
+    image_limit_pixels(5);
+    file_write("small.ppm", "P6 2 2 255 123456789abc", 23);
+    Image image = image_read_file("small.ppm");
+    image_free(&image);
+    file_write("large.ppm", "P6 3 2 255 123456789abcdefghi", 29);
+    MessageList messages = {0};
+    assert_false(image_read(&image, "large.ppm", &messages));
+    assert_int_equal(messages.count, 1);
+    assert_string_equal(messages.items[0].text, "cannot read 'large.ppm': 3 x 2 pixels are more than 5; "
+                                                "--max-pixels raises this limit");
+    message_list_free(&messages);
+    image_limit_pixels(IMAGE_PIXELS_MAX);
+    image = image_read_file("large.ppm");
+    image_free(&image);
+    unlink("small.ppm");
+    unlink("large.ppm");
+}
+
 static void test_text_pixmap(void **state)
 {
     (void)state;
@@ -490,6 +512,7 @@ int main(void)
         cmocka_unit_test(test_format_by_ending),
         cmocka_unit_test(test_bad_files),
         cmocka_unit_test(test_png_that_declares_too_much),
+        cmocka_unit_test(test_pixels_are_limited),
         cmocka_unit_test(test_text_pixmap),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);

@@ -16,6 +16,7 @@ enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON };
 
 static const struct option long_options[] = {
     {"heatmap", required_argument, NULL, OPTION_HEATMAP},
+    {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},
     {"json", no_argument, NULL, OPTION_JSON},
     {"help", no_argument, NULL, 'h'},
     {0},
@@ -25,8 +26,8 @@ static const char help_text[] =
     "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
     "Compares two images (PNG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal; 3: "
     "different.\n\n"
-    "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_JSON
-        HELP_HELP;
+    "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_MAX_PIXELS
+        HELP_JSON HELP_HELP;
 
 typedef struct {
     const char *reference_path, *test_path, *heatmap_path;
@@ -187,6 +188,9 @@ int command_diff(int argument_count, char **arguments)
             break;
         case OPTION_JSON:
             options.as_json = true;
+            break;
+        case OPTION_MAX_PIXELS:
+            if (!option_max_pixels(optarg)) return EXIT_USER;
             break;
         case 'h':
             return option_help(help_text);

@@ -1,4 +1,5 @@
 #include "host/cli/options.h"
+#include "host/image/image.h"
 #include "host/import/load.h"
 
 #include "host/base/fault.h"
@@ -52,6 +53,14 @@ bool option_size(const char *option, const char *value, uint32_t *width, uint32_
     }
     *width = (uint32_t)w;
     *height = (uint32_t)h;
+    return true;
+}
+
+bool option_max_pixels(const char *value)
+{
+    uint32_t largest;
+    if (!option_count("max-pixels", value, 1, UINT32_MAX, &largest)) return false;
+    image_limit_pixels(largest);
     return true;
 }
 
@@ -144,6 +153,9 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
         return true;
     case OPTION_LENIENT:
         common->lenient = true;
+        return true;
+    case OPTION_MAX_PIXELS:
+        *valid = option_max_pixels(value);
         return true;
     case OPTION_PERTURB:
         *valid = perturb_read(value, common);

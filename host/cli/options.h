@@ -26,6 +26,7 @@ enum {
     OPTION_BVH,
     OPTION_NO_CACHE,
     OPTION_LENIENT,
+    OPTION_MAX_PIXELS,
     OPTION_PERTURB,
     OPTION_OWN
 };
@@ -35,6 +36,7 @@ enum {
         {"precision", required_argument, NULL, OPTION_PRECISION},                                            \
         {"lanes", required_argument, NULL, OPTION_LANES}, {"bvh", required_argument, NULL, OPTION_BVH},      \
         {"no-cache", no_argument, NULL, OPTION_NO_CACHE},                                                    \
+        {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
     {                                                                                                        \
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
@@ -53,8 +55,9 @@ enum {
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
 #define HELP_BOUNCES                                                                                         \
     "      --bounces N       reflections and refractions of a ray: at most N, up to 255 (default: 5)\n"
-#define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
-#define HELP_LENIENT  "      --lenient         skip unknown elements of .rt files with a warning\n"
+#define HELP_NO_CACHE   "      --no-cache        ignore the kernel cache\n"
+#define HELP_LENIENT    "      --lenient         skip unknown elements of .rt files with a warning\n"
+#define HELP_MAX_PIXELS "      --max-pixels N    of an image that is read (default: 134217728)\n"
 #define HELP_PERTURB                                                                                         \
     "      --perturb SEED[:SCALE]\n"                                                                         \
     "                        inject the rounding error that OpenCL permits, times SCALE (default: 1)\n"
@@ -66,7 +69,7 @@ enum {
     HELP_DEVICE                                                                                              \
     "      --precision P     fast, single, strict or double (default: single)\n" HELP_LANES                  \
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
-        HELP_LENIENT
+        HELP_LENIENT HELP_MAX_PIXELS
 
 enum { IMAGE_SIDE_MAX = 1 << 20, SAMPLES_MAX = 1 << 20, BOUNCES_DEFAULT = 5 };
 
@@ -86,6 +89,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // WxH
 bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
                    unsigned *result);
+bool option_max_pixels(const char *value); // and sets the limit
 // Comma-separated names; the result has one bit per name.
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,
                 unsigned *result);

@@ -105,6 +105,13 @@ bool image_refuse(const ImageFile *file, const char *format, ...)
     return false;
 }
 
+static uint32_t pixels_max = IMAGE_PIXELS_MAX;
+
+void image_limit_pixels(uint32_t largest)
+{
+    pixels_max = largest;
+}
+
 bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_t height, uint64_t channels,
                     uint64_t expansion)
 {
@@ -115,6 +122,9 @@ bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_
         __builtin_mul_overflow(width * height, channels, &values) ||
         __builtin_mul_overflow(values, sizeof *image->values, &bytes) || bytes > most)
         return image_refuse(file, "the file is too short for its image");
+    if (width * height > pixels_max)
+        return image_refuse(file, "%ju x %ju pixels are more than %u; --max-pixels raises this limit",
+                            (uintmax_t)width, (uintmax_t)height, pixels_max);
     image->values = calloc(values, sizeof *image->values);
     if (!image->values) return image_refuse(file, "the image does not fit into memory");
     image->width = (uint32_t)width;

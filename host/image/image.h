@@ -57,7 +57,10 @@ typedef struct {
     double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL
 } Image;
 // Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message
-// and an empty image that need not be freed.
+// and an empty image that need not be freed. An image whose header declares more pixels than
+// image_limit_pixels permits is refused before anything is decoded: a small file may be compressed from many.
 bool image_read(Image *image, const char *path, MessageList *messages);
+enum { IMAGE_PIXELS_MAX = 1 << 27 }; // the default: 1.6 GB of floats
+void image_limit_pixels(uint32_t largest);
 double image_value(const Image *image, size_t i); // values[i], at the file's own width
 void image_free(Image *image);

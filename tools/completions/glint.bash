@@ -3,16 +3,16 @@
 _glint_options() {
     case ${1-} in
     render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
-        "--timing --transfer --bits --no-cache --lenient --perturb --quiet -h --help" ;;
-    view) echo "--size --samples --bounces --device --precision --lanes --bvh --no-cache --lenient -h --help" ;;
-    trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --perturb -h --help" ;;
+        "--timing --transfer --bits --no-cache --lenient --max-pixels --perturb --quiet -h --help" ;;
+    view) echo "--size --samples --bounces --device --precision --lanes --bvh --no-cache --lenient --max-pixels -h --help" ;;
+    trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --max-pixels --perturb -h --help" ;;
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
-    diff) echo "--heatmap --json -h --help" ;;
+    diff) echo "--heatmap --max-pixels --json -h --help" ;;
     bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --tolerance --device" \
-        "--lenient -h --help" ;;
+        "--lenient --max-pixels -h --help" ;;
     accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
-        "--perturb --device --lenient -h --help" ;;
+        "--perturb --device --lenient --max-pixels -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --lean --json -h --help" ;;
     cache) echo "--clear -h --help" ;;
     *) echo "--version --help" ;;
@@ -37,7 +37,7 @@ _glint() {
     --device) words="cpu gpu" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
-    --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance) return ;;
+    --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance | --max-pixels) return ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

@@ -28,6 +28,7 @@ complete -c glint -n '__fish_seen_subcommand_from render view trace' -l bvh -x -
 complete -c glint -n '__fish_seen_subcommand_from render view trace verify' -l no-cache -d 'Build the kernel anew'
 complete -c glint -n '__fish_seen_subcommand_from render trace accuracy verify' -l perturb -x -d 'Err as other devices may, SEED[:SCALE]'
 complete -c glint -n '__fish_seen_subcommand_from render view trace check bench accuracy' -l lenient -d 'Skip unknown elements of a .rt scene'
+complete -c glint -n '__fish_seen_subcommand_from render view trace diff bench accuracy' -l max-pixels -x -d 'Largest image that is read'
 complete -c glint -n '__fish_seen_subcommand_from cache' -l clear -d 'Remove all programs'
 complete -c glint -n '__fish_seen_subcommand_from verify' -l lean -d 'Build small kernels, for a slow compiler'
 complete -c glint -n '__fish_seen_subcommand_from check devices diff bench accuracy verify' -l json -d 'For programs'

@@ -23,6 +23,7 @@ _glint_render() {
         '--no-cache[build the kernel anew]' \
         '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
+        '--max-pixels[largest image that is read]:number:' \
         '--quiet[no progress]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
@@ -39,6 +40,7 @@ _glint_view() {
         '--bounces[reflections and refractions at most]:number:' \
         '--no-cache[build the kernel anew]' \
         '--lenient[skip unknown elements of a .rt scene]' \
+        '--max-pixels[largest image that is read]:number:' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
@@ -54,6 +56,7 @@ _glint_trace() {
         '--no-cache[build the kernel anew]' \
         '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
+        '--max-pixels[largest image that is read]:number:' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
@@ -93,6 +96,7 @@ _glint_cache() {
 _glint_diff() {
     _arguments \
         '--heatmap[image of the differences]:image:_files -g "*.(png|ppm|exr|npy)"' \
+        '--max-pixels[largest image that is read]:number:' \
         '--json[print JSON]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:reference:_files -g "*.(png|ppm|exr|npy)"' \
@@ -112,6 +116,7 @@ _glint_bench() {
         '--tolerance[new time over old that passes]:ratio:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--lenient[skip unknown elements of a .rt scene]' \
+        '--max-pixels[largest image that is read]:number:' \
         '(- *)'{-h,--help}'[list the options]' \
         '*:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
@@ -132,6 +137,7 @@ _glint_accuracy() {
         '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--lenient[skip unknown elements of a .rt scene]' \
+        '--max-pixels[largest image that is read]:number:' \
         '(- *)'{-h,--help}'[list the options]' \
         '*:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
 }
