@@ -73,8 +73,7 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
         if (option == 'h') return help_print();
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
-    if (optind + 1 != argument_count)
-        return option_usage_fault("view", optind == argument_count ? "no scene given" : "takes one scene");
+    if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
     return OPTIONS_READ;
 }
