@@ -112,6 +112,12 @@ class WrongInput(CliTestCase):
                 write("rays", rays + "\n")
                 self.refuses("trace sphere.yaml --rays rays", pattern)
 
+    def test_array_of_rays(self):
+        with open("rays.npy", "wb") as file:
+            file.write(b"\x93NUMPY\x01\x00" + 200 * b"\xff\n")
+        errors = self.refuses("trace sphere.yaml --rays rays.npy", r"rays\.npy: a NumPy array; rays are text").stderr
+        self.assertEqual(errors.count("\n"), 1)
+
     def test_at_most_20_errors(self):
         write("rays", "\n".join(map(str, range(1, 100001))))
         errors = self.refuses("trace sphere.yaml --rays rays", "^rays:1:1: error: expected .*1$").stderr
@@ -212,6 +218,19 @@ class Failures(CliTestCase):
                 self.assertIn("long.png", errors)
                 self.assertEqual(read("long.png"), "an earlier image")
                 self.nothing_left("long.png.*")
+
+    def test_images_too_large(self):
+        """What cannot fit on the disk is refused; else the first bands say how long it takes."""
+        for name in "vast.ppm", "vast.npy":
+            self.refuses(f"render sphere.yaml --size 1048576x1048576 --quiet -o {name}", "its disk has .* MB left")
+        self.nothing_left("vast.*")
+        os.symlink("/dev/null", "null.png")
+        command = [PROGRAM, *"render sphere.yaml --size 1048576x1048576 -o null.png".split()]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as render:
+            self.assertRegex(render.stderr.readline(), r"^glint: 1048576 x 1048576 pixels: about \d+ hours and .* MB\n")
+            render.send_signal(signal.SIGINT)
+            self.assertIn("interrupted", render.communicate(timeout=120)[1])
+        self.assertEqual(render.returncode, 130)
 
     def test_signals_before_the_render(self):
         """A signal while the scene is read ends glint like later ones; one that is ignored stays ignored."""

@@ -27,6 +27,7 @@ struct ImageOutput {
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted; // a band's values in another type
+    double bytes;      // estimated, of all files
 
     // A band is written by a thread of its own while the next is rendered; until it has ended, all from here
     // on is that thread's, and so are the writers and messages.
@@ -256,11 +257,25 @@ static void band_keep(ImageOutput *output, const Film *band)
     }
 }
 
+static double bytes_estimate(const ImageOutput *output, uint32_t rows_written)
+{
+    uint64_t bytes = image_writer_bytes(output->image);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (output->aovs[layer]) bytes += image_writer_bytes(output->aovs[layer]);
+    return (double)bytes * output->settings->region_height / rows_written;
+}
+
+double image_output_bytes(const ImageOutput *output)
+{
+    return output->bytes;
+}
+
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
 {
     if (!output->opened && !files_open(output, band, messages)) return false;
     output->opened = true;
     if (!band_written(output)) return false;
+    if (band->first_row > 0) output->bytes = bytes_estimate(output, band->first_row);
     output->messages = messages;
     band_keep(output, band);
     output->writing =

@@ -29,6 +29,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 // Encodes a copy of the band while the caller goes on, unless options.synchronous; the messages belong to the
 // output until it is committed or abandoned. False: this band could not be written, or an earlier one.
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages);
+// Estimated bytes of all files; 0 before the second band.
+double image_output_bytes(const ImageOutput *output);
 // Puts all files in place; frees the output. False with a message if one could not be. *seconds: spent on
 // encoding and writing, beside other work or not.
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds);

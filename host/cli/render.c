@@ -171,13 +171,37 @@ typedef struct {
     ImageOutput *output;
     Progress *progress;
     MessageList *messages;
+    const RenderSettings *settings;
+    double first_fraction, first_seconds; // after the first band
+    bool is_quiet, is_estimated;
 } BandContext;
+
+// Says once what a long render takes, by the second band: the first one's time includes the kernel's build.
+static void estimate_print(BandContext *take, double fraction_done)
+{
+    enum { SECONDS_MIN = 60, MINUTE = 60, HOUR = 3600 };
+    double now = clock_seconds();
+    if (take->is_quiet || take->is_estimated) return;
+    if (take->first_fraction == 0) {
+        take->first_fraction = fraction_done;
+        take->first_seconds = now;
+        return;
+    }
+    take->is_estimated = true;
+    double left = (now - take->first_seconds) * (1 - fraction_done) / (fraction_done - take->first_fraction);
+    if (left < SECONDS_MIN) return;
+    bool in_hours = left >= 2 * HOUR;
+    fprintf(stderr, "glint: %u x %u pixels: about %.0f %s and %.3g MB\n", take->settings->region_width,
+            take->settings->region_height, left / (in_hours ? HOUR : MINUTE), in_hours ? "hours" : "minutes",
+            1e-6 * image_output_bytes(take->output));
+}
 
 static bool band_take(void *context, const Film *band, double fraction_done)
 {
     BandContext *take = context;
     if (progress_interrupted()) return false;
     bool written = image_output_write(take->output, band, take->messages);
+    if (written) estimate_print(take, fraction_done);
     progress_show(take->progress, fraction_done);
     return written;
 }
@@ -199,7 +223,11 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     progress_open(&progress, options->quiet);
     ImageOutput *output =
         image_output_open(&options->output, options->scene, scene, &settings, renderer, compute->device);
-    BandContext context = {output, &progress, &messages};
+    BandContext context = {.output = output,
+                           .progress = &progress,
+                           .messages = &messages,
+                           .settings = &settings,
+                           .is_quiet = options->quiet};
     bool whole = renderer_render(renderer, options->output.aovs, band_take, &context);
     double encode_seconds = 0;
     if (whole)

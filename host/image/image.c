@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/statvfs.h>
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "NPY rows are written as they lie in memory");
 
@@ -41,12 +42,52 @@ static const Encoder *encoder_of(ImageFormat format)
     fault("an image of unknown format");
 }
 
+// Deflate, in PNG and EXR, makes 1032 bytes of one at most (zlib's technical details).
+enum { DEFLATE_RATIO_MAX = 1032 };
+
+static uint64_t bytes_min(const ImageHeader *header)
+{
+    uint64_t values = (uint64_t)header->width * header->height * header->channels;
+    switch (header->format) {
+    case IMAGE_PPM:
+        return values * (header->bits / 8);
+    case IMAGE_NPY:
+        return values * (header->npy_type == 'd' ? 8 : 4);
+    case IMAGE_PNG:
+    case IMAGE_EXR:
+    case IMAGE_UNKNOWN:
+        break;
+    }
+    return values / DEFLATE_RATIO_MAX;
+}
+
+// False with a message where the disk has no room for the image, however well it is compressed.
+static bool disk_has_room(const ImageWriter *writer, MessageList *messages)
+{
+    struct statvfs disk;
+    uint64_t bytes = bytes_min(&writer->header);
+    if (!writer->output.has_folder || fstatvfs(writer->output.folder, &disk) != 0) return true;
+    double room = (double)disk.f_bavail * (double)disk.f_frsize;
+    if (disk.f_blocks == 0 || (double)bytes <= room) return true;
+    message_add(messages, MESSAGE_ERROR,
+                "cannot write '%s': it has %.3g MB or more, and its disk has %.3g MB left",
+                writer->output.target, 1e-6 * (double)bytes, 1e-6 * room);
+    return false;
+}
+
+uint64_t image_writer_bytes(const ImageWriter *writer)
+{
+    off_t position = writer->output.file ? ftello(writer->output.file) : 0;
+    return position > 0 ? (uint64_t)position : 0;
+}
+
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages)
 {
     ImageWriter *writer = memory_allocate_zeroed(1, sizeof *writer);
     writer->header = *header;
     writer->encoder = encoder_of(header->format);
-    if (output_open(&writer->output, path, messages) && writer->encoder->begin(writer, messages))
+    if (output_open(&writer->output, path, messages) && disk_has_room(writer, messages) &&
+        writer->encoder->begin(writer, messages))
         return writer;
     image_writer_abandon(writer);
     return NULL;

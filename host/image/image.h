@@ -27,13 +27,14 @@ ImageFormat image_format_of(const char *path); // by its ending, in any case
 // Writes row by row, so that a large image needs memory for a band only. Nothing is at the target path until
 // image_writer_commit renames the file.
 typedef struct ImageWriter ImageWriter;
-// NULL with an error message if the file cannot be written. Reads the header's notes; they need not outlive
-// it.
+// NULL with an error message if the file cannot be written, or cannot fit on its disk. Reads the header's
+// notes; they need not outlive it.
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages);
 // `pixels`: row_count x width x channels values of npy_type ('f' for PNG, PPM, EXR), from the top. Returns
 // false with an error message if they cannot be written; the writer must still be committed, which then fails
 // silently, or abandoned. More rows than the image has are a bug.
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
+uint64_t image_writer_bytes(const ImageWriter *writer); // so far; 0 where that is unknown
 // Completes the file so that only the rename is left: of several files none is put in place before all are
 // complete. False with an error message on failure; the writer must still be committed or abandoned.
 bool image_writer_finish(ImageWriter *writer, MessageList *messages);
