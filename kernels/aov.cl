@@ -21,7 +21,7 @@ typedef struct {
 } HitLayers;
 
 // light_count: 0 without a shadow layer.
-static KERNEL_BODY void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
+static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
                                   uint light_count)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);

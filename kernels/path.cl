@@ -3,11 +3,11 @@
 #include "film.h"
 #include "shading/path.h"
 
-static KERNEL_BODY void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths)
+static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Seen seen;
-    rays_see(scene, &ray, 1, &seen);
+    camera_rays_see(scene, &ray, 1, &seen);
     unsigned_integer signature;
     ray_tree_color(scene, ray, &seen, &signature);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));

@@ -8,7 +8,7 @@
 // pixel, -1 to 1. `compensation`: the rounding error of the sum, compensated in the next addition and kept
 // between launches (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965): a plain sum of a
 // million equal samples would be off by 1 %.
-static KERNEL_BODY void tiles_render(const Scene *scene, const Band *band, uint first_tile,
+static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
                                      global scalar *compensation, uint first_sample, uint last_sample)
 {
@@ -30,7 +30,7 @@ static KERNEL_BODY void tiles_render(const Scene *scene, const Band *band, uint 
                                  tiles[i].inside);
             ray_counter_add(scene, RAYS_CAMERA, rays[i].active);
         }
-        rays_see(scene, rays, PACKETS, seen);
+        camera_rays_see(scene, rays, PACKETS, seen);
         for (uint i = 0; i < PACKETS; i++) {
             unsigned_integer path;
             Color3 color = vector_subtract(ray_tree_color(scene, rays[i], &seen[i], &path), lost[i]);

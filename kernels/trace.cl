@@ -16,7 +16,7 @@ static inline void vector_store(Vector vector, RealLanes *to)
 // rays: RAY_SCALARS per ray. results: RESULT_SCALARS per ray: t,
 // geometric normal facing the ray, position, origin and direction of the reflected and of the refracted ray,
 // transmitted fraction, and transmittance from tmin to tmax. On a miss only the last is valid.
-static KERNEL_BODY void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
+static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
 {
     RealLanes value[RAY_SCALARS];

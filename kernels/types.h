@@ -128,8 +128,7 @@ typedef struct {
 } BvhNode;
 #endif
 
-// BVH_DEPTH_MAX: see host/compile/bvh.h.
-enum { BVH_NODE = 0xff, BVH_DEPTH_MAX = 80 };
+enum { BVH_NODE = 0xff };
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
 // a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the

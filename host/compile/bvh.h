@@ -32,9 +32,9 @@ typedef struct {
     unsigned depth; // inner nodes on the longest path
 } Bvh;
 
-enum { BVH_LEAF_MAX = 8 }; // primitives per leaf, at most
+enum { BVH_LEAF_MAX = 8 /* primitives per leaf */, BVH_DEPTH_MAX = 80 };
 
 // `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
-// of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep (kernels/types.h).
+// of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep.
 void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count);
 void bvh_free(Bvh *bvh);

@@ -39,11 +39,12 @@ typedef struct CompiledTexture {
 } CompiledTexture;
 
 typedef struct {
-    FlatArray arrays[FLAT_COUNT]; // in the order of the kernels' arguments
-    FeatureSet features;          // that the kernels need
-    double unit;                  // scene units per unit of length in the arrays, a power of two
-    double bvh_seconds;           // building the BVH
-    double flatten_seconds;       // everything else in scene_compile
+    FlatArray arrays[FLAT_COUNT];  // in the order of the kernels' arguments
+    FeatureSet features;           // that the kernels need
+    double unit;                   // scene units per unit of length in the arrays, a power of two
+    uint32_t pending_children_max; // of the BVH, while a ray visits it; 0 without one
+    double bvh_seconds;            // building the BVH
+    double flatten_seconds;        // everything else in scene_compile
     // What the stages leave for later ones and for the header.
     CompiledTexture *textures;           // of each of the scene's textures
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays

@@ -127,6 +127,7 @@ static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSetti
     renderer->settings = *settings;
     renderer->light_count = scene->lights.count;
     renderer->unit = compiled.unit;
+    renderer->pending_children_max = compiled.pending_children_max;
     renderer->report.features = compiled.features;
     renderer->report.lanes = compile_settings.lanes;
     renderer->report.is_double = is_double;
@@ -142,18 +143,38 @@ static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSetti
     return compute_ok(renderer->compute);
 }
 
-// Refracted rays that wait while reflected ones are traced, up to one per depth. Few sizes, so that few
-// kernels are built: 16, which most scenes' depth is below, and doubled from there.
+// At least `count`: few sizes, so that few kernels are built. Most scenes are served by `usual`, which is
+// doubled for the others.
+static uint32_t capacity_for(uint32_t count, uint32_t usual)
+{
+    while (usual < count)
+        usual *= 2;
+    return usual;
+}
+
+// Refracted rays that wait while reflected ones are traced, up to one per depth.
 static uint32_t pending_max(const Renderer *renderer)
 {
     if (!(renderer->report.features & FEATURE_TRANSMISSION)) return 1;
-    uint32_t count = 16;
-    while (count < renderer->settings.bounce_count)
-        count *= 2;
-    return count;
+    return capacity_for(renderer->settings.bounce_count, 8);
 }
 
-// The definitions and compiler options that distinguish the variants of the kernels.
+static void kernels_close(Renderer *renderer)
+{
+    for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
+        KernelSlot *slot = &renderer->kernels[kind];
+        if (slot->kernel) {
+            // it has been launched: its program's binary holds finished machine code
+            program_store(renderer->compute, &slot->request, &slot->program);
+            clReleaseKernel(slot->kernel);
+        }
+        program_close(&slot->program);
+        *slot = (KernelSlot){0};
+    }
+}
+
+// The definitions and compiler options that distinguish the variants of the kernels. Kernels of another
+// variant are closed.
 static void variant_set(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
@@ -164,7 +185,7 @@ static void variant_set(Renderer *renderer)
     // OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
     // vectors, unlike llvmpipe and Oclgrind
     bool has_fma = renderer->report.is_double || device->fma_in_hardware || device->native_float_width > 1;
-    Text *text = &renderer->prelude;
+    Text prelude = {0}, *text = &prelude;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
@@ -172,11 +193,20 @@ static void variant_set(Renderer *renderer)
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
     text_appendf(text, "#define HAS_FMA %d\n", has_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
+    // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
+    text_appendf(text, "#define STACK_CAPACITY %u\n", capacity_for(renderer->pending_children_max, 40));
     text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
     text_appendf(text, "#define PERTURB %d\n", seed != 0);
     text_appendf(text, "#define PERTURB_SEED %uu\n", seed);
     text_appendf(text, "#define PERTURB_SCALE %u\n", scale > 0 ? scale : 1);
     features_write_prelude(text, renderer->report.features);
+    if (strcmp(text_c(&prelude), text_c(&renderer->prelude)) == 0) {
+        text_free(&prelude);
+        return;
+    }
+    kernels_close(renderer);
+    text_free(&renderer->prelude);
+    renderer->prelude = prelude;
 
     renderer->options = "-cl-std=CL1.2";
     if (precision == PRECISION_FAST) renderer->options = "-cl-std=CL1.2 -cl-fast-relaxed-math";
@@ -202,21 +232,15 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages)
 {
-    return compute_ok(renderer->compute) && scene_take(renderer, scene, settings, messages);
+    if (!compute_ok(renderer->compute) || !scene_take(renderer, scene, settings, messages)) return false;
+    variant_set(renderer); // another eye may need another feature, or a deeper stack
+    return true;
 }
 
 void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
-    for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
-        KernelSlot *slot = &renderer->kernels[kind];
-        if (slot->kernel) {
-            // it has been launched: its program's binary holds finished machine code
-            program_store(renderer->compute, &slot->request, &slot->program);
-            clReleaseKernel(slot->kernel);
-        }
-        program_close(&slot->program);
-    }
+    kernels_close(renderer);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
         buffer_release(renderer->arrays[kind]);
     buffer_release(renderer->offsets);
@@ -230,6 +254,11 @@ void renderer_close(Renderer *renderer)
 size_t renderer_scalar_size(const Renderer *renderer)
 {
     return renderer->report.is_double ? sizeof(double) : sizeof(float);
+}
+
+char *renderer_kernel_text(const Renderer *renderer)
+{
+    return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&renderer->prelude));
 }
 
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)

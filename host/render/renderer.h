@@ -42,8 +42,8 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
                         MessageList *messages);
 void renderer_close(Renderer *renderer);
 // Takes another camera, size, region, samples or bounces; all else in `scene` and `settings` is what the
-// renderer was opened with. Kernels and textures stay on the device. False as where renderer_open returns
-// NULL; the renderer is then as it was, unless the device failed.
+// renderer was opened with. Textures stay on the device, and kernels where they suit. False as where
+// renderer_open returns NULL; the renderer is then as it was, unless the device failed.
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);
 
@@ -90,5 +90,8 @@ typedef struct {
     } launches, reads;
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
+
+// The composed text of the kernel that renders, for other compilers. Caller frees.
+char *renderer_kernel_text(const Renderer *renderer);
 // Clears launches, reads and counted rays, so that the next render has its own report.
 void renderer_report_restart(Renderer *renderer);

@@ -22,7 +22,8 @@ struct Renderer {
     CompiledTexture *textures; // of the scene, once uploaded
     cl_mem offsets;            // of a pixel's samples
     size_t light_count;
-    double unit; // scene lengths per device length, a power of two
+    double unit;                   // scene lengths per device length, a power of two
+    uint32_t pending_children_max; // of the BVH
     KernelSlot kernels[KERNEL_COUNT];
 };
 

@@ -48,15 +48,13 @@ typedef int scalar_integer;
 #define SMALLEST_RATIO   0x1p-120f
 #endif
 
-// For large functions with several callers and little live state: inlined, each copy would be compiled.
-#define OUT_OF_LINE __attribute__((noinline))
-
-// The body of a kernel. PoCL compiles a kernel three times, once per form of launch, but out-of-line
-// functions once.
+// For large functions with several callers and little live state: inlined, each copy would be compiled. And
+// for the bodies of kernels, of which PoCL compiles three, one per form of launch. But GPUs would pass their
+// structs through memory.
 #if LANES == 1
-#define KERNEL_BODY inline
+#define OUT_OF_LINE inline
 #else
-#define KERNEL_BODY OUT_OF_LINE
+#define OUT_OF_LINE __attribute__((noinline))
 #endif
 
 #define JOIN_TOKENS(a, b) a##b

@@ -58,6 +58,13 @@ static OUT_OF_LINE void rays_see(const Scene *scene, Ray *rays, uint count, Seen
         seen[i].color = vector_select(hit_found(&seen[i].hit), seen[i].color, background);
 }
 
+// The same of camera rays, for ray_tree_color. A lone packet's are left to it, whose loop then has the only
+// copy of the search.
+static inline void camera_rays_see(const Scene *scene, Ray *rays, uint count, Seen *seen)
+{
+    if (PACKETS > 1) rays_see(scene, rays, count, seen);
+}
+
 // Adds a ray's hit and its bounces to the signature.
 static inline unsigned_integer path_signature_add(unsigned_integer path, const Ray *ray, const Hit *hit,
                                                   mask reflected, mask refracted, mask total)
@@ -73,24 +80,25 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
-// Traces a ray tree depth first, reflected before refracted, from what its camera ray sees. If
+// Traces a ray tree depth first, reflected before refracted, from what camera_rays_see left in *seen. If
 // COMPUTE_SIGNATURE, *path is its signature (types.h), which in each lane is independent of the other lanes,
 // and the color is undefined.
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, Seen *seen, unsigned_integer *path)
 {
     *path = (unsigned_integer)(PATH_START);
-    ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&seen->hit));
-    // without secondary rays the color is that of the camera ray: no weights
-    if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
-        if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, &ray, &seen->hit, mask_none(), mask_none(), mask_none());
-        return seen->color;
-    }
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 color = black, weight = white;
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
     for (;;) {
+        if (depth > 0 || PACKETS == 1) rays_see(scene, &ray, 1, seen);
+        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&seen->hit));
+        // without secondary rays the color is that of the camera ray: no weights
+        if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
+            if (COMPUTE_SIGNATURE)
+                *path = path_signature_add(*path, &ray, &seen->hit, mask_none(), mask_none(), mask_none());
+            return seen->color;
+        }
         color = color_add_weighted(color, weight, vector_select(ray.active, seen->color, black));
 
         Bounce reflected = {ray.origin, ray.direction, black, depth + 1, ray.travelled};
@@ -116,7 +124,6 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, Seen *seen, uns
         ray = bounce_ray(&next);
         weight = next.weight;
         depth = next.depth;
-        rays_see(scene, &ray, 1, seen);
     }
 }
 

@@ -13,10 +13,7 @@ typedef struct {
     scalar entry;      // its entry distance
 } StackEntry;
 
-// A visit replaces a node by at most BVH_WIDTH children.
-#define STACK_CAPACITY ((BVH_WIDTH - 1) * BVH_DEPTH_MAX + 1)
-
-// `entries` is an array of its own, so that the count stays in a register.
+// `entries`, of STACK_CAPACITY, is an array of its own, so that the count stays in a register.
 typedef struct {
     StackEntry *entries;
     uint count;
