@@ -89,7 +89,10 @@ $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o te
 # What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.
 features: $(BUILD)/tools/features
 
-$(BUILD)/tools/features: $(BUILD)/tools/features.o $(library)
+# The kernel as a GPU would be given it, for tools/gpu-resources.
+kernel_text: $(BUILD)/tools/kernel_text
+
+$(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 # These two change only when what they hold does, and what depends on it is then built anew.
@@ -141,7 +144,7 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/numerics/ladder.c \
+linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c \
           $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
@@ -206,7 +209,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test ladder features bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all tests test ladder features kernel_text bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
