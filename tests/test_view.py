@@ -24,18 +24,27 @@ camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
 background: [0.1, 0.2, 0.4]
 lights: [{point: {position: [3, 4, -5]}}]
 objects:
-  - sphere: {center: [0, 0, 0], radius: 1}
+  - mesh: {file: mesh.obj, material: {color: [0.9, 0.8, 0.7]}}
+"""
+MESH = """\
+v 0 -1 -1
+v 1 1 0
+v -1 1 0
+v 0 -1 1
+f 1 2 3
+f 1 3 4
+f 4 2 1
 """
 WIDTH, HEIGHT = 160, 120
 SAMPLES = 3
-DEADLINE = 120  # seconds until a test gives up what it waits for
+DEADLINE = 60  # seconds until a test gives up what it waits for
 
 
 def display_open():
     """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process."""
     read, write_end = os.pipe()
     folder = os.environ["VIEW_FOLDER"]
-    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "640x480x24", "-fbdir", folder]
+    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "320x240x24", "-fbdir", folder]
     process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write_end)
     with os.fdopen(read) as file:
@@ -108,7 +117,10 @@ class Window:
         """The next line that matches."""
         seen = []
         while True:
-            line = self.lines.get(timeout=DEADLINE)
+            try:
+                line = self.lines.get(timeout=DEADLINE)
+            except queue.Empty:
+                self.test.fail(f"glint view has not printed {pattern}: {''.join(seen)}")
             seen.append(line)
             if match := re.search(pattern, line):
                 return match
@@ -138,6 +150,7 @@ class Window:
     def rendered(self, camera, ending="png", size=None):
         """The file that glint render writes with the camera."""
         os.makedirs("rendered", exist_ok=True)
+        shutil.copy("mesh.obj", "rendered")
         write("rendered/scene.yaml", re.sub("^camera: .*", camera, SCENE))
         path = f"rendered/image.{ending}"
         width, height = size or (WIDTH, HEIGHT)
@@ -151,10 +164,14 @@ class Window:
         self.test.assertSameBytes(self.saved(), path)
         self.key("x")  # hides the message
         rows = png_rows(path)
+        self.shows_at_last(rows)
+        return camera
+
+    def shows_at_last(self, rows):
         end = time.monotonic() + DEADLINE
         while not self.shows(rows):
             self.test.assertLess(time.monotonic(), end, "the display does not show the image")
-        return camera
+            time.sleep(0.01)  # lets glint work
 
     def shows(self, rows):
         stride, pixels = screen()
@@ -177,6 +194,7 @@ class View(TestCase):
     def setUp(self):
         super().setUp()
         write("scene.yaml", SCENE)
+        write("mesh.obj", MESH)
 
     def test_movement(self):
         window = Window(self)
@@ -196,7 +214,6 @@ class View(TestCase):
                 act()
                 cameras[name] = window.check()
         self.assertEqual(len(set(cameras.values())), len(cameras), "a step does not move the camera")
-        # the sphere's surface at the center: orbits keep the distance to it, a notch takes a tenth of it
         self.assertEqual(numbers(cameras["look around"], "position"), numbers(cameras["look at"], "position"))
         self.assertEqual(numbers(cameras["arrows"], "look_at"), numbers(cameras["look around"], "look_at"))
         window.key("r")
@@ -221,6 +238,45 @@ class View(TestCase):
         xdotool("windowunmap", "--sync", window.id, "windowmap", "--sync", window.id, "windowfocus", window.id)
         window.check((101, 73))
         window.close()
+
+    def test_reload(self):
+        window = Window(self)
+        window.check()
+        red = SCENE.replace("0.9, 0.8, 0.7", "1, 0, 0")
+        for name, replace in ("written", write), ("renamed", self.write_by_rename):
+            with self.subTest(name):
+                text = red if name == "written" else red.replace("[1, 0, 0]", "[0, 1, 0]")
+                replace("scene.yaml", text)
+                window.shows_at_last(self.image_of(text))
+        write("scene.yaml", red.replace("material", "metarial"))
+        window.line("^scene.yaml:5:.*metarial")
+        self.assertIn("metarial: {", window.line("(.*)$")[1])
+        self.assertRegex(window.line("(.*)$")[1], r"^ *\^")
+        moved = red.replace("-4]", "-5]")
+        write("scene.yaml", moved)  # the message is gone, and the camera is the file's
+        window.shows_at_last(self.image_of(moved))
+        self.assertEqual(numbers(window.camera(), "position"), [0.5, 1, -5])
+        window.close()
+
+    def test_reload_of_a_mesh(self):
+        """The view's camera stays where the file's does."""
+        window = Window(self)
+        window.saved()
+        window.key("Left")
+        camera = window.camera()
+        window.key("x")  # hides it
+        write("mesh.obj", MESH.replace("1 1 0", "1.5 1 0"))
+        window.shows_at_last(self.image_of(re.sub("^camera: .*", camera, SCENE)))
+        window.close()
+
+    @staticmethod
+    def write_by_rename(path, text):
+        os.rename(write("other", text), path)
+
+    def image_of(self, text):
+        write("expected.yaml", text)
+        self.glint(f"render expected.yaml --size {WIDTH}x{HEIGHT} --samples {SAMPLES} -o expected.png")
+        return png_rows("expected.png")
 
     def test_help(self):
         window = Window(self)

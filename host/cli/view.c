@@ -100,19 +100,21 @@ static bool image_save(void *context, const char *path, const Scene *scene, cons
     return false;
 }
 
-static int scene_view(ViewOptions *options, const Scene *scene, const Device *device)
+// Takes the scene.
+static int scene_view(ViewOptions *options, Scene *scene, const Device *device)
 {
     image_size_choose(scene, &options->width, &options->height);
     SaveContext save = {options->scene, device,
                         scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB};
     WindowOptions window = {
         .frames = {.device = device,
+                   .scene_path = options->scene,
+                   .scene_options = {.lenient = options->common.lenient},
                    .scene = scene,
                    .settings = settings_whole(&options->common, options->width, options->height),
                    .transfer = save.transfer,
                    .save = image_save,
                    .save_context = &save},
-        .scene_path = options->scene,
         .size = {options->width, options->height},
         .stop = progress_interrupted,
     };

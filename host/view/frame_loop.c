@@ -6,6 +6,7 @@
 #include "host/base/numbers.h"
 #include "host/image/transfer.h"
 #include "host/view/preview.h"
+#include "host/view/watch.h"
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -27,12 +28,17 @@ struct FrameLoop {
     // under the mutex
     Request request;
     bool quits;
+    bool reloads; // the scene's files have changed
     char *save_path, *message;
     Frame ready;
     bool has_ready;
+    Camera file_camera;
+    bool has_camera;
 
     // the thread's own
-    Scene scene; // options.scene with the request's camera
+    Scene scene;      // with the request's camera
+    bool is_mistaken; // its file, as it is now
+    Watch *watch;
     RenderSettings settings;
     Compute compute;
     Renderer *renderer; // NULL: not open, or failed
@@ -130,6 +136,18 @@ static void distances_fill(FrameLoop *loop)
     size_t count = film_pixel_count(&loop->film);
     loop->frame.distances = memory_allocate(count, sizeof *loop->frame.distances);
     numbers_narrow(loop->frame.distances, loop->film.t, count);
+}
+
+static bool vectors_equal(Vector3 a, Vector3 b)
+{
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+static bool cameras_equal(const Camera *a, const Camera *b)
+{
+    return vectors_equal(a->position, b->position) && vectors_equal(a->look_at, b->look_at) &&
+           vectors_equal(a->up, b->up) && a->field_axis == b->field_axis &&
+           a->half_tangent == b->half_tangent;
 }
 
 static bool is_last(const Film *film, const Film *band)
@@ -258,36 +276,97 @@ static void image_save(FrameLoop *loop, char *path)
     free(path);
 }
 
-// Waits for a request, for an image to be saved, or for the end. False: the end.
-static bool request_wait(FrameLoop *loop, bool is_complete, char **save_path)
+static void files_watch(const FrameLoop *loop)
+{
+    const Scene *scene = &loop->scene;
+    const char **paths = memory_allocate(1 + scene->textures.count + scene->meshes.count, sizeof *paths);
+    size_t count = 0;
+    paths[count++] = loop->options.scene_path;
+    for (size_t i = 0; i < scene->textures.count; i++)
+        paths[count++] = scene->textures.items[i].path;
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        if (scene->meshes.items[i].path) paths[count++] = scene->meshes.items[i].path;
+    watch_set(loop->watch, paths, count);
+    free(paths);
+}
+
+static void files_changed(void *context)
+{
+    FrameLoop *loop = context;
+    pthread_mutex_lock(&loop->mutex);
+    loop->reloads = true;
+    atomic_store(&has_news, true);
+    pthread_cond_signal(&loop->changed);
+    pthread_mutex_unlock(&loop->mutex);
+}
+
+// A camera that was changed in the file becomes the view's: the window asks for its image.
+static void camera_publish(FrameLoop *loop, const Camera *camera)
 {
     pthread_mutex_lock(&loop->mutex);
-    while (!loop->quits && loop->request.number == loop->current.number && !(is_complete && loop->save_path))
+    loop->has_camera |= !cameras_equal(&loop->file_camera, camera);
+    loop->file_camera = *camera;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
+// Reads the scene anew. False, with a message published, where it has a mistake: the last one stays.
+static bool scene_reload(FrameLoop *loop)
+{
+    const bool was_mistaken = loop->is_mistaken;
+    MessageList messages = {0};
+    Scene scene;
+    loop->is_mistaken =
+        !scene_load(&scene, loop->options.scene_path, &loop->options.scene_options, &messages);
+    if (was_mistaken && messages.count == 0) message_publish(loop, memory_copy_text(""));
+    messages_publish(loop, &messages);
+    if (loop->is_mistaken) return false;
+    renderer_close(loop->renderer);
+    loop->renderer = NULL;
+    scene_free(&loop->scene);
+    loop->scene = scene;
+    files_watch(loop);
+    camera_publish(loop, &scene.camera);
+    return true;
+}
+
+typedef enum { WORK_RENDER, WORK_SAVE, WORK_RELOAD, WORK_END } Work;
+
+// Waits for the next work.
+static Work work_wait(FrameLoop *loop, bool is_complete, char **save_path)
+{
+    pthread_mutex_lock(&loop->mutex);
+    while (!loop->quits && !loop->reloads && loop->request.number == loop->current.number &&
+           !(is_complete && loop->save_path))
         pthread_cond_wait(&loop->changed, &loop->mutex);
-    *save_path = NULL;
-    if (loop->request.number == loop->current.number) {
+    Work work = WORK_SAVE;
+    if (loop->quits) {
+        work = WORK_END;
+    } else if (loop->reloads) {
+        work = WORK_RELOAD;
+        loop->reloads = false;
+    } else if (loop->request.number != loop->current.number) {
+        work = WORK_RENDER;
+        loop->current = loop->request;
+    } else {
         *save_path = loop->save_path;
         loop->save_path = NULL;
     }
-    loop->current = loop->request;
-    atomic_store(&has_news, false);
-    bool goes_on = !loop->quits;
+    atomic_store(&has_news, loop->request.number != loop->current.number);
     pthread_mutex_unlock(&loop->mutex);
-    return goes_on;
+    return work;
 }
 
 static void *loop_run(void *context)
 {
     FrameLoop *loop = context;
     bool is_complete = false;
-    char *save_path;
-    while (request_wait(loop, is_complete, &save_path)) {
-        if (save_path)
-            image_save(loop, save_path);
-        else
-            is_complete = request_render(loop);
+    char *save_path = NULL;
+    for (Work work; (work = work_wait(loop, is_complete, &save_path)) != WORK_END;) {
+        if (work == WORK_SAVE) image_save(loop, save_path);
+        if (work == WORK_RELOAD) is_complete = !scene_reload(loop) && is_complete;
+        if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete)) is_complete = request_render(loop);
     }
-    free(save_path);
     renderer_close(loop->renderer);
     compute_close(&loop->compute);
     return NULL;
@@ -298,6 +377,8 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     FrameLoop *loop = memory_allocate_zeroed(1, sizeof *loop);
     loop->options = *options;
     loop->scene = *options->scene;
+    *options->scene = (Scene){0};
+    loop->file_camera = loop->scene.camera;
     loop->settings = options->settings;
     loop->settings.stop = render_stops;
     loop->settings.band_seconds = 0.01;
@@ -305,6 +386,8 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     atomic_store(&ends, false);
     pthread_mutex_init(&loop->mutex, NULL);
     pthread_cond_init(&loop->changed, NULL);
+    loop->watch = watch_open(files_changed, loop);
+    files_watch(loop);
     if (pthread_create(&loop->thread, NULL, loop_run, loop) != 0) fault("cannot start a thread");
     return loop;
 }
@@ -317,6 +400,8 @@ void frame_loop_close(FrameLoop *loop)
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
     pthread_join(loop->thread, NULL);
+    watch_close(loop->watch);
+    scene_free(&loop->scene);
     pthread_mutex_destroy(&loop->mutex);
     pthread_cond_destroy(&loop->changed);
     film_free(&loop->film);
@@ -357,6 +442,16 @@ bool frame_loop_take(FrameLoop *loop, Frame *frame)
         loop->ready = shown;
         loop->has_ready = false;
     }
+    pthread_mutex_unlock(&loop->mutex);
+    return is_new;
+}
+
+bool frame_loop_take_camera(FrameLoop *loop, Camera *camera)
+{
+    pthread_mutex_lock(&loop->mutex);
+    bool is_new = loop->has_camera;
+    loop->has_camera = false;
+    if (is_new) *camera = loop->file_camera;
     pthread_mutex_unlock(&loop->mutex);
     return is_new;
 }

@@ -1,14 +1,18 @@
 // Renders what the window shows, on a thread of its own: while the camera moves coarse frames in time, at
-// rest the image in passes, until it has all samples. A new request ends the work on the last.
+// rest the image in passes, until it has all samples. A new request ends the work on the last. Reads the
+// scene anew when its files change.
 #pragma once
 
 #include "host/image/image.h"
+#include "host/import/load.h"
 #include "host/render/renderer.h"
 #include "host/view/camera_moves.h"
 
 typedef struct {
     const Device *device;
-    const Scene *scene;      // outlives the loop, which leaves it unchanged
+    const char *scene_path;
+    SceneOptions scene_options;
+    Scene *scene;            // as it was first read; taken
     RenderSettings settings; // all but the size
     Transfer transfer;
     // Called on the loop's thread when there is something to take.
@@ -46,5 +50,9 @@ void frame_loop_save(FrameLoop *loop, const char *path);
 
 // Exchanges `frame` for the newest one. False: there is none that was not taken before.
 bool frame_loop_take(FrameLoop *loop, Frame *frame);
-// What went wrong, or was saved, since the last call: caller frees; NULL: nothing.
+// Whether the scene's file has another camera than at the last call, at first than the scene that the loop
+// was opened with.
+bool frame_loop_take_camera(FrameLoop *loop, Camera *camera);
+// What went wrong, or was saved, since the last call; empty: what was wrong is mended. Caller frees; NULL:
+// nothing.
 char *frame_loop_take_message(FrameLoop *loop);

@@ -35,8 +35,8 @@ typedef struct {
     FrameLoop *frames;
     Uint32 frame_event;
 
-    ImageSize size; // in pixels, which a point of the window may have several of
-    Camera camera;
+    ImageSize size;             // in pixels, which a point of the window may have several of
+    Camera camera, file_camera; // the view's, and the scene's own
     bool camera_changed, size_changed;
     unsigned request;
     Frame frame;
@@ -59,7 +59,7 @@ static void frame_notify(void *context)
 
 static const char *scene_name(const Window *window)
 {
-    const char *path = window->options->scene_path, *slash = strrchr(path, '/');
+    const char *path = window->options->frames.scene_path, *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
 }
 
@@ -238,7 +238,7 @@ static void key_press(Window *window, const SDL_KeyboardEvent *event)
         arrow_turn(window, 0, 1);
         break;
     case SDLK_r:
-        window->camera = window->options->frames.scene->camera;
+        window->camera = window->file_camera;
         window->camera_changed = true;
         break;
     case SDLK_c:
@@ -339,19 +339,28 @@ static void draw(Window *window)
     window->redraws = false;
 }
 
+static void message_take(Window *window)
+{
+    char *message = frame_loop_take_message(window->frames);
+    if (!message) return;
+    size_t length = strlen(message);
+    if (length > 0) fprintf(stderr, "%s%s", message, message[length - 1] == '\n' ? "" : "\n");
+    message_show(window, message);
+}
+
 static void work_exchange(Window *window)
 {
+    if (frame_loop_take_camera(window->frames, &window->file_camera)) {
+        window->camera = window->file_camera;
+        window->camera_changed = true;
+    }
     if (window->camera_changed || window->size_changed) {
         bool is_moving = window->request > 0;
         window->request = frame_loop_request(window->frames, &window->camera, window->size, is_moving);
         window->camera_changed = window->size_changed = false;
     }
     if (frame_loop_take(window->frames, &window->frame)) frame_show(window);
-    char *message = frame_loop_take_message(window->frames);
-    if (message) {
-        fprintf(stderr, "%s%s", message, message[strlen(message) - 1] == '\n' ? "" : "\n");
-        message_show(window, message);
-    }
+    message_take(window);
 }
 
 static WindowEnd events_run(Window *window)
@@ -416,7 +425,7 @@ static bool window_open(Window *window)
     if (!window->target) return false;
     size_read(window);
     window->caption = caption_open(window->target, (float)window->size.width / (float)size.width);
-    window->camera = options->frames.scene->camera;
+    window->camera = window->file_camera = options->frames.scene->camera;
     window->frame_event = SDL_RegisterEvents(1);
     FrameLoopOptions frames = options->frames;
     frames.notify = frame_notify;

@@ -5,9 +5,8 @@
 
 typedef struct {
     FrameLoopOptions frames; // but for notify
-    const char *scene_path;
-    ImageSize size;     // of the window, reduced to fit the display
-    bool (*stop)(void); // true ends it: an interrupt
+    ImageSize size;          // of the window, reduced to fit the display
+    bool (*stop)(void);      // true ends it: an interrupt
 } WindowOptions;
 
 typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT } WindowEnd;

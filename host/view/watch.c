@@ -1,0 +1,134 @@
+// Folders are watched, not files: a file that is replaced by renaming is another one, and its watch would
+// stay with the old.
+#include "host/view/watch.h"
+
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include <poll.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/inotify.h>
+#include <unistd.h>
+
+typedef struct {
+    int folder; // its watch
+    char *name;
+} WatchedFile;
+
+struct Watch {
+    void (*changed)(void *context);
+    void *context;
+    int notify, end; // inotify; an event that ends the thread
+    pthread_t thread;
+    pthread_mutex_t mutex; // of the files
+    struct {
+        WatchedFile *items;
+        size_t count, capacity;
+    } files;
+};
+
+static bool is_watched(Watch *watch, const struct inotify_event *event)
+{
+    bool found = false;
+    pthread_mutex_lock(&watch->mutex);
+    for (size_t i = 0; i < watch->files.count && event->len > 0; i++) {
+        const WatchedFile *file = &watch->files.items[i];
+        found |= file->folder == event->wd && strcmp(file->name, event->name) == 0;
+    }
+    pthread_mutex_unlock(&watch->mutex);
+    return found;
+}
+
+// Reads all events that are there. Whether one is of a watched file.
+static bool events_read(Watch *watch)
+{
+    _Alignas(struct inotify_event) char events[4096];
+    ssize_t size = read(watch->notify, events, sizeof events);
+    bool found = false;
+    for (ssize_t at = 0; at < size;) {
+        const struct inotify_event *event = (const void *)(events + at);
+        found |= is_watched(watch, event);
+        at += (ssize_t)(sizeof *event + event->len);
+    }
+    return found;
+}
+
+static void *watch_run(void *context)
+{
+    Watch *watch = context;
+    struct pollfd sources[] = {{watch->notify, POLLIN, 0}, {watch->end, POLLIN, 0}};
+    for (;;) {
+        poll(sources, 2, -1);
+        if (sources[1].revents) return NULL;
+        if (sources[0].revents && events_read(watch)) watch->changed(watch->context);
+    }
+}
+
+static void files_forget(Watch *watch)
+{
+    for (size_t i = 0; i < watch->files.count; i++)
+        free(watch->files.items[i].name);
+    watch->files.count = 0;
+}
+
+static void watch_free(Watch *watch)
+{
+    if (watch->notify >= 0) close(watch->notify);
+    if (watch->end >= 0) close(watch->end);
+    files_forget(watch);
+    free(watch->files.items);
+    pthread_mutex_destroy(&watch->mutex);
+    free(watch);
+}
+
+Watch *watch_open(void (*changed)(void *context), void *context)
+{
+    Watch *watch = memory_allocate_zeroed(1, sizeof *watch);
+    watch->changed = changed;
+    watch->context = context;
+    watch->notify = inotify_init1(IN_CLOEXEC);
+    watch->end = eventfd(0, EFD_CLOEXEC);
+    pthread_mutex_init(&watch->mutex, NULL);
+    if (watch->notify >= 0 && watch->end >= 0 && pthread_create(&watch->thread, NULL, watch_run, watch) == 0)
+        return watch;
+    watch_free(watch);
+    return NULL;
+}
+
+void watch_close(Watch *watch)
+{
+    if (!watch) return;
+    const uint64_t one = 1;
+    while (write(watch->end, &one, sizeof one) != sizeof one) {
+    }
+    pthread_join(watch->thread, NULL);
+    watch_free(watch);
+}
+
+static void file_add(Watch *watch, const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? memory_copy_text(path) : memory_copy_text(".");
+    if (slash) folder[slash == path ? 1 : slash - path] = '\0';
+    // the same folder gets the same watch
+    int descriptor = inotify_add_watch(watch->notify, folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
+    free(folder);
+    if (descriptor < 0) return;
+    WatchedFile file = {descriptor, memory_copy_text(slash ? slash + 1 : path)};
+    array_push(watch->files, file);
+}
+
+// Folders are watched until the end: what happens to their other files is ignored.
+void watch_set(Watch *watch, const char *const *paths, size_t count)
+{
+    if (!watch) return;
+    pthread_mutex_lock(&watch->mutex);
+    files_forget(watch);
+    for (size_t i = 0; i < count; i++)
+        file_add(watch, paths[i]);
+    pthread_mutex_unlock(&watch->mutex);
+}
