@@ -29,7 +29,7 @@ OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconve
 LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
             $(shell pkg-config --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) \
-            $(if $(has_window),$(shell pkg-config --libs $(window_packages))) -lm -lpthread
+            $(if $(has_window),$(shell pkg-config --libs $(window_packages))) -lm -lpthread -Wl,--export-dynamic-symbol=abort
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))

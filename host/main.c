@@ -77,9 +77,13 @@ int main(int argument_count, char **arguments)
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
     progress_catch_signals();
+    fault_catch_crashes();
     int status = command_run(argument_count, arguments);
     // a report that did not get out whole must not look like one that did
-    if (fflush(stdout) == 0 && !ferror(stdout)) return status;
+    if (fflush(stdout) == 0 && !ferror(stdout)) {
+        fault_output_is_complete(status);
+        return status;
+    }
     fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
     return EXIT_MACHINE;
 }

@@ -8,6 +8,7 @@
 #include "tests/child.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,6 +21,7 @@ static struct {
     const char *call;  // the function that fails; NULL: none
     size_t index;      // at which of its calls, from 0, or EVERY_CALL
     bool returns_null; // with CL_SUCCESS
+    int crash;         // or the signal that ends the driver; 0: none
 } injected;
 
 static const size_t EVERY_CALL = SIZE_MAX;
@@ -44,8 +46,12 @@ static CallCount *counted(const char *call)
 static bool call_fails(const char *call)
 {
     size_t index = counted(call)->count++;
-    return injected.call && strcmp(injected.call, call) == 0 &&
-           (injected.index == index || injected.index == EVERY_CALL);
+    bool fails = injected.call && strcmp(injected.call, call) == 0 &&
+                 (injected.index == index || injected.index == EVERY_CALL);
+    if (fails && injected.crash == SIGABRT) abort();
+    while (fails && injected.crash) // as a wrong access would again; LLVM's handler only resets the signal's
+        raise(injected.crash);
+    return fails;
 }
 
 // A call that returns a status: not made where it fails.
@@ -453,6 +459,8 @@ typedef struct {
 } Command;
 
 static const char *failing_call;
+static int crash;
+static const char *crash_folder; // for caches
 
 static void command_fail(void *result)
 {
@@ -462,6 +470,12 @@ static void command_fail(void *result)
     for (; command->arguments[count]; count++)
         arguments[count] = memory_copy_text(command->arguments[count]);
     injected.call = failing_call;
+    injected.crash = crash;
+    if (crash) {
+        setenv("XDG_CACHE_HOME", crash_folder, 1);
+        unsetenv("POCL_CACHE_DIR");
+    }
+    fault_catch_crashes();
     int status = command->run(count, arguments);
     while (count > 0)
         free(arguments[--count]);
@@ -510,11 +524,50 @@ static void test_release_after_the_output(void **state)
     unlink(path);
 }
 
+// A driver that crashes is named with its call; when the output is complete it is a warning.
+static void test_crashes(void **state)
+{
+    (void)state;
+#ifdef __SANITIZE_ADDRESS__
+    skip(); // sanitizers handle crashes
+#else
+    static const char *const calls[] = {"clGetPlatformIDs", "clBuildProgram", "clWaitForEvents",
+                                        "clGetProgramInfo"};
+    static const int signals[] = {SIGSEGV, SIGABRT};
+    char folder[] = "/tmp/glint-test-XXXXXX";
+    assert_non_null(mkdtemp(folder));
+    crash_folder = folder; // an empty cache: no program comes from it
+    for (size_t i = 0; i < sizeof calls / sizeof *calls; i++)
+        for (size_t k = 0; k < 2; k++) {
+            bool is_complete = i == 3;
+            char path[] = "/tmp/glint-test-XXXXXX.png", expected[80];
+            assert_true(close(mkstemps(path, 4)) == 0);
+            Command command = {command_render,
+                               {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", path}};
+            failing_call = calls[i];
+            crash = signals[k];
+            ChildEnd end = child_run(command_fail, &command, sizeof command);
+            snprintf(expected, sizeof expected, "glint: %s%s: the OpenCL driver %s",
+                     is_complete ? "warning: " : "", calls[i], k ? "aborted" : "crashed");
+            if (!strstr(end.errors, expected)) print_error("%s\n", end.errors);
+            assert_non_null(strstr(end.errors, expected));
+            assert_int_equal(end.status, is_complete ? EXIT_DONE : EXIT_MACHINE);
+            struct stat status;
+            assert_int_equal(stat(path, &status), 0);
+            assert_int_equal(status.st_size > 0, is_complete);
+            unlink(path);
+        }
+    crash = 0;
+    scratch_close(memory_copy_text(folder));
+#endif
+}
+
 int main(void)
 {
     // each command is a process of its own, and forks before this one has opened a device
     const struct CMUnitTest command_tests[] = {cmocka_unit_test(test_commands),
-                                               cmocka_unit_test(test_release_after_the_output)};
+                                               cmocka_unit_test(test_release_after_the_output),
+                                               cmocka_unit_test(test_crashes)};
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_needed_calls),   cmocka_unit_test(test_unmaps),
         cmocka_unit_test(test_needed_objects), cmocka_unit_test(test_dispensable_calls),

@@ -9,5 +9,16 @@ enum {
     EXIT_INTERRUPTED = 130
 };
 
-// Prints `glint: format…` to stderr and exits with EXIT_MACHINE.
+// Prints `glint: format…` to stderr and exits with EXIT_MACHINE, or as fault_output_is_complete says.
 _Noreturn void fault(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+// An OpenCL driver that lacks memory or threads may abort or read where nothing is. From here on that ends
+// the process with EXIT_MACHINE and a message that names the call; a crash outside of a call is a bug of
+// glint, and ends it by the signal. Sanitizers handle crashes themselves.
+void fault_catch_crashes(void);
+// Notes the OpenCL call that follows, a text up to a parenthesis; NULL: none.
+void fault_note_call(const char *call);
+// From here on a fault or a crash is a warning, and the process exits with `status`: all output is complete.
+void fault_output_is_complete(int status);
+// " (limited to …)" where the process has little address space or may have few threads, else "".
+const char *fault_limits(void);

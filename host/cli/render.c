@@ -244,6 +244,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderer_report(renderer), compute->device, &settings,
                      &(HostTimes){parse_seconds, encode_seconds});
+    if (whole) fault_output_is_complete(status);
     renderer_close(renderer);
     return status;
 }

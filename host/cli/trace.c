@@ -201,6 +201,7 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     free(exponents);
     free(hits);
     free(scaled);
+    if (written) fault_output_is_complete(EXIT_DONE);
     renderer_close(renderer);
     return written ? EXIT_DONE : EXIT_USER;
 }

@@ -15,8 +15,10 @@ bool compute_open(Compute *compute, const Device *device)
     const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM, (cl_context_properties)device->platform,
                                                 0};
     cl_int status;
+    fault_note_call("clCreateContext");
     compute->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &status);
     if (!compute_check_object(compute, compute->context, status, "clCreateContext")) return false;
+    fault_note_call("clCreateCommandQueue");
     compute->queue = clCreateCommandQueue(compute->context, device->id, CL_QUEUE_PROFILING_ENABLE, &status);
     return compute_check_object(compute, compute->queue, status, "clCreateCommandQueue");
 }
@@ -53,12 +55,14 @@ void compute_fail(Compute *compute, const char *call, cl_int status, const char 
 
 bool compute_check(Compute *compute, cl_int status, const char *call)
 {
+    fault_note_call(NULL);
     if (status != CL_SUCCESS) failure_keep(compute, call, status, NULL);
     return compute_ok(compute);
 }
 
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call)
 {
+    fault_note_call(NULL);
     if (status != CL_SUCCESS || !object) failure_keep(compute, call, status, NULL);
     return compute_ok(compute);
 }
@@ -78,7 +82,7 @@ static char *failure_text(const Compute *compute, const ComputeFailure *failure)
         text_appendf(&text, "NULL with CL_SUCCESS");
     else
         text_appendf(&text, "%s (%d)", cl_status_name(failure->status), failure->status);
-    text_appendf(&text, " on %s", compute->device->name);
+    text_appendf(&text, " on %s%s", compute->device->name, fault_limits());
     if (failure->detail) text_appendf(&text, ": %s", failure->detail);
     return text.items;
 }
@@ -98,8 +102,10 @@ static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_m
 {
     if (!compute_ok(compute)) return NULL;
     cl_int status;
+    fault_note_call("clCreateBuffer");
     cl_mem buffer =
         clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);
+    fault_note_call(NULL);
     if (status != CL_SUCCESS || !buffer) {
         const Device *device = compute->device;
         const double mebi = 1024.0 * 1024.0;

@@ -6,6 +6,7 @@
 // fails: no result depends on it. A failed Compute is closed, not repaired; others are not affected.
 #pragma once
 
+#include "host/base/fault.h"
 #include "host/opencl/device.h"
 
 typedef struct {
@@ -33,7 +34,8 @@ static inline bool compute_ok(const Compute *compute)
 
 // `compute_try(compute, clFinish(compute->queue))`: makes the call unless an earlier one failed; false if
 // either failed.
-#define compute_try(compute, call) (compute_ok(compute) ? compute_check((compute), (call), #call) : false)
+#define compute_try(compute, call)                                                                           \
+    (compute_ok(compute) ? (fault_note_call(#call), compute_check((compute), (call), #call)) : false)
 // Keeps the failure of a call that was made, if it is the first: the function's name is `call` up to a
 // parenthesis. Returns compute_ok.
 bool compute_check(Compute *compute, cl_int status, const char *call);

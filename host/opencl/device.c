@@ -3,6 +3,7 @@
 #include "host/opencl/device.h"
 
 #include "host/base/array.h"
+#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include <CL/cl_ext.h>
@@ -14,6 +15,7 @@
 // property that the runtime does not know (CL_INVALID_VALUE), such as the format of double without fp64.
 static bool list_check(DeviceList *list, cl_int status, const char *call)
 {
+    fault_note_call(NULL);
     bool is_absent =
         status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR || status == CL_INVALID_VALUE;
     if (status != CL_SUCCESS && !is_absent && !list->failed_call) {
@@ -26,12 +28,14 @@ static bool list_check(DeviceList *list, cl_int status, const char *call)
 static bool device_query(DeviceList *list, cl_device_id id, cl_device_info what, size_t size, void *value,
                          size_t *needed)
 {
+    fault_note_call("clGetDeviceInfo");
     return list_check(list, clGetDeviceInfo(id, what, size, value, needed), "clGetDeviceInfo");
 }
 
 static bool platform_query(DeviceList *list, cl_platform_id platform, cl_platform_info what, size_t size,
                            void *value, size_t *needed)
 {
+    fault_note_call("clGetPlatformInfo");
     return list_check(list, clGetPlatformInfo(platform, what, size, value, needed), "clGetPlatformInfo");
 }
 
@@ -151,6 +155,7 @@ static void pocl_compile_once(void)
 static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform, cl_uint *count)
 {
     *count = 0;
+    fault_note_call("clGetDeviceIDs");
     if (!list_check(list, clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, NULL, count), "clGetDeviceIDs"))
         *count = 0;
     cl_device_id *ids = memory_allocate_zeroed(*count, sizeof *ids);
@@ -165,6 +170,7 @@ void device_list_open(DeviceList *list)
     pocl_compile_once();
     *list = (DeviceList){0};
     cl_uint platform_count = 0;
+    fault_note_call("clGetPlatformIDs");
     if (!list_check(list, clGetPlatformIDs(0, NULL, &platform_count), "clGetPlatformIDs") ||
         platform_count == 0)
         return;
@@ -290,6 +296,7 @@ static void report_no_match(const DeviceList *list, const char *selector, Messag
         text_appendf(&text, "no OpenCL device on %u platforms", list->platform_count);
     }
     if (failure) text_appendf(&text, " (%s)", failure);
+    text_appendf(&text, "%s", fault_limits());
     for (size_t i = 0; i < list->count; i++) {
         const Device *device = &list->items[i];
         const char *why;
@@ -298,9 +305,12 @@ static void report_no_match(const DeviceList *list, const char *selector, Messag
         if (!device_usable(device, &why)) text_appendf(&text, ", unusable: %s", why);
         text_append(&text, ")", 1);
     }
-    if (list->count == 0)
+    bool is_limited = fault_limits()[0] != '\0';
+    if (list->count == 0 && is_limited)
+        text_appendf(&text, "; a driver may not load within that");
+    else if (list->count == 0)
         text_appendf(&text, "; PoCL runs on any CPU: `apt install pocl-opencl-icd` on Debian and Ubuntu");
-    if (list->count == 0 && list->platform_count > 0)
+    if (list->count == 0 && list->platform_count > 0 && !is_limited)
         text_appendf(&text,
                      "; if it is installed, its cache needs a writable folder: set HOME, XDG_CACHE_HOME "
                      "or POCL_CACHE_DIR");

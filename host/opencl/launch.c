@@ -39,7 +39,9 @@ static cl_ulong event_timestamp(cl_event event, cl_profiling_info what)
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start)
 {
     LaunchTime time = {0};
+    fault_note_call("clWaitForEvents");
     cl_int waited = clWaitForEvents(1, &event), state = CL_COMPLETE;
+    fault_note_call(NULL);
     double host_seconds = clock_seconds() - host_start;
     compute_try(compute,
                 clGetEventInfo(event, CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof state, &state, NULL));

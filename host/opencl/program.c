@@ -105,12 +105,15 @@ static void append_unused_option(Text *options)
 static cl_program build_from_source(Compute *compute, const char *text, const char *options, bool afresh)
 {
     cl_int status;
+    fault_note_call("clCreateProgramWithSource");
     cl_program program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
     if (!compute_check_object(compute, program, status, "clCreateProgramWithSource")) return NULL;
     Text all_options = {0};
     text_appendf(&all_options, "%s", options);
     if (afresh) append_unused_option(&all_options);
+    fault_note_call("clBuildProgram");
     status = clBuildProgram(program, 1, &compute->device->id, text_c(&all_options), NULL, NULL);
+    fault_note_call(NULL);
     text_free(&all_options);
     if (status == CL_SUCCESS) return program;
     if (afresh) build_fail(compute, program, status, text, options);
@@ -131,10 +134,14 @@ static cl_program build_from_binary(const Compute *compute, const Text *binary, 
 {
     const unsigned char *bytes = (const unsigned char *)text_c(binary);
     cl_int binary_status, status;
+    fault_note_call("clCreateProgramWithBinary");
     cl_program program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
                                                    &bytes, &binary_status, &status);
     if (status != CL_SUCCESS || !program) return NULL;
-    if (clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL) == CL_SUCCESS) return program;
+    fault_note_call("clBuildProgram");
+    status = clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL);
+    fault_note_call(NULL);
+    if (status == CL_SUCCESS) return program;
     clReleaseProgram(program);
     return NULL;
 }
@@ -167,9 +174,18 @@ cl_kernel program_kernel(Compute *compute, const Program *program, const char *n
 {
     if (!compute_ok(compute)) return NULL;
     cl_int status;
+    fault_note_call("clCreateKernel");
     cl_kernel kernel = clCreateKernel(program->program, name, &status);
     compute_check_object(compute, kernel, status, "clCreateKernel");
     return kernel;
+}
+
+static bool program_query(const Program *program, cl_program_info what, size_t size, void *value)
+{
+    fault_note_call("clGetProgramInfo");
+    cl_int status = clGetProgramInfo(program->program, what, size, value, NULL);
+    fault_note_call(NULL);
+    return status == CL_SUCCESS;
 }
 
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program)
@@ -177,11 +193,9 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
     if (request->no_cache || program->from_cache || !compute_ok(compute)) return;
     size_t size = 0;
     // a driver without a binary costs the next run a build; this one has its image
-    if (clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL) != CL_SUCCESS ||
-        size == 0)
-        return;
+    if (!program_query(program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size) || size == 0) return;
     char *bytes = memory_allocate(size, 1);
-    if (clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL) != CL_SUCCESS) {
+    if (!program_query(program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes)) {
         free(bytes);
         return;
     }

@@ -297,6 +297,7 @@ void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
     double start = clock_seconds();
     cl_event event = NULL;
     cl_int status;
+    fault_note_call("clEnqueueMapBuffer");
     void *mapped =
         clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size, 0, NULL, &event, &status);
     if (!compute_check_object(compute, mapped, status, "clEnqueueMapBuffer")) {

@@ -2,6 +2,7 @@
 #include "host/base/array.h"
 #include "host/base/fault.h"
 
+#include <errno.h>
 #include <libfyaml.h>
 #include <stdlib.h>
 #include <string.h>
@@ -193,6 +194,7 @@ static size_t place_offset(const Source *source, int line, int column)
 // `end`: how far the parser came, for the few errors it does not describe.
 static void syntax_report(struct fy_diag *diagnostics, Report *report, size_t end)
 {
+    if (errno == ENOMEM) fault("out of memory: reading %s%s", report->source->file, fault_limits());
     void *iterator = NULL;
     const struct fy_diag_error *error = fy_diag_errors_iterate(diagnostics, &iterator);
     if (!error) {
@@ -256,6 +258,7 @@ bool yaml_tree_read(YamlTree *tree, Report *report)
         fault("libfyaml: cannot make a parser");
 
     TreeBuilder builder = {.tree = tree, .report = report};
+    errno = 0;
     bool built = tree_build(&builder, parser, diagnostics);
     free(builder.anchors.items);
     fy_parser_destroy(parser);
