@@ -14,6 +14,7 @@
     FEATURE(IMAGES, )             \
     FEATURE(REFLECTION, )         \
     FEATURE(TRANSMISSION, )       \
+    FEATURE(EYE_POWERS, )         \
     FEATURE(BVH, )
 // clang-format on
 

@@ -26,8 +26,14 @@ typedef struct {
 
 typedef struct {
     scalar4 center_radius; // xyz center, w radius
-    uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES
+    // x: the object's id, y: IGNORES_FRONT_FACES | SPHERE_HAS_POWER. With the latter the eye's power,
+    // |center|^2 - radius^2 before either is rounded, defines the sphere instead of the radius: next to a
+    // planet the two round to half a meter, the power to an ulp of the distance. z: its bits as a float, or
+    // z, w: low and high half of its bits as a double.
+    uint4 id;
 } Sphere;
+
+enum { SPHERE_HAS_POWER = 16 };
 
 // In a shape's id.y: front faces are ignored, only rays from inside hit. Never with REVOLUTION_CAPPED.
 enum { IGNORES_FRONT_FACES = 8 };

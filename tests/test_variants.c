@@ -48,7 +48,8 @@ static void scene_has_every_feature(void **state)
 {
     (void)state;
     // test_textures has textures: a mirror image would have to mirror them too
-    assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_IMAGES, FEATURE_ALL);
+    assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES,
+                     FEATURE_ALL);
 }
 
 static void lanes_agree(void **state)
@@ -176,7 +177,8 @@ static void features_alone_and_all_together_agree(void **state)
         film_free(&general);
         scene_free(&scene);
     }
-    assert_int_equal(seen | FEATURE_BVH, FEATURE_ALL); // no scene needs a BVH; it has a test of its own
+    // these depend on numbers and settings, and have tests of their own
+    assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS, FEATURE_ALL);
 
     // No scene needs checkers alone: built in without need, on an empty scene.
     Scene empty = scene_with_warnings(SCENE_HEAD);

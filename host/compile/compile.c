@@ -21,7 +21,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     materials_flatten(compiled, scene, &rounding);
     lights_flatten(compiled, scene, &rounding);
     if (!numbers_fit(compiled, scene, settings, messages)) return false;
-    compiled->features = features_of(scene) | settings->extra_features;
+    compiled->features |= features_of(scene) | settings->extra_features;
     double start = clock_seconds();
     bvh_flatten(compiled, settings);
     compiled->bvh_seconds = clock_seconds() - start;

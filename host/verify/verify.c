@@ -24,6 +24,7 @@ static const struct {
     {"S4", "ground sphere, from a millionth of its radius above", {verify_ground_horizon}},
     {"S5", "rays an ulp beside a sphere's tangent", {0}},
     {"S6", "inside a sphere, and leaving it", {verify_scaled_directions, verify_leaving_spheres}},
+    {"S7", "spheres up to 2^60 times as large as their distance", {verify_sphere_sizes}},
     {"P1", "plane up to the horizon", {verify_plane_horizon}},
     {"P2", "a plane's own shadow", {verify_plane_acne}},
     {"P3", "disc's rim from far away", {0}},

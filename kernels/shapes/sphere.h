@@ -8,18 +8,46 @@ typedef struct {
     real b, c;
 } SphereCoefficients;
 
-// Each rounded about once. `to_center` is -f.
-static inline SphereCoefficients sphere_coefficients(PairVector to_center, real radius, const Ray *ray)
+// start + a . b, rounded about once.
+static inline real sphere_power_sum(Pair start, Vector a, PairVector b)
 {
-    real x = to_center.x.high, y = to_center.y.high, z = to_center.z.high;
-    Pair rr = two_product(radius, radius);
-    Pair xx = two_product(x, x), yy = two_product(y, y), zz = two_product(z, z);
-    Pair one = two_sum(xx.high, -rr.high), two = two_sum(one.high, yy.high),
+    Pair xx = two_product(a.x, b.x.high), yy = two_product(a.y, b.y.high), zz = two_product(a.z, b.z.high);
+    Pair one = two_sum(xx.high, start.high), two = two_sum(one.high, yy.high),
          three = two_sum(two.high, zz.high);
-    real twice_low = real_fma(x, to_center.x.low, real_fma(y, to_center.y.low, z * to_center.z.low));
-    real low = ((one.low + two.low) + three.low) + ((xx.low + yy.low) + (zz.low - rr.low));
-    return (SphereCoefficients){-pair_vector_dot_once(to_center, ray->direction),
-                                three.high + real_fma((real)(2), twice_low, low)};
+    real of_low = real_fma(a.x, b.x.low, real_fma(a.y, b.y.low, a.z * b.z.low));
+    real low = ((one.low + two.low) + three.low) + ((xx.low + yy.low) + (zz.low + start.low));
+    return three.high + (of_low + low);
+}
+
+static inline real sphere_eye_power(const Sphere *sphere)
+{
+#if IS_DOUBLE
+    return (real)(as_double(upsample(sphere->id.w, sphere->id.z)));
+#else
+    return (real)(as_float(sphere->id.z));
+#endif
+}
+
+// Each rounded about once. `to_center` is -f. c is the origin's power: f . f - r^2, or the eye's plus
+// o . (o - 2 center), in which the center's rounding counts only by the origin's distance from the eye.
+static inline SphereCoefficients sphere_coefficients(const Sphere *sphere, PairVector to_center,
+                                                     const Ray *ray)
+{
+    SphereCoefficients coefficients = {.b = -pair_vector_dot_once(to_center, ray->direction)};
+    if (HAS_EYE_POWERS && (sphere->id.y & SPHERE_HAS_POWER)) {
+        Vector twice_center = vector_scale(vector_of(sphere->center_radius), (real)(2));
+        coefficients.c = sphere_power_sum(pair_of(sphere_eye_power(sphere)), ray->origin,
+                                          pair_vector_difference(ray->origin, twice_center));
+        return coefficients;
+    }
+    real radius = (real)(sphere->center_radius.w);
+    Pair rr = two_product(radius, radius);
+    PairVector twice_low = to_center;
+    twice_low.x.low *= (real)(2);
+    twice_low.y.low *= (real)(2);
+    twice_low.z.low *= (real)(2);
+    coefficients.c = sphere_power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
+    return coefficients;
 }
 
 // From rounded b and c, off by 2 u (b^2 + |a c|): for rays that start near the closest approach.
@@ -75,7 +103,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real discriminant;
     if (IS_COMPENSATED) {
         PairVector to_center = pair_vector_difference(center, ray->origin);
-        SphereCoefficients compensated = sphere_coefficients(to_center, radius, ray);
+        SphereCoefficients compensated = sphere_coefficients(sphere, to_center, ray);
         Vector moment = pair_vector_cross_once(to_center, ray->direction);
         discriminant = sphere_discriminant(compensated, moment, radius, ray);
         b = compensated.b;
@@ -89,7 +117,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
              near_surface = hit & (fabs(c) < (real)(0.5f) * squared_distance);
         if (RARELY(lanes_any(near_surface))) {
             PairVector to_center = pair_vector_difference(center, ray->origin);
-            SphereCoefficients compensated = sphere_coefficients(to_center, radius, ray);
+            SphereCoefficients compensated = sphere_coefficients(sphere, to_center, ray);
             b = lanes_select(near_surface, compensated.b, b);
             c = lanes_select(near_surface, compensated.c, c);
             discriminant =
@@ -104,11 +132,13 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 
 // The point seen from the center; compensated n = (l -+ h d) / r with l = d x E / a and h the root of the
 // discriminant over a, which loses no bits with distance.
-static inline Vector sphere_normal(Vector center, real radius, const Ray *ray, real t)
+static inline Vector sphere_normal(const Sphere *sphere, const Ray *ray, real t)
 {
+    Vector center = vector_of(sphere->center_radius);
+    real radius = (real)(sphere->center_radius.w);
     if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, center, t));
     PairVector to_center = pair_vector_difference(center, ray->origin);
-    SphereCoefficients compensated = sphere_coefficients(to_center, radius, ray);
+    SphereCoefficients compensated = sphere_coefficients(sphere, to_center, ray);
     Vector moment = pair_vector_cross_once(to_center, ray->direction);
     real discriminant = real_max(sphere_discriminant(compensated, moment, radius, ray), (real)(0));
     real inverse = real_divide((real)(1), ray->squared);
@@ -123,7 +153,7 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
 {
     Vector center = vector_of(sphere->center_radius);
     real radius = (real)(sphere->center_radius.w);
-    Vector normal = sphere_normal(center, radius, ray, t);
+    Vector normal = sphere_normal(sphere, ray, t);
     SurfacePoint point =
         surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_norm1(center));
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);

@@ -1,4 +1,6 @@
 #include "host/compile/shapes.h"
+#include <float.h>
+#include <string.h>
 
 static bool sphere_bounds(const Scene *scene, const Object *object, Bounds *bounds)
 {
@@ -7,11 +9,61 @@ static bool sphere_bounds(const Scene *scene, const Object *object, Bounds *boun
     return true;
 }
 
+// The eye's power |center - eye|^2 - radius^2, in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot
+// product, 2005), since it is but 2^-60 of its terms where the eye is as near to a sphere; and how far the
+// rounding of center and radius moves the surface.
+typedef struct {
+    double power, moved;
+} EyePower;
+
+static EyePower eye_power(const Rounding *rounding, const Object *object, Vector3 center)
+{
+    const Vector3 from = rounding->eye, to = object->as.sphere.center;
+    const double radius = object->as.sphere.radius, square = radius * radius;
+    const double starts[] = {from.x, from.y, from.z}, ends[] = {to.x, to.y, to.z},
+                 stored[] = {center.x, center.y, center.z};
+    double sum = -square, rest = -fma(radius, radius, -square), moved_square = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const double start = starts[axis], end = ends[axis], step = end - start, of_end = step + start,
+                     low = (end - of_end) - (start - (of_end - step));
+        const double product = step * step, next = sum + product, of_product = next - sum;
+        rest += ((sum - (next - of_product)) + (product - of_product)) + fma(step, step, -product) +
+                low * (2 * step + low);
+        sum = next;
+        const double moved = (step - stored[axis]) + low;
+        moved_square += moved * moved;
+    }
+    return (EyePower){sum + rest, sqrt(moved_square) + fabs(radius - rounded(rounding, radius))};
+}
+
+// Most spheres do not need their power: their surface moves by less than 4 roundings of its distance.
+static void sphere_take_power(Sphere *sphere, Flattening *flattening, const Object *object, Vector3 center)
+{
+    const Rounding *rounding = &flattening->rounding;
+    const EyePower eye = eye_power(rounding, object, center);
+    const double distance = fabs(eye.power) / (vector_length(center) + object->as.sphere.radius);
+    const double roundoff = (rounding->is_double ? DBL_EPSILON : FLT_EPSILON) / 2;
+    const double power = rounded(rounding, eye.power);
+    if (!(eye.moved > 4 * roundoff * distance) || !isfinite(power)) return;
+    flattening->compiled->features |= FEATURE_EYE_POWERS;
+    sphere->id.y |= SPHERE_HAS_POWER;
+    const float single = (float)power;
+    if (!rounding->is_double) {
+        memcpy(&sphere->id.z, &single, sizeof single);
+        return;
+    }
+    uint64_t bits;
+    memcpy(&bits, &power, sizeof bits);
+    sphere->id.z = (uint32_t)bits;
+    sphere->id.w = (uint32_t)(bits >> 32);
+}
+
 static void sphere_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 center = point_from_eye(&flattening->rounding, object->as.sphere.center);
-    const Sphere sphere = {.center_radius = scalar4_of(center, object->as.sphere.radius),
-                           .id.y = object->as.sphere.only_inside ? IGNORES_FRONT_FACES : 0u};
+    Sphere sphere = {.center_radius = scalar4_of(center, object->as.sphere.radius),
+                     .id.y = object->as.sphere.only_inside ? IGNORES_FRONT_FACES : 0u};
+    sphere_take_power(&sphere, flattening, object, center);
     primitive_add(flattening, KIND_SPHERES, &sphere, object->material);
 }
 
