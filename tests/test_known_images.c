@@ -464,8 +464,8 @@ static uint64_t panes_render(bool transparent, Precision precision, uint32_t lan
 static void depth_of_facing_panes(Precision precision)
 {
     const uint64_t plain = panes_render(true, precision, 0, 5);
-    check(panes_render(true, precision, 0, 16) == plain);
-    check(panes_render(true, precision, 0, 17) != plain);
+    check(panes_render(true, precision, 0, 8) == plain);
+    check(panes_render(true, precision, 0, 9) != plain);
     panes_render(true, precision, 0, BOUNCES_MAX);
     panes_render(true, precision, 1, BOUNCES_MAX);
     check(panes_render(false, precision, 0, 5) == panes_render(false, precision, 0, BOUNCES_MAX));
