@@ -1,5 +1,5 @@
 #!/bin/bash
-# The options of each command are the same in its --help, in the manual page, which tools/man-options writes, and in the
+# The keys of the window are those of docs/view.md. The options of each command are the same in its --help, in the manual page, which tools/man-options writes, and in the
 # completions of three shells.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -59,6 +59,10 @@ cp docs/glint.1 "$page"
 tools/man-options "$GLINT" "$page"
 for subcommand in $subcommands; do grep -q "options $subcommand\$" "$page" || { echo "docs/glint.1 has no options of $subcommand"; failed=1; }; done
 diff docs/glint.1 "$page" || failed=1
+
+# What mouse and keys do in the window.
+keys=$("$GLINT" view --help | sed -n '3,/^$/s/^  \(.*[^ ]\)   *\([^ ].*\)$/| \1 | \2 |/p' | sed 's/ * |/ |/')
+diff <(echo "$keys") <(sed -n '/^<!-- keys/,/^<!-- end/{/^| [^|]/p}' docs/view.md) || failed=1
 
 listed=$("$GLINT" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p' | xargs)
 if [ "$listed" != "$subcommands" ]; then

@@ -21,7 +21,7 @@ from glint import IS_LONG, PROGRAM, TestCase, main, need_device, png_read, run, 
 
 SCENE = """\
 camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
-background: [0.1, 0.2, 0.4]
+background: [0.125, 0.25, 0.5]
 lights: [{point: {position: [3, 4, -5]}}]
 objects:
   - mesh: {file: mesh.obj, material: {color: [0.9, 0.8, 0.7]}}
@@ -167,6 +167,15 @@ class Window:
         self.shows_at_last(rows)
         return camera
 
+    def pixel(self, x, y):
+        stride, pixels = screen()
+        return tuple(pixels[y * stride + 4 * x + channel] for channel in (2, 1, 0))
+
+    def title_at_last(self, text):
+        end = time.monotonic() + DEADLINE
+        while text not in xdotool("getwindowname", self.id):
+            self.test.assertLess(time.monotonic(), end, f"the title has no '{text}'")
+
     def shows_at_last(self, rows):
         end = time.monotonic() + DEADLINE
         while not self.shows(rows):
@@ -227,9 +236,7 @@ class View(TestCase):
     def test_resize_and_save(self):
         window = Window(self)
         xdotool("windowsize", window.id, 101, 73)
-        end = time.monotonic() + DEADLINE
-        while "101x73" not in xdotool("getwindowname", window.id):
-            self.assertLess(time.monotonic(), end)
+        window.title_at_last("101x73")
         camera = window.check((101, 73))
         path = window.saved("shift+s")
         self.assertEqual(path, "scene-1.exr")
@@ -273,10 +280,28 @@ class View(TestCase):
     def write_by_rename(path, text):
         os.rename(write("other", text), path)
 
-    def image_of(self, text):
+    def image_of(self, text, options=""):
         write("expected.yaml", text)
-        self.glint(f"render expected.yaml --size {WIDTH}x{HEIGHT} --samples {SAMPLES} -o expected.png")
+        self.glint(f"render expected.yaml --size {WIDTH}x{HEIGHT} --samples {SAMPLES} {options} -o expected.png")
         return png_rows("expected.png")
+
+    def test_views_and_precisions(self):
+        """The views' titles, and their colors at the corner, which sees the background, and at the center."""
+        window = Window(self)
+        for view, corner in (("color", None), ("depth", (0, 0, 0)), ("normal", (0, 0, 0)), ("object", (0, 0, 0)),
+                             ("shadow", (0, 0, 0)), ("error against double", (0, 0, 0))):
+            with self.subTest(view):
+                window.title_at_last(f", {view}, single, ")
+                if corner:
+                    end = time.monotonic() + DEADLINE
+                    while window.pixel(0, 0) != corner or (window.pixel(80, 60) == corner and "error" not in view):
+                        self.assertLess(time.monotonic(), end, (window.pixel(0, 0), window.pixel(80, 60)))
+                        time.sleep(0.01)
+                window.key("v")
+        window.key("4")
+        window.title_at_last(", color, double, ")
+        window.shows_at_last(self.image_of(SCENE, "--precision double"))
+        window.close()
 
     def test_help(self):
         window = Window(self)

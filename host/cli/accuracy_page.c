@@ -2,9 +2,9 @@
 
 #include "host/base/base64.h"
 #include "host/base/memory.h"
+#include "host/image/heatmap.h"
 #include "host/image/png_bytes.h"
 #include "host/image/transfer.h"
-#include "host/measure/heatmap.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -4,8 +4,8 @@
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
+#include "host/image/heatmap.h"
 #include "host/measure/flip.h"
-#include "host/measure/heatmap.h"
 #include "host/measure/image_metrics.h"
 #include <getopt.h>
 #include <math.h>

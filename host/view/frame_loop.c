@@ -4,20 +4,12 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
-#include "host/image/transfer.h"
 #include "host/view/preview.h"
 #include "host/view/watch.h"
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-
-typedef struct {
-    Camera camera;
-    ImageSize size;
-    unsigned number;
-    bool is_moving;
-} Request;
 
 struct FrameLoop {
     FrameLoopOptions options;
@@ -26,7 +18,8 @@ struct FrameLoop {
     pthread_cond_t changed;
 
     // under the mutex
-    Request request;
+    FrameRequest request;
+    unsigned request_number;
     bool quits;
     bool reloads; // the scene's files have changed
     char *save_path, *message;
@@ -41,8 +34,10 @@ struct FrameLoop {
     Watch *watch;
     RenderSettings settings;
     Compute compute;
-    Renderer *renderer; // NULL: not open, or failed
-    Request current;
+    Renderer *renderer;  // NULL: not open, or failed
+    Renderer *reference; // in double, of the view of errors; NULL: not open
+    FrameRequest current;
+    unsigned current_number;
     uint32_t divisor; // of its first frame
     double move_seconds, render_start;
     Film film; // of the image or the coarse frame: sums of samples, at the end their mean
@@ -63,6 +58,7 @@ static bool render_stops(void)
 void frame_free(Frame *frame)
 {
     free(frame->pixels);
+    free(frame->summary);
     free(frame->distances);
     *frame = (Frame){0};
 }
@@ -95,7 +91,7 @@ static void messages_publish(FrameLoop *loop, MessageList *messages)
 
 static void frame_publish(FrameLoop *loop, uint32_t samples, bool complete)
 {
-    loop->frame.number = loop->current.number;
+    loop->frame.number = loop->current_number;
     loop->frame.samples = samples;
     loop->frame.complete = complete;
     pthread_mutex_lock(&loop->mutex);
@@ -107,28 +103,54 @@ static void frame_publish(FrameLoop *loop, uint32_t samples, bool complete)
     loop->options.notify(loop->options.notify_context);
 }
 
-// The film's color as display values, as image files have them.
-static void frame_fill(FrameLoop *loop, uint32_t divisor_of_sums)
+static double seconds_of(const NamedLaunch *launches, size_t count)
+{
+    double seconds = 0;
+    for (size_t i = 0; i < count; i++)
+        seconds += launches[i].time.trusted ? launches[i].time.event_seconds : launches[i].time.host_seconds;
+    return seconds;
+}
+
+static char *summary_make(const FrameLoop *loop, uint32_t samples)
+{
+    const RenderReport *report = renderer_report(loop->renderer);
+    double launches = seconds_of(report->launches.items, report->launches.count);
+    double reads = seconds_of(report->reads.items, report->reads.count);
+    double rays = (double)film_pixel_count(&loop->film) * samples;
+    Text text = {0};
+    text_appendf(&text, "%s\n", loop->options.device->name);
+    text_appendf(&text, "%s, %u lanes, %ux%u, %u of %u samples, %.1f million camera rays/s\n",
+                 precision_names[loop->settings.precision], report->lanes, loop->film.width,
+                 loop->film.height, samples, loop->settings.sample_count, rays / launches / 1e6);
+    text_appendf(&text, "ms: flatten %.2f, bvh %.2f, upload %.2f, build %.1f, launches %.1f, read-back %.2f",
+                 1e3 * report->flatten_seconds, 1e3 * report->bvh_seconds, 1e3 * report->upload_seconds,
+                 1e3 * report->build_seconds, 1e3 * launches, 1e3 * reads);
+    return text.items;
+}
+
+// The frame's pixels of the film; but of errors those of its color.
+static void frame_fill(FrameLoop *loop, uint32_t samples)
 {
     const Film *film = &loop->film;
     Frame *frame = &loop->frame;
-    size_t row = 3 * (size_t)film->width;
-    if (frame->width != film->width || frame->height != film->height) {
+    const bool fits = frame->width == film->width && frame->height == film->height;
+    if (!fits) {
         frame_free(frame);
-        frame->pixels = memory_allocate(row * film->height, 1);
+        frame->pixels = memory_allocate(3 * film_pixel_count(film), 1);
         frame->width = film->width;
         frame->height = film->height;
     }
     free(frame->distances);
     frame->distances = NULL;
-    float *values = memory_allocate(row, sizeof *values);
-    for (uint32_t y = 0; y < film->height; y++) {
-        const double *sums = film->color + y * row;
-        for (size_t i = 0; i < row; i++)
-            values[i] = (float)(sums[i] / divisor_of_sums);
-        transfer_quantize(frame->pixels + y * row, values, row, loop->options.transfer, 8);
-    }
-    free(values);
+    free(frame->summary);
+    frame->summary = summary_make(loop, samples);
+    const Camera *camera = &loop->current.camera;
+    if (view_aovs[loop->current.view])
+        view_aov(frame->pixels, film, loop->current.view,
+                 vector_length(vector_subtract(camera->look_at, camera->position)));
+    else
+        view_color(frame->pixels, film, samples < loop->settings.sample_count ? samples : 1,
+                   loop->options.transfer);
 }
 
 static void distances_fill(FrameLoop *loop)
@@ -167,14 +189,15 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     FrameLoop *loop = context;
     film_copy_band(&loop->film, band);
     if (!is_last(&loop->film, band)) return true;
-    const uint32_t count = loop->settings.sample_count;
-    const bool is_first = samples == 1 && band->layers[LAYER_COLOR], has_distances = !is_first;
+    const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
     if (is_first && loop->current.is_moving && loop->divisor == 1)
         preview_note(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
                      (double)film_pixel_count(&loop->film));
-    frame_fill(loop, samples < count ? samples : 1);
-    if (has_distances) distances_fill(loop);
-    frame_publish(loop, samples, samples == count && has_distances);
+    if (is_first && view_aovs[loop->current.view]) return true; // what it is made of is yet to come
+    frame_fill(loop, samples);
+    if (!is_first) distances_fill(loop);
+    bool complete = !is_first && samples == loop->settings.sample_count && loop->current.view != VIEW_ERROR;
+    frame_publish(loop, samples, complete);
     atomic_store(&first_is_due, false);
     return true;
 }
@@ -182,18 +205,27 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
 static void film_fit(FrameLoop *loop, unsigned aovs)
 {
     Film *film = &loop->film;
+    const uint32_t light_count = (uint32_t)loop->scene.lights.count;
     bool fits = film->width == loop->settings.width && film->height == loop->settings.height &&
-                (film->t || !(aovs & AOV_T));
+                film->light_count == light_count;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        fits = fits && (film->layers[layer] || !(aovs >> layer & 1));
     if (fits) return;
     film_free(film);
-    *film = film_allocate(loop->settings.width, loop->settings.height, 0, aovs);
+    *film = film_allocate(loop->settings.width, loop->settings.height, light_count, aovs);
+}
+
+static void renderers_close(FrameLoop *loop)
+{
+    renderer_close(loop->renderer);
+    renderer_close(loop->reference);
+    loop->renderer = loop->reference = NULL;
 }
 
 static void failure_publish(FrameLoop *loop)
 {
     message_publish(loop, compute_failure_text(&loop->compute));
-    renderer_close(loop->renderer);
-    loop->renderer = NULL;
+    renderers_close(loop);
     compute_close(&loop->compute);
 }
 
@@ -209,6 +241,8 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
     loop->scene.camera = loop->current.camera;
     MessageList messages = {0};
     bool prepared = true;
+    if (loop->renderer && settings->precision != loop->current.precision) renderers_close(loop);
+    settings->precision = loop->current.precision;
     if (loop->renderer) {
         prepared = renderer_move(loop->renderer, &loop->scene, settings, &messages);
         renderer_report_restart(loop->renderer);
@@ -226,10 +260,11 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
 
 static bool coarse_render(FrameLoop *loop)
 {
+    const unsigned aovs = view_aovs[loop->current.view];
     if (!renderer_prepare(loop, loop->divisor, 1)) return false;
-    film_fit(loop, 0);
+    film_fit(loop, aovs);
     atomic_store(&first_is_due, true);
-    if (!renderer_render(loop->renderer, 0, coarse_take, &loop->film)) return false;
+    if (!renderer_render(loop->renderer, aovs, coarse_take, &loop->film)) return false;
     preview_note(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
                  (double)film_pixel_count(&loop->film));
     frame_fill(loop, 1);
@@ -238,17 +273,47 @@ static bool coarse_render(FrameLoop *loop)
     return !render_stops();
 }
 
+// Replaces the image by the heat map of its errors. False: stopped, or failed.
+static bool errors_render(FrameLoop *loop)
+{
+    RenderSettings settings = loop->settings;
+    settings.precision = PRECISION_DOUBLE;
+    settings.lanes = 0;
+    MessageList messages = {0};
+    if (!loop->reference)
+        loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages);
+    else if (!renderer_move(loop->reference, &loop->scene, &settings, &messages))
+        return false;
+    messages_publish(loop, &messages);
+    Film film;
+    if (!loop->reference || !renderer_render_film(loop->reference, 0, &film)) return false;
+    frame_fill(loop, 1);
+    double largest = view_error(loop->frame.pixels, &loop->film, &film);
+    film_free(&film);
+    char *summary = loop->frame.summary;
+    if (asprintf(&loop->frame.summary, "%s\nlargest error against double: %.3g", summary, largest) < 0)
+        fault("out of memory");
+    free(summary);
+    distances_fill(loop);
+    frame_publish(loop, 1, true);
+    return true;
+}
+
 // The image of the current request, as far as no other comes. True: it is complete.
 static bool request_render(FrameLoop *loop)
 {
     const ImageSize size = loop->current.size;
+    const View view = loop->current.view;
+    const unsigned aovs = AOV_T | view_aovs[view];
     loop->divisor = loop->current.is_moving ? preview_divisor(&loop->preview, size.width, size.height) : 1;
     bool complete = (loop->divisor == 1 || coarse_render(loop)) &&
-                    renderer_prepare(loop, 1, loop->options.settings.sample_count);
+                    renderer_prepare(loop, 1, view == VIEW_COLOR ? loop->options.settings.sample_count : 1);
     if (complete) {
-        film_fit(loop, AOV_T);
+        film_fit(loop, aovs);
         atomic_store(&first_is_due, loop->current.is_moving && loop->divisor == 1);
-        complete = renderer_accumulate(loop->renderer, AOV_T, pass_take, loop);
+        complete = renderer_accumulate(loop->renderer, aovs, pass_take, loop) &&
+                   (view != VIEW_ERROR || errors_render(loop));
+        atomic_store(&first_is_due, false);
     }
     if (loop->renderer && !compute_ok(&loop->compute)) failure_publish(loop);
     return complete;
@@ -321,8 +386,7 @@ static bool scene_reload(FrameLoop *loop)
     if (was_mistaken && messages.count == 0) message_publish(loop, memory_copy_text(""));
     messages_publish(loop, &messages);
     if (loop->is_mistaken) return false;
-    renderer_close(loop->renderer);
-    loop->renderer = NULL;
+    renderers_close(loop);
     scene_free(&loop->scene);
     loop->scene = scene;
     files_watch(loop);
@@ -333,11 +397,11 @@ static bool scene_reload(FrameLoop *loop)
 typedef enum { WORK_RENDER, WORK_SAVE, WORK_RELOAD, WORK_END } Work;
 
 // Waits for the next work.
-static Work work_wait(FrameLoop *loop, bool is_complete, char **save_path)
+static Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
 {
     pthread_mutex_lock(&loop->mutex);
-    while (!loop->quits && !loop->reloads && loop->request.number == loop->current.number &&
-           !(is_complete && loop->save_path))
+    while (!loop->quits && !loop->reloads && loop->request_number == loop->current_number &&
+           !(can_save && loop->save_path))
         pthread_cond_wait(&loop->changed, &loop->mutex);
     Work work = WORK_SAVE;
     if (loop->quits) {
@@ -345,14 +409,15 @@ static Work work_wait(FrameLoop *loop, bool is_complete, char **save_path)
     } else if (loop->reloads) {
         work = WORK_RELOAD;
         loop->reloads = false;
-    } else if (loop->request.number != loop->current.number) {
+    } else if (loop->request_number != loop->current_number) {
         work = WORK_RENDER;
         loop->current = loop->request;
+        loop->current_number = loop->request_number;
     } else {
         *save_path = loop->save_path;
         loop->save_path = NULL;
     }
-    atomic_store(&has_news, loop->request.number != loop->current.number);
+    atomic_store(&has_news, loop->request_number != loop->current_number);
     pthread_mutex_unlock(&loop->mutex);
     return work;
 }
@@ -362,12 +427,13 @@ static void *loop_run(void *context)
     FrameLoop *loop = context;
     bool is_complete = false;
     char *save_path = NULL;
-    for (Work work; (work = work_wait(loop, is_complete, &save_path)) != WORK_END;) {
+    for (Work work;
+         (work = work_wait(loop, is_complete && loop->current.view == VIEW_COLOR, &save_path)) != WORK_END;) {
         if (work == WORK_SAVE) image_save(loop, save_path);
         if (work == WORK_RELOAD) is_complete = !scene_reload(loop) && is_complete;
         if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete)) is_complete = request_render(loop);
     }
-    renderer_close(loop->renderer);
+    renderers_close(loop);
     compute_close(&loop->compute);
     return NULL;
 }
@@ -412,12 +478,12 @@ void frame_loop_close(FrameLoop *loop)
     free(loop);
 }
 
-unsigned frame_loop_request(FrameLoop *loop, const Camera *camera, ImageSize size, bool is_moving)
+unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)
 {
     pthread_mutex_lock(&loop->mutex);
-    loop->request = (Request){*camera, size, loop->request.number + 1, is_moving};
+    loop->request = *request;
+    unsigned number = ++loop->request_number;
     atomic_store(&has_news, true);
-    unsigned number = loop->request.number;
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
     return number;

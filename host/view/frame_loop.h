@@ -7,6 +7,7 @@
 #include "host/import/load.h"
 #include "host/render/renderer.h"
 #include "host/view/camera_moves.h"
+#include "host/view/views.h"
 
 typedef struct {
     const Device *device;
@@ -33,6 +34,7 @@ typedef struct {
     float *distances;
     uint32_t samples; // per pixel; 0: a coarse frame
     bool complete;
+    char *summary; // of the times and what they are of, some lines
 } Frame;
 
 void frame_free(Frame *frame); // and zeroes
@@ -43,9 +45,17 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options);
 // Ends the work and waits for it.
 void frame_loop_close(FrameLoop *loop);
 
-// Asks for an image; `is_moving`: a coarse one first. Returns the request's number, from 1.
-unsigned frame_loop_request(FrameLoop *loop, const Camera *camera, ImageSize size, bool is_moving);
-// Asks for the image of the last request to be saved when it is complete.
+typedef struct {
+    Camera camera;
+    ImageSize size;
+    View view;
+    Precision precision;
+    bool is_moving; // a coarse frame first
+} FrameRequest;
+
+// Asks for an image. Returns the request's number, from 1.
+unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
+// Asks for the image of the last request to be saved when it is complete: its color.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
 // Exchanges `frame` for the newest one. False: there is none that was not taken before.

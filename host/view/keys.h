@@ -9,6 +9,9 @@
     KEY("double click", "look at that point")                                                                \
     KEY("right drag", "look around; W A S D fly, Q and E sink and rise")                                     \
     KEY("arrows", "orbit about the point looked at, by 5 degrees")                                           \
+    KEY("V", "next view: depth, normal, object, shadow, error, color")                                       \
+    KEY("1 2 3 4", "precision fast, single, strict, double")                                                 \
+    KEY("T", "show or hide times, device and samples")                                                       \
     KEY("R", "reset the camera")                                                                             \
     KEY("C", "print the camera as YAML")                                                                     \
     KEY("S", "save the image, once complete, as PNG; Shift S: EXR")                                          \

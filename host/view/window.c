@@ -1,6 +1,7 @@
 #include "host/view/window.h"
 
 #include "host/base/clock.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/view/camera_yaml.h"
 #include "host/view/caption.h"
@@ -37,7 +38,9 @@ typedef struct {
 
     ImageSize size;             // in pixels, which a point of the window may have several of
     Camera camera, file_camera; // the view's, and the scene's own
-    bool camera_changed, size_changed;
+    View view;
+    Precision precision;
+    bool camera_changed, image_changed;
     unsigned request;
     Frame frame;
 
@@ -48,7 +51,7 @@ typedef struct {
     double flown_seconds; // the moment up to which the camera has flown
 
     char *message; // at the bottom, until the next key
-    bool shows_help, redraws, closes;
+    bool shows_help, shows_times, redraws, closes;
 } Window;
 
 static void frame_notify(void *context)
@@ -65,10 +68,11 @@ static const char *scene_name(const Window *window)
 
 static void title_set(const Window *window)
 {
-    const uint32_t count = window->options->frames.settings.sample_count;
+    const uint32_t count = window->view == VIEW_COLOR ? window->options->frames.settings.sample_count : 1;
     Text title = {0};
     // ASCII: in the C locale SDL sets no other title
-    text_appendf(&title, "%s, %ux%u", scene_name(window), window->size.width, window->size.height);
+    text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->view],
+                 precision_names[window->precision], window->size.width, window->size.height);
     if (window->request == 0 || !window->frame.pixels)
         text_appendf(&title, ", preparing");
     else if (window->frame.samples < count)
@@ -106,7 +110,7 @@ static double distance_known(const Window *window, const double at[2])
 {
     const Frame *frame = &window->frame;
     bool is_inside = at[0] >= 0 && at[0] < frame->width && at[1] >= 0 && at[1] < frame->height;
-    bool is_current = frame->number == window->request && !window->camera_changed && !window->size_changed;
+    bool is_current = frame->number == window->request && !window->camera_changed && !window->image_changed;
     if (!frame->distances || !is_inside || !is_current) return 0;
     float distance = frame->distances[(size_t)at[1] * frame->width + (size_t)at[0]];
     return distance < INFINITY ? (double)distance : 0;
@@ -245,10 +249,29 @@ static void key_press(Window *window, const SDL_KeyboardEvent *event)
         camera_print(window);
         break;
     case SDLK_s:
-        image_save(window, event->keysym.mod & KMOD_SHIFT ? "exr" : "png");
+        if (window->view == VIEW_COLOR)
+            image_save(window, event->keysym.mod & KMOD_SHIFT ? "exr" : "png");
+        else
+            message_show(window, memory_copy_text("only the color is saved (V)"));
         break;
     case SDLK_f:
         full_screen_toggle(window);
+        break;
+    case SDLK_v: {
+        unsigned step = event->keysym.mod & KMOD_SHIFT ? VIEW_COUNT - 1 : 1;
+        window->view = (View)((window->view + step) % VIEW_COUNT);
+        window->image_changed = true;
+        break;
+    }
+    case SDLK_1:
+    case SDLK_2:
+    case SDLK_3:
+    case SDLK_4:
+        window->precision = (Precision)(event->keysym.sym - SDLK_1);
+        window->image_changed = true;
+        break;
+    case SDLK_t:
+        window->shows_times = !window->shows_times;
         break;
     case SDLK_h:
         window->shows_help = !window->shows_help;
@@ -267,7 +290,7 @@ static void size_read(Window *window)
     SDL_GetRendererOutputSize(window->target, &width, &height);
     if (width < 1 || height < 1) return;
     window->size = (ImageSize){(uint32_t)width, (uint32_t)height};
-    window->size_changed = true;
+    window->image_changed = true;
 }
 
 static void event_handle(Window *window, const SDL_Event *event)
@@ -329,7 +352,10 @@ static void draw(Window *window)
     SDL_SetRenderDrawColor(window->target, 0, 0, 0, 255);
     SDL_RenderClear(window->target);
     if (window->texture) SDL_RenderCopy(window->target, window->texture, NULL, NULL);
-    if (window->shows_help) help_draw(window);
+    if (window->shows_help)
+        help_draw(window);
+    else if (window->shows_times && window->frame.summary)
+        caption_draw(window->caption, CAPTION_TOP, window->frame.summary);
     if (window->message)
         caption_draw(window->caption, CAPTION_BOTTOM, window->message);
     else if (!window->texture)
@@ -354,10 +380,12 @@ static void work_exchange(Window *window)
         window->camera = window->file_camera;
         window->camera_changed = true;
     }
-    if (window->camera_changed || window->size_changed) {
+    if (window->camera_changed || window->image_changed) {
         bool is_moving = window->request > 0;
-        window->request = frame_loop_request(window->frames, &window->camera, window->size, is_moving);
-        window->camera_changed = window->size_changed = false;
+        const FrameRequest request = {window->camera, window->size, window->view, window->precision,
+                                      is_moving};
+        window->request = frame_loop_request(window->frames, &request);
+        window->camera_changed = window->image_changed = false;
     }
     if (frame_loop_take(window->frames, &window->frame)) frame_show(window);
     message_take(window);
@@ -426,6 +454,7 @@ static bool window_open(Window *window)
     size_read(window);
     window->caption = caption_open(window->target, (float)window->size.width / (float)size.width);
     window->camera = window->file_camera = options->frames.scene->camera;
+    window->precision = options->frames.settings.precision;
     window->frame_event = SDL_RegisterEvents(1);
     FrameLoopOptions frames = options->frames;
     frames.notify = frame_notify;

@@ -1,4 +1,4 @@
-#include "host/measure/heatmap.h"
+#include "host/image/heatmap.h"
 
 #include "host/base/memory.h"
 #include "host/image/image.h"
@@ -20,7 +20,7 @@ void heatmap_color(double fraction, float color[3])
     color[2] = (float)fmax(0, fmin(fraction + 1.97294 * c, 1));
 }
 
-static void error_color(double error, double largest, float color[3])
+void heatmap_error_color(double error, double largest, float color[3])
 {
     if (!isfinite(error)) {
         color[0] = 1;
@@ -53,7 +53,7 @@ bool heatmap_write(const char *path, const float *errors, uint32_t width, uint32
     bool written = true;
     for (uint32_t y = 0; y < height && written; y++) {
         for (uint32_t x = 0; x < width; x++)
-            error_color((double)errors[(size_t)y * width + x], largest, row + 3 * (size_t)x);
+            heatmap_error_color((double)errors[(size_t)y * width + x], largest, row + 3 * (size_t)x);
         written = image_writer_rows(writer, row, 1, messages);
     }
     free(row);

@@ -10,8 +10,11 @@ enum { HEATMAP_DECADES = 4 };
 // white.
 void heatmap_color(double fraction, float color[3]);
 
-// Writes an image of the errors to `path`, on a logarithmic scale whose white is `largest` and whose black
-// is HEATMAP_DECADES powers of ten below it or less. An error that is not finite is red. The scale is noted
-// in the file (PNG, EXR). False with a message where it cannot be written.
+// The color of an error on a logarithmic scale whose white is `largest` and whose black is HEATMAP_DECADES
+// powers of ten below it or less. An error that is not finite is red.
+void heatmap_error_color(double error, double largest, float color[3]);
+
+// Writes an image of the errors in these colors to `path`. The scale is noted in the file (PNG, EXR). False
+// with a message where it cannot be written.
 bool heatmap_write(const char *path, const float *errors, uint32_t width, uint32_t height, double largest,
                    MessageList *messages);

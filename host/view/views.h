@@ -1,0 +1,31 @@
+// What the window shows of an image.
+#pragma once
+
+#include "host/image/image.h"
+#include "host/render/film.h"
+
+// VIEW(NAME, name, aovs): those that it is made of, beside the color.
+#define VIEW_LIST(VIEW)                                                                                      \
+    VIEW(COLOR, "color", 0)                                                                                  \
+    VIEW(DEPTH, "depth", AOV_T | AOV_OBJECT)                                                                 \
+    VIEW(NORMAL, "normal", AOV_NORMAL | AOV_OBJECT)                                                          \
+    VIEW(OBJECT, "object", AOV_OBJECT)                                                                       \
+    VIEW(SHADOW, "shadow", AOV_OBJECT | AOV_SHADOW)                                                          \
+    VIEW(ERROR, "error against double", 0)
+
+#define VIEW_NUMBER(NAME, name, aovs) VIEW_##NAME,
+typedef enum { VIEW_LIST(VIEW_NUMBER) VIEW_COUNT } View;
+
+extern const char *const view_names[VIEW_COUNT];
+extern const unsigned view_aovs[VIEW_COUNT];
+
+// Display values, RGB, of a film's color: sums of so many samples.
+void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer);
+
+// Of its AOVs: the depth as distance_half / (distance_half + t); normals from -1..1 to 0..1 per axis; a
+// random color for each object; the share of lights that are not occluded. Nothing hit is black.
+void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half);
+
+// A heat map of each pixel's largest difference of a channel, on a logarithmic scale: white from 1e-3 on,
+// black up to 1e-7. Returns the largest of the image.
+double view_error(uint8_t *pixels, const Film *film, const Film *reference);
