@@ -91,7 +91,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, Seen *seen, uns
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
     for (;;) {
-        if (depth > 0 || PACKETS == 1) rays_see(scene, &ray, 1, seen);
+        if (PACKETS == 1 || depth > 0) rays_see(scene, &ray, 1, seen);
         if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&seen->hit));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
