@@ -6,10 +6,9 @@
 static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
-    Seen seen;
-    camera_rays_see(scene, &ray, 1, &seen);
+    ShadedHit hit;
     unsigned_integer signature;
-    ray_tree_color(scene, ray, &seen, &signature);
+    ray_tree_color(scene, ray, false, &hit, &signature);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 

@@ -1,4 +1,4 @@
-// The image: each work-item renders its tiles of pixels in turn.
+// The image: each work-item renders a macro-tile, its packets together where there is a BVH, else in turn.
 #define COMPUTE_SIGNATURE 0
 #include "film.h"
 #include "shading/path.h"
@@ -14,7 +14,7 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
 {
     Tile tiles[PACKETS];
     Ray rays[PACKETS];
-    Seen seen[PACKETS];
+    ShadedHit hits[PACKETS];
     Color3 sums[PACKETS], lost[PACKETS];
     for (uint i = 0; i < PACKETS; i++) {
         tiles[i] = band_tile(band, first_tile + i);
@@ -30,10 +30,12 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
                                  tiles[i].inside);
             ray_counter_add(scene, RAYS_CAMERA, rays[i].active);
         }
-        camera_rays_see(scene, rays, PACKETS, seen);
+        if (PACKETS > 1) rays_shade(scene, rays, PACKETS, hits);
         for (uint i = 0; i < PACKETS; i++) {
+            if (!lanes_any(tiles[i].inside)) continue;
             unsigned_integer path;
-            Color3 color = vector_subtract(ray_tree_color(scene, rays[i], &seen[i], &path), lost[i]);
+            Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path);
+            Color3 color = vector_subtract(traced, lost[i]);
             Color3 next = vector_add(sums[i], color);
             lost[i] = vector_subtract(vector_subtract(next, sums[i]), color);
             sums[i] = next;

@@ -198,7 +198,8 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define TILE_WIDTH_OF(lanes)  ((lanes) >= 8 ? 4 : (lanes) == 4 ? 2 : 1)
 #define TILE_HEIGHT_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
 
-// The macro-tile that a work-item renders: as many tiles as a packet has lanes, nearly as wide as high.
+// The macro-tile that a work-item renders: a square of as many tiles as a packet has lanes. On a CPU each
+// work-item is a work-group of its own, which costs PoCL some hundred cycles to start.
 #define MACRO_TILE_COLUMNS_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
 #define MACRO_TILE_ROWS_OF(lanes)    ((lanes) / MACRO_TILE_COLUMNS_OF(lanes))
 

@@ -13,7 +13,7 @@
 
 static Random random_state;
 
-enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 300 };
+enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 300, MATERIALS = 7 };
 
 static const double half_tangent = 0.75, floor_y = -3, farthest = 12;
 
@@ -135,7 +135,11 @@ static Scene scene_attacking(double scale)
                               .up = {0, 1, 0},
                               .field_axis = FIELD_HORIZONTAL,
                               .half_tangent = half_tangent}};
-    array_push(scene.materials, material_default());
+    for (size_t i = 0; i < MATERIALS; i++) {
+        Material material = material_default();
+        material.diffuse = vector_all(0.3 + 0.6 * (double)i / MATERIALS);
+        array_push(scene.materials, material);
+    }
     for (size_t i = 1; i < ORIGINS; i++)
         array_push(scene.lights, ((Light){.kind = LIGHT_POINT,
                                           .color = {0.5, 0.4, 0.3},
@@ -144,6 +148,7 @@ static Scene scene_attacking(double scale)
         Object object = i % 4 == 3   ? sphere_in_view()
                         : i % 4 == 2 ? triangle_in_view(i / 4)
                                      : flat_triangle_in_view();
+        object.material = (uint32_t)(i % MATERIALS);
         object_scale(&object, scale);
         array_push(scene.objects, object);
     }

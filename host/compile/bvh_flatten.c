@@ -138,7 +138,8 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, const Bounded *
     FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     free(nodes->items);
     *nodes = flat_nodes_make(wide.node_count, width);
-    compiled->pending_children_max = wide.pending_children_max;
+    // a visit replaces a node by at most `width` children: a ray from far away meets the empty places, too
+    compiled->pending_children_max = (width - 1) * wide.depth + 1;
     uint32_t *order = order_in_kinds(bvh, bounded);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
     for (size_t i = 0; i < wide.node_count; i++)

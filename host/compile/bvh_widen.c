@@ -137,24 +137,6 @@ static void child_gather(const Widening *widening, const BvhChild *child, unsign
     node->children[node->child_count++] = child;
 }
 
-static uint32_t pending_children_max(const BvhWide *wide)
-{
-    uint32_t *most = memory_allocate(wide->node_count, sizeof *most); // from each node on
-    for (size_t i = wide->node_count; i-- > 0;) {
-        const BvhWideNode *node = &wide->nodes[i];
-        uint32_t next_node = node->first_node;
-        most[i] = node->child_count;
-        for (unsigned k = 0; k < node->child_count; k++) {
-            if (!child_is_node(node->children[k])) continue;
-            uint32_t with_siblings = node->child_count - 1 + most[next_node++];
-            if (with_siblings > most[i]) most[i] = with_siblings;
-        }
-    }
-    uint32_t from_root_on = most[0];
-    free(most);
-    return from_root_on;
-}
-
 void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
 {
     if (width < 2 || width > BVH_WIDTH_MAX) fault("a node of %u children", width);
@@ -173,14 +155,17 @@ void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
         .leaves = memory_allocate((bvh->node_count + 1) / 2, sizeof *wide->leaves), // none within another
     };
     roots[0] = 0;
-    for (size_t i = 0; i < wide->node_count; i++) {
+    for (size_t i = 0, level_end = 0; i < wide->node_count; i++) {
+        if (i == level_end) {
+            level_end = wide->node_count;
+            wide->depth++;
+        }
         BvhWideNode *node = &wide->nodes[i];
         *node = (BvhWideNode){.first_node = (uint32_t)wide->node_count};
         children_gather(&widening, roots[i], width, wide, node);
         for (unsigned k = 0; k < node->child_count; k++)
             if (child_is_node(node->children[k])) roots[wide->node_count++] = node->children[k]->first;
     }
-    wide->pending_children_max = pending_children_max(wide);
     free(roots);
     free(widening.subtrees);
 }

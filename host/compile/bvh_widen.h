@@ -15,7 +15,7 @@ typedef struct {
     size_t node_count;
     BvhChild *leaves; // that were subtrees of the binary tree
     size_t leaf_count;
-    uint32_t pending_children_max; // while a ray visits the nodes depth first, in any order
+    unsigned depth; // nodes on the longest path
 } BvhWide;
 
 // Nodes of at most `width` children, 2 to BVH_WIDTH_MAX, and leaves of up to BVH_LEAF_MAX primitives,

@@ -19,15 +19,10 @@ typedef struct {
     uint32_t width, height;
 } TileShape;
 
-static TileShape tile_shape(uint32_t lanes)
-{
-    return (TileShape){TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
-}
-
 // The pixels of a work-item: a macro-tile.
 static TileShape item_shape(uint32_t lanes)
 {
-    TileShape tile = tile_shape(lanes);
+    TileShape tile = {TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
     return (TileShape){tile.width * MACRO_TILE_COLUMNS_OF(lanes), tile.height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
@@ -213,7 +208,7 @@ static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigne
 // Rows of whole groups.
 static uint32_t rows_step(const Renderer *renderer)
 {
-    return tile_shape(renderer->report.lanes).height * (uint32_t)group_side(renderer);
+    return item_shape(renderer->report.lanes).height * (uint32_t)group_side(renderer);
 }
 
 // Enough rows for several groups per compute unit: with fewer, the last group to end would idle the others.

@@ -3,11 +3,13 @@
 // Above this file code reads like the scalar algorithm, with a mask where that would branch. A mask is the
 // result of a comparison: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
 //
-// The host defines these macros before the text (prelude_write in host/render/renderer.c):
+// The host defines these macros before the text (variant_set in host/render/renderer.c):
 //     LANES            1, 4, 8 or 16
 //     IS_FAST, IS_STRICT, IS_DOUBLE    the precision, one of them 1; all 0 at `single`
 //     REPAIRS_DIVIDE   1 at `strict` where the device's division and square root are inexact: numerics.h
 //     HAS_FMA          0 where the device emulates fma: pair.h
+//     PENDING_MAX      of pending refracted rays: shading/path.h
+//     STACK_CAPACITY   of pending children of BVH nodes: traversal/stack.h
 //     IS_COUNTING      1: rays are counted
 //     PERTURB          1: errors are simulated, by PERTURB_SEED and PERTURB_SCALE: perturb.h
 //     HAS_<feature>    0 or 1 for each of features.h

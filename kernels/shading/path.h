@@ -6,15 +6,15 @@
 #include "shading/bounce.h"
 #include "shading/phong.h"
 
-// What a packet of rays sees.
+// The hits of a packet of rays, shaded.
 typedef struct {
     Hit hit;
-    Surface surface; // where any lane hit one
+    Surface surface; // undefined if no lane hit any
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
-} Seen;
+} ShadedHit;
 
 // Adds each light that reaches the surfaces of `count` packets.
-static inline void surfaces_light(const Scene *scene, uint count, Seen *seen)
+static inline void surfaces_light(const Scene *scene, uint count, ShadedHit *hits)
 {
     Ray shadow_rays[PACKETS];
     LightVisibility lights[PACKETS];
@@ -22,47 +22,41 @@ static inline void surfaces_light(const Scene *scene, uint count, Seen *seen)
     for (uint index = 0; index < scene->header->image.w; index++) {
         for (uint i = 0; i < count; i++) {
             shadow_rays[i].active = lights[i].lit = mask_none();
-            if (lanes_any(hit_found(&seen[i].hit)))
-                lights[i] = light_reach(scene, &seen[i].surface, index, &shadow_rays[i]);
+            shadow_rays[i].tmax = (real)(0);
+            if (lanes_any(hit_found(&hits[i].hit)))
+                lights[i] = light_reach(scene, &hits[i].surface, index, &shadow_rays[i]);
         }
         scene_traverse(scene, shadow_rays, count, OCCLUSION, traversals);
         for (uint i = 0; i < count; i++) {
             if (!lanes_any(lights[i].lit)) continue;
             light_occlude(&lights[i], traversal_transmittance(&traversals[i]));
             if (!lanes_any(lights[i].lit)) continue;
-            Color3 reflected = phong_shade(scene, &seen[i].surface, &lights[i], index);
-            seen[i].color = vector_add(seen[i].color, reflected);
+            Color3 reflected = phong_shade(scene, &hits[i].surface, &lights[i], index);
+            hits[i].color = vector_add(hits[i].color, reflected);
         }
     }
 }
 
-// The surfaces that `count` packets of rays hit, and their colors; no colors if COMPUTE_SIGNATURE.
-static OUT_OF_LINE void rays_see(const Scene *scene, Ray *rays, uint count, Seen *seen)
+// Traces `count` packets of rays and shades their hits; no colors if COMPUTE_SIGNATURE.
+static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, ShadedHit *hits)
 {
     Traversal traversals[PACKETS];
     scene_traverse(scene, rays, count, CLOSEST_HIT, traversals);
     Color3 background = vector_of(scene->header->background);
     for (uint i = 0; i < count; i++) {
-        seen[i].hit = traversals[i].hit;
-        mask found = hit_found(&seen[i].hit);
-        seen[i].color = background;
+        hits[i].hit = traversals[i].hit;
+        mask found = hit_found(&hits[i].hit);
+        hits[i].color = background;
         if (!lanes_any(found)) continue;
-        seen[i].surface = visible_surface(scene, &rays[i], &seen[i].hit);
-        const Surface *surface = &seen[i].surface;
+        hits[i].surface = visible_surface(scene, &rays[i], &hits[i].hit);
+        const Surface *surface = &hits[i].surface;
         Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
-        seen[i].color = color_multiply(ambient, surface->color);
+        hits[i].color = color_multiply(ambient, surface->color);
     }
     if (COMPUTE_SIGNATURE) return;
-    surfaces_light(scene, count, seen);
+    surfaces_light(scene, count, hits);
     for (uint i = 0; i < count; i++)
-        seen[i].color = vector_select(hit_found(&seen[i].hit), seen[i].color, background);
-}
-
-// The same of camera rays, for ray_tree_color. A lone packet's are left to it, whose loop then has the only
-// copy of the search.
-static inline void camera_rays_see(const Scene *scene, Ray *rays, uint count, Seen *seen)
-{
-    if (PACKETS > 1) rays_see(scene, rays, count, seen);
+        hits[i].color = vector_select(hit_found(&hits[i].hit), hits[i].color, background);
 }
 
 // Adds a ray's hit and its bounces to the signature.
@@ -80,10 +74,12 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
-// Traces a ray tree depth first, reflected before refracted, from what camera_rays_see left in *seen. If
-// COMPUTE_SIGNATURE, *path is its signature (types.h), which in each lane is independent of the other lanes,
-// and the color is undefined.
-static inline Color3 ray_tree_color(const Scene *scene, Ray ray, Seen *seen, unsigned_integer *path)
+// Traces a ray tree depth first, reflected before refracted. `is_shaded`: *shaded is the camera ray's hit,
+// from rays_shade; otherwise the loop traces it, whose traversal is then compiled once. If COMPUTE_SIGNATURE,
+// *path is the tree's signature (types.h), which in each lane is independent of the other lanes, and the
+// color is undefined.
+static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
+                                    unsigned_integer *path)
 {
     *path = (unsigned_integer)(PATH_START);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
@@ -91,24 +87,24 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, Seen *seen, uns
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
     for (;;) {
-        if (PACKETS == 1 || depth > 0) rays_see(scene, &ray, 1, seen);
-        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&seen->hit));
+        if (depth > 0 || !is_shaded) rays_shade(scene, &ray, 1, shaded);
+        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&shaded->hit));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE)
-                *path = path_signature_add(*path, &ray, &seen->hit, mask_none(), mask_none(), mask_none());
-            return seen->color;
+                *path = path_signature_add(*path, &ray, &shaded->hit, mask_none(), mask_none(), mask_none());
+            return shaded->color;
         }
-        color = color_add_weighted(color, weight, vector_select(ray.active, seen->color, black));
+        color = color_add_weighted(color, weight, vector_select(ray.active, shaded->color, black));
 
         Bounce reflected = {ray.origin, ray.direction, black, depth + 1, ray.travelled};
         Bounce refracted = reflected;
         mask total = mask_none();
-        if (lanes_any(hit_found(&seen->hit)) && depth < scene->header->bounces.x)
-            total = surface_bounce(&seen->surface, vector_renormalize(ray.direction), weight, false,
+        if (lanes_any(hit_found(&shaded->hit)) && depth < scene->header->bounces.x)
+            total = surface_bounce(&shaded->surface, vector_renormalize(ray.direction), weight, false,
                                    &reflected, &refracted);
         if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, &ray, &seen->hit, bounce_is_active(&reflected),
+            *path = path_signature_add(*path, &ray, &shaded->hit, bounce_is_active(&reflected),
                                        bounce_is_active(&refracted), total);
         ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&reflected));
         ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&refracted));

@@ -28,24 +28,26 @@ typedef struct {
     uint negative_x, negative_y, negative_z; // the lanes whose direction is negative, as bits
 } BoxRays;
 
-// The largest 1-norm of what a ray from this origin meets within the bounds; *farthest: of the way there.
-static inline real bounds_max_norm1(Vector origin, scalar4 bounds, real *farthest)
+// Upper bounds of 1-norms: from the origin to any hit within the bounds; of the origin and of all hits.
+static inline real bounds_farthest(Vector origin, scalar4 bounds)
 {
-    Vector center = vector_of(bounds);
-    *farthest = vector_norm1(vector_subtract(origin, center)) + (real)(bounds.w);
-    return real_fma((real)(2), vector_norm1(center), *farthest);
+    return vector_norm1(vector_subtract(origin, vector_of(bounds))) + (real)(bounds.w);
+}
+
+static inline real bounds_max_norm1(Vector origin, scalar4 bounds)
+{
+    return real_fma((real)(2), vector_norm1(vector_of(bounds)), bounds_farthest(origin, bounds));
 }
 
 static inline real box_slack(Vector origin, scalar4 bounds)
 {
-    real farthest, max_norm1 = bounds_max_norm1(origin, bounds, &farthest);
-    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), farthest,
-                    (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
+    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(origin, bounds),
+                    (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * bounds_max_norm1(origin, bounds));
 }
 
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
 {
-    real farthest, max_norm1 = bounds_max_norm1(ray->origin, bounds, &farthest);
+    real max_norm1 = bounds_max_norm1(ray->origin, bounds);
     real slack = box_slack(ray->origin, bounds);
     const real huge = (real)(1 / SMALLEST_RATIO);
     real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);

@@ -3,8 +3,11 @@
 // In the frame of the common origin, one coordinate axis is w and the other two are u and v. A ray there is a
 // point (u / w, v / w), a packet a rectangle of such points, and a box seen from the origin is a rectangle as
 // well. The children of a node are culled all at once, a lane per child, against the macro-tile's rectangle;
-// the packets of each child that is left all at once, a lane per packet; and the rays of a packet that is not
-// wholly within the child's rectangle all at once, a lane per ray.
+// the packets of each child that is left all at once, a lane per packet; and the rays of each packet that is
+// left all at once, a lane per ray. Packets are frusta on a plane across the main axis in Wald, Ize, Kensler,
+// Knoll, Parker, Ray tracing animated scenes using coherent grid traversal, SIGGRAPH 2006, and culled in
+// groups in Reshetov, Soupikov, Hurley, Multi-level ray tracing algorithm, SIGGRAPH 2005; neither tests lanes
+// of three kinds.
 #ifndef MACRO_TILE_H
 #define MACRO_TILE_H
 
@@ -14,7 +17,7 @@
 
 #if LANES > 1
 
-// A ray whose slope exceeds this in the frame is searched for by packet traversal.
+// Packets with a larger slope in the frame take packet traversal.
 #define SLOPE_MAX ((real)(4))
 // Slopes below this count as it.
 #define SLOPE_MIN (UNIT_ROUNDOFF * UNIT_ROUNDOFF)
@@ -36,8 +39,8 @@ typedef struct {
     OriginFrame frame;
     uint packets; // those that take part, as bits
     real slack;   // by which boxes are enlarged: for each lane's rays, from macro_tile_bound on for all
-    // of each packet's rays: w per u and per v, w per t, and how far along w they search, -LARGEST where they
-    // do not
+    // of each packet's rays: w per u and per v, w per t, and the w up to which they are traversed, -LARGEST
+    // in lanes that are done
     real w_per_u[LANES], w_per_v[LANES], w_per_t[LANES], reach[LANES];
     // bounds of these over each packet, a lane per packet
     RealLanes u_min, u_max, v_min, v_max, reach_max;
@@ -121,7 +124,8 @@ static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint pack
     tile->u_max.each[packet] = -minima.each[1];
     tile->v_min.each[packet] = minima.each[2];
     tile->v_max.each[packet] = -minima.each[3];
-    real farthest, max_norm1 = bounds_max_norm1(ray->origin, scene->header->bounds, &farthest);
+    // the origin counts, too: a shadow ray's line misses the light by u of all of the ray
+    real max_norm1 = bounds_max_norm1(ray->origin, scene->header->bounds);
     real slack = real_fma((real)(TILE_POSITION_SLACK * UNIT_ROUNDOFF), max_norm1,
                           box_slack(ray->origin, scene->header->bounds));
     tile->slack = real_max(tile->slack, lanes_select(active, slack, zero));
@@ -267,6 +271,7 @@ static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scen
     if (active == 0) return others;
     macro_tile_bound(&tile);
     StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)active, -LARGEST};
+    // entry distances are from the common origin: nearest the light is farthest from the surface
     TraversalStack stack = {entries, 0, false};
     for (;; next = entries[--stack.count]) {
         uint met = next.lanes & active & lanes_bits((real)(next.entry) <= tile.reach_max.all);

@@ -7,12 +7,12 @@
 #include "traversal/packet.h"
 #include "traversal/single.h"
 
-// Searches for the rays of `count` packets, up to PACKETS, which are independent of each other; if they have
-// a common origin, all have the same.
+// Traces the rays of `count` packets, up to PACKETS, which are independent of each other; if they have a
+// common origin, all have the same.
 static OUT_OF_LINE void scene_traverse(const Scene *scene, Ray *rays, uint count, Query query,
                                        Traversal *traversals)
 {
-    uint packets = 0; // that search the BVH
+    uint packets = 0; // that traverse the BVH
     for (uint i = 0; i < count; i++) {
         Ray *ray = &rays[i];
         traversals[i] = (Traversal){query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
@@ -47,7 +47,7 @@ static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
     return traversal.hit;
 }
 
-// The fraction of light that passes where a search for occlusion has ended: 1 if the way is free, 0 behind an
+// The fraction of light that passes, after a traversal for OCCLUSION: 1 if nothing occludes it, 0 behind an
 // opaque object. Each transparent object transmits its fraction, without bending the ray.
 static inline real traversal_transmittance(const Traversal *traversal)
 {
