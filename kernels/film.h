@@ -20,7 +20,7 @@ static inline Tile band_tile(const Band *band, uint which)
 {
     Tile tile;
     uint column = (uint)get_global_id(0) * MACRO_TILE_COLUMNS + which % MACRO_TILE_COLUMNS;
-    uint row = (uint)get_global_id(1) * MACRO_TILE_ROWS + which / MACRO_TILE_COLUMNS;
+    uint row = (uint)get_global_id(1) * MACRO_TILE_ROWS + (which >> MACRO_TILE_COLUMNS_LOG2);
     integer x = (integer)((scalar_integer)(column * TILE_WIDTH)) + LANE_X;
     integer y = (integer)((scalar_integer)(row * TILE_HEIGHT)) + LANE_Y;
     tile.inside =

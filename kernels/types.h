@@ -200,8 +200,9 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 
 // The macro-tile that a work-item renders: a square of as many tiles as a packet has lanes. On a CPU each
 // work-item is a work-group of its own, which costs PoCL some hundred cycles to start.
-#define MACRO_TILE_COLUMNS_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
-#define MACRO_TILE_ROWS_OF(lanes)    ((lanes) / MACRO_TILE_COLUMNS_OF(lanes))
+#define MACRO_TILE_COLUMNS_LOG2_OF(lanes) ((lanes) == 16 ? 2 : (lanes) == 1 ? 0 : 1)
+#define MACRO_TILE_COLUMNS_OF(lanes)      (1 << MACRO_TILE_COLUMNS_LOG2_OF(lanes))
+#define MACRO_TILE_ROWS_OF(lanes)         ((lanes) >> MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 
 // The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };

@@ -1,5 +1,5 @@
-// Prints the text of the kernel that renders a scene with one ray per work-item: what a GPU would be given, but
-// that HAS_FMA and REPAIRS_DIVIDE are the default device's.
+// Prints the text of the kernel that renders a scene with one ray per work-item: what a GPU would be given,
+// but that HAS_FMA and REPAIRS_DIVIDE are the default device's.
 #include "host/base/fault.h"
 #include "host/import/load.h"
 #include "host/render/renderer.h"

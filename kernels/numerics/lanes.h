@@ -86,11 +86,12 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define integer_from_unsigned LANES_AS(INTEGER_BASE)
 
 // The tile of a packet (types.h), and the position of each lane in it.
-#define TILE_WIDTH         TILE_WIDTH_OF(LANES)
-#define TILE_HEIGHT        TILE_HEIGHT_OF(LANES)
-#define MACRO_TILE_COLUMNS MACRO_TILE_COLUMNS_OF(LANES)
-#define MACRO_TILE_ROWS    MACRO_TILE_ROWS_OF(LANES)
-#define TILES              LANES // of a macro-tile
+#define TILE_WIDTH              TILE_WIDTH_OF(LANES)
+#define TILE_HEIGHT             TILE_HEIGHT_OF(LANES)
+#define MACRO_TILE_COLUMNS      MACRO_TILE_COLUMNS_OF(LANES)
+#define MACRO_TILE_COLUMNS_LOG2 MACRO_TILE_COLUMNS_LOG2_OF(LANES)
+#define MACRO_TILE_ROWS         MACRO_TILE_ROWS_OF(LANES)
+#define TILES                   LANES // of a macro-tile
 // Packets traced together: a macro-tile's, where they search a BVH. Else one, whose data stays near.
 #define PACKETS (HAS_BVH ? TILES : 1)
 #if LANES == 1

@@ -7,30 +7,37 @@
 #include "traversal/packet.h"
 #include "traversal/single.h"
 
+// Starts a packet's traversal with what is outside the BVH. Whether the BVH is left to traverse.
+static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
+{
+    *traversal = (Traversal){query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
+    if (!lanes_any(ray->active)) return false;
+    intersect_outside_bvh(traversal, scene, ray);
+    if (!HAS_BVH || !lanes_any(traversal->active)) return false;
+    global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
+    return !cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0;
+}
+
 // Traces the rays of `count` packets, up to PACKETS, which are independent of each other; if they have a
 // common origin, all have the same.
 static OUT_OF_LINE void scene_traverse(const Scene *scene, Ray *rays, uint count, Query query,
                                        Traversal *traversals)
 {
+#if LANES == 1
+    (void)count; // 1: Mesa 22.3 crashes in compiling a loop for it
+    if (traversal_begin(traversals, scene, rays, query)) traverse_bvh(traversals, scene, rays);
+#else
     uint packets = 0; // that traverse the BVH
-    for (uint i = 0; i < count; i++) {
-        Ray *ray = &rays[i];
-        traversals[i] = (Traversal){query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
-        if (!lanes_any(ray->active)) continue;
-        intersect_outside_bvh(&traversals[i], scene, ray);
-        if (!HAS_BVH || !lanes_any(traversals[i].active)) continue;
-        global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
-        if (!cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0) packets |= 1u << i;
-    }
-#if LANES > 1
+    for (uint i = 0; i < count; i++)
+        if (traversal_begin(&traversals[i], scene, &rays[i], query)) packets |= 1u << i;
     if (HAS_BVH && (packets & (packets - 1)) != 0 &&
         rays[lowest_bit(packets)].common_origin != COMMON_ORIGIN_NONE)
         packets = traverse_bvh_by_tile(traversals, scene, rays, packets);
-#endif
     for (; HAS_BVH && packets != 0; packets &= packets - 1) {
         uint i = lowest_bit(packets);
         traverse_bvh(&traversals[i], scene, &rays[i]);
     }
+#endif
 }
 
 static inline Hit closest_hit(const Scene *scene, Ray *ray)
