@@ -91,11 +91,13 @@ static bool temporary_lock(int descriptor)
 
 void output_remove_stale(int folder, const char *file_name)
 {
-    struct stat status;
+    struct stat opened, named;
     int descriptor = openat(folder, file_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0) return;
-    // without a link it has been removed meanwhile, and its name may be in use again
-    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && fstat(descriptor, &status) == 0 && status.st_nlink > 0)
+    // its process may have removed or renamed it meanwhile, and another may use the name again
+    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && fstat(descriptor, &opened) == 0 &&
+        fstatat(folder, file_name, &named, AT_SYMLINK_NOFOLLOW) == 0 && named.st_dev == opened.st_dev &&
+        named.st_ino == opened.st_ino && S_ISREG(named.st_mode) && named.st_uid == geteuid())
         unlinkat(folder, file_name, 0);
     close(descriptor);
 }

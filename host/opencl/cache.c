@@ -172,9 +172,12 @@ static bool secret_make(Secret *secret, int folder)
     if (!has_secret && getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES) {
         MessageList ignored = {0};
         OutputFile output;
-        has_secret = output_open_private(&output, folder, secret_name, &ignored) &&
-                     output_write(&output, secret->bytes, SECRET_BYTES, &ignored) &&
-                     output_commit(&output, &ignored);
+        if (output_open_private(&output, folder, secret_name, &ignored)) {
+            if (output_write(&output, secret->bytes, SECRET_BYTES, &ignored))
+                has_secret = output_commit(&output, &ignored);
+            else
+                output_abandon(&output);
+        }
         message_list_free(&ignored);
     }
     close(locked);

@@ -232,7 +232,9 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages)
 {
-    if (!compute_ok(renderer->compute) || !scene_take(renderer, scene, settings, messages)) return false;
+    if (!compute_ok(renderer->compute) || !settings_fit(settings, renderer->compute->device, messages) ||
+        !scene_take(renderer, scene, settings, messages))
+        return false;
     variant_set(renderer); // another eye may need another feature, or a deeper stack
     return true;
 }

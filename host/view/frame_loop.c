@@ -63,11 +63,17 @@ void frame_free(Frame *frame)
     *frame = (Frame){0};
 }
 
+// Takes the message. "" removes the last one; others are added to those that were not yet taken.
 static void message_publish(FrameLoop *loop, char *message)
 {
     pthread_mutex_lock(&loop->mutex);
-    free(loop->message);
+    char *waiting = loop->message;
     loop->message = message;
+    if (waiting && *waiting && *message) {
+        if (asprintf(&loop->message, "%s%s", waiting, message) < 0) fault("out of memory");
+        free(message);
+    }
+    free(waiting);
     pthread_mutex_unlock(&loop->mutex);
     loop->options.notify(loop->options.notify_context);
 }
@@ -280,13 +286,15 @@ static bool errors_render(FrameLoop *loop)
     settings.precision = PRECISION_DOUBLE;
     settings.lanes = 0;
     MessageList messages = {0};
-    if (!loop->reference)
-        loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages);
-    else if (!renderer_move(loop->reference, &loop->scene, &settings, &messages))
-        return false;
+    bool prepared = true;
+    if (loop->reference)
+        prepared = renderer_move(loop->reference, &loop->scene, &settings, &messages);
+    else
+        prepared =
+            (loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages)) != NULL;
     messages_publish(loop, &messages);
     Film film;
-    if (!loop->reference || !renderer_render_film(loop->reference, 0, &film)) return false;
+    if (!prepared || !renderer_render_film(loop->reference, 0, &film)) return false;
     frame_fill(loop, 1);
     double largest = view_error(loop->frame.pixels, &loop->film, &film);
     film_free(&film);

@@ -65,8 +65,11 @@ void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half
 static double pixel_error(const Film *film, const Film *reference, size_t pixel)
 {
     double error = 0;
-    for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++)
-        error = fmax(error, fabs(film->color[i] - reference->color[i]));
+    for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
+        if (film->color[i] == reference->color[i]) continue; // infinite ones, too
+        double difference = fabs(film->color[i] - reference->color[i]);
+        error = isnan(difference) ? INFINITY : fmax(error, difference);
+    }
     return error;
 }
 

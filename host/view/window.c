@@ -204,6 +204,15 @@ static void camera_print(Window *window)
     message_show(window, yaml.items);
 }
 
+static void request_send(Window *window)
+{
+    if (!window->camera_changed && !window->image_changed) return;
+    bool is_moving = window->request > 0;
+    const FrameRequest request = {window->camera, window->size, window->view, window->precision, is_moving};
+    window->request = frame_loop_request(window->frames, &request);
+    window->camera_changed = window->image_changed = false;
+}
+
 // Saves as SCENE-1.png, or with the first number that is free.
 static void image_save(Window *window, const char *ending)
 {
@@ -214,6 +223,7 @@ static void image_save(Window *window, const char *ending)
         text_free(&path);
         text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
     } while (access(text_c(&path), F_OK) == 0);
+    request_send(window); // what is saved is what was asked for before
     frame_loop_save(window->frames, text_c(&path));
     text_free(&path);
 }
@@ -380,13 +390,7 @@ static void work_exchange(Window *window)
         window->camera = window->file_camera;
         window->camera_changed = true;
     }
-    if (window->camera_changed || window->image_changed) {
-        bool is_moving = window->request > 0;
-        const FrameRequest request = {window->camera, window->size, window->view, window->precision,
-                                      is_moving};
-        window->request = frame_loop_request(window->frames, &request);
-        window->camera_changed = window->image_changed = false;
-    }
+    request_send(window);
     if (frame_loop_take(window->frames, &window->frame)) frame_show(window);
     message_take(window);
 }

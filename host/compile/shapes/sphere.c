@@ -10,8 +10,8 @@ static bool sphere_bounds(const Scene *scene, const Object *object, Bounds *boun
 }
 
 // The eye's power |center - eye|^2 - radius^2, in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot
-// product, 2005), since it is but 2^-60 of its terms where the eye is as near to a sphere; and how far the
-// rounding of center and radius moves the surface.
+// product, 2005): its terms cancel to 2^-60 of them where the eye is 2^-60 radii from the surface; and how
+// far the rounding of center and radius moves the surface.
 typedef struct {
     double power, moved;
 } EyePower;
