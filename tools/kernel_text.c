@@ -1,18 +1,20 @@
 // Prints the text of the kernel that renders a scene with one ray per work-item: what a GPU would be given,
 // but that HAS_FMA and REPAIRS_DIVIDE are the default device's.
-#include "host/base/fault.h"
-#include "host/import/load.h"
-#include "host/render/renderer.h"
-#include "host/scene/scene.h"
+#include "host/cli/options.h"
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-static Precision precision_of(const char *name)
+static char *kernel_text(OpenDevice *open, const Scene *scene, const CommonOptions *options)
 {
-    for (Precision precision = 0; precision < PRECISION_COUNT; precision++)
-        if (strcmp(precision_names[precision], name) == 0) return precision;
-    fault("no precision %s", name);
+    RenderSettings settings = settings_whole(options, 1920, 1080);
+    settings.bounce_count = BOUNCES_DEFAULT;
+    settings.shift_to_eye = true;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&open->compute, scene, &settings, &messages);
+    messages_print(&messages, NULL);
+    char *text = renderer ? renderer_kernel_text(renderer) : NULL;
+    renderer_close(renderer);
+    return text;
 }
 
 int main(int argument_count, char **arguments)
@@ -21,35 +23,21 @@ int main(int argument_count, char **arguments)
         fputs("usage: kernel_text SCENE PRECISION\n", stderr);
         return EXIT_FAILURE;
     }
-    Scene scene = {0};
-    DeviceList devices;
-    Compute compute;
-    MessageList messages = {0};
-    device_list_open(&devices);
-    const Device *device = device_choose(&devices, device_selector(NULL), &messages);
-    Renderer *renderer = NULL;
-    if (device && scene_load(&scene, arguments[1], &(SceneOptions){0}, &messages)) {
-        compute_open(&compute, device);
-        const RenderSettings settings = {.width = 1920,
-                                         .height = 1080,
-                                         .region_width = 1920,
-                                         .region_height = 1080,
-                                         .sample_count = 1,
-                                         .bounce_count = 5,
-                                         .lanes = 1,
-                                         .precision = precision_of(arguments[2]),
-                                         .shift_to_eye = true};
-        renderer = renderer_open(&compute, &scene, &settings, &messages);
+    CommonOptions options = {.lanes = 1};
+    unsigned precision;
+    Scene scene;
+    OpenDevice open;
+    if (!option_choice("precision", arguments[2], precision_names, PRECISION_COUNT, &precision) ||
+        !scene_open(&scene, arguments[1], &options))
+        return EXIT_FAILURE;
+    options.precision = precision;
+    int status = EXIT_FAILURE;
+    if (device_open(&open, NULL)) {
+        char *text = kernel_text(&open, &scene, &options);
+        if (text) fputs(text, stdout);
+        status = device_close(&open, text ? EXIT_SUCCESS : EXIT_FAILURE);
+        free(text);
     }
-    message_list_print(&messages, stderr);
-    message_list_free(&messages);
-    if (!renderer) return EXIT_FAILURE;
-    char *text = renderer_kernel_text(renderer);
-    fputs(text, stdout);
-    free(text);
-    renderer_close(renderer);
     scene_free(&scene);
-    compute_close(&compute);
-    device_list_close(&devices);
-    return EXIT_SUCCESS;
+    return status;
 }
