@@ -1,5 +1,6 @@
 # make [BUILD=folder] [CFLAGS=…]: the user owns CFLAGS, and a variant is another BUILD folder. One whose name ends in
-# -sanitize is built with ASan and UBSan, at -O1, which takes two thirds of the time. A newer compiler's warnings: CFLAGS='-O2 -Wno-error'.
+# -sanitize is built with ASan and UBSan, at -O1, which takes two thirds of the time. A newer compiler's warnings:
+# CFLAGS='-O2 -Wno-error'.
 VERSION := 0.1.0
 MAKEFLAGS += --no-builtin-rules
 
@@ -89,7 +90,7 @@ $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o te
 # What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.
 features: $(BUILD)/tools/features
 
-# The kernel as a GPU would be given it, for tools/gpu-resources.
+# The kernel's text, for tools/gpu-resources.
 kernel_text: $(BUILD)/tools/kernel_text
 
 $(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)
