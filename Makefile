@@ -34,6 +34,8 @@ LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsod
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
+GLINT_COMMIT  := $(or $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null)),unknown)
+version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_COMMIT)"' '-DGLINT_FLAGS="$(CFLAGS)"'
 
 # KERNELS=folder: its files stand in for those of the same name in kernels/: the textbook's formulas, to measure beside
 # (tools/numerics/textbook), never to ship.
@@ -67,7 +69,7 @@ $(BUILD)/page_files.c: $(pages) host/cli/page tools/embed
 $(BUILD)/%_files.o: $(BUILD)/%_files.c $(BUILD)/flags
 	$(CC) $(OURS) -Wno-overlength-strings $(CFLAGS) -c $< -o $@
 
-$(BUILD)/host/cli/version.o: OURS += -DGLINT_VERSION='"$(GLINT_VERSION)"'
+$(BUILD)/host/cli/version.o: OURS += $(version_flags)
 $(BUILD)/host/cli/version.o: $(BUILD)/version
 
 $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
@@ -98,7 +100,7 @@ $(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)
 
 # These two change only when what they hold does, and what depends on it is then built anew.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
-$(BUILD)/version: text := $(GLINT_VERSION)
+$(BUILD)/version: text := $(GLINT_VERSION) $(GLINT_COMMIT)
 $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(text)' | cmp -s - $@ || printf '%s\n' '$(text)' > $@
@@ -161,11 +163,11 @@ lint-format:
 
 lint-tidy:
 	@printf '%s\n' $(linted) | xargs -P $(LINT_JOBS) -I FILE \
-	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) FILE -- $(OURS) '-DGLINT_VERSION="lint"' 2>/dev/null
+	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) FILE -- $(OURS) $(version_flags) 2>/dev/null
 
 lint-cppcheck:
 	@$(CPPCHECK) --quiet --std=c11 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
-	    -j $(LINT_JOBS) -I. -D_GNU_SOURCE '-DGLINT_VERSION="lint"' $(linted)
+	    -j $(LINT_JOBS) -I. -D_GNU_SOURCE $(version_flags) $(linted)
 
 lint-man:
 	@! groff -man -ww -z -Tutf8 docs/glint.1 2>&1 | grep .

@@ -1,5 +1,5 @@
 // What glint bench makes of times, worked out by hand: quantiles, which clock is believed, when runs suffice,
-// and the ratios to an earlier report.
+// when a peak is stable, and the rows of an earlier report.
 #include "host/measure/baseline.h"
 #include "host/measure/bench.h"
 #include "host/measure/work.h"
@@ -117,7 +117,7 @@ static void test_runs_that_scatter(void **state)
 static BenchRow row_make(void)
 {
     BenchRow row = {
-        .key = {"scenes/a \"b\".yaml", "single", "auto", 16, 40, 30},
+        .key = {"scenes/a.yaml", "single", "auto", 16, 40, 30, 4, 5, 0xabcdef0123456789},
         .times = times_make(30, 1),
         .rays = {1200, 900, 100, 200, 1500},
         .flops_per_ray = 50,
@@ -169,28 +169,41 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     return baseline;
 }
 
-#define BASELINE_ROW(scene, frame)                                                                           \
-    "{\"scene\": \"" scene "\", \"precision\": \"single\", \"lanes\": 16, \"bvh\": \"auto\", "               \
-    "\"size\": [40, 30], \"frame_ms\": " frame ", \"kernel_ms\": {\"median\": 15.0}}"
+#define BASELINE_ROW(hash, frames)                                                                           \
+    "{\"scene\": \"elsewhere.yaml\", \"scene_hash\": \"" hash                                                \
+    "\", \"precision\": \"single\", \"lanes\": 16, \"bvh\": \"auto\", \"samples\": 4, \"bounces\": 5, "      \
+    "\"size\": [40, 30], \"frame_samples_ms\": " frames "}"
+#define ROW_HASH "abcdef0123456789"
 
 static void test_baseline(void **state)
 {
     (void)state;
-    BenchRow row = row_make();
     size_t errors;
     Baseline *baseline =
-        baseline_of("{\"schema\": 3, \"device\": {\"name\": \"d\"}, \"runs\": [" BASELINE_ROW(
-                        "other.yaml", "{\"median\": 1}") "," BASELINE_ROW("scenes/a \\\"b\\\".yaml",
-                                                                          "{\"median\": 90}") "]}",
+        baseline_of("{\"schema\": 4, \"device\": {\"name\": \"d\"}, \"host\": {\"name\": \"h\"}, "
+                    "\"calibration_ms\": [1, 1.5], \"runs\": [" BASELINE_ROW(
+                        "0000000000000000", "[1, 1]") "," BASELINE_ROW(ROW_HASH, "[90, 91.5]") "]}",
                     &errors);
     assert_non_null(baseline);
     assert_string_equal(baseline_device(baseline), "d");
-    Ratio ratio = baseline_ratio(baseline, &row);
-    assert_true(ratio.found);
-    assert_near(ratio.frame, 0.5, 1e-12);
-    assert_near(ratio.kernel, 2, 1e-12);
-    row.key.lanes = 8;
-    assert_false(baseline_ratio(baseline, &row).found);
+    assert_string_equal(baseline_host(baseline), "h");
+    BenchRow row = row_make();
+    ReportTimes times;
+    assert_true(baseline_find(baseline, &row.key, &times));
+    assert_true(times.frame->count == 2 && times.calibration->count == 2);
+    assert_near(times.frame->items[1], 0.0915, 1e-12);
+    assert_near(times.calibration->items[1], 0.0015, 1e-12);
+    BenchKey others[6];
+    for (int i = 0; i < 6; i++)
+        others[i] = row.key;
+    others[0].lanes = 8;
+    others[1].samples = 1;
+    others[2].bounces = 4;
+    others[3].scene_hash++;
+    others[4].precision = "double";
+    others[5].height = 31;
+    for (int i = 0; i < 6; i++)
+        assert_false(baseline_find(baseline, &others[i], &times));
     baseline_close(baseline);
     bench_row_free(&row);
 }
@@ -202,29 +215,46 @@ static void test_broken_baselines(void **state)
     const char *refused[] = {"",
                              "no json: [",
                              "[1, 2]",
-                             "{\"schema\": 1, \"runs\": []}",
+                             "{\"schema\": 3, \"runs\": []}",
                              "{\"runs\": []}",
                              "\"",
-                             "{\"schema\": 3}",
-                             "{\"schema\": 3, \"runs\": 3}"};
+                             "{\"schema\": 4}",
+                             "{\"schema\": 4, \"runs\": 3}"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         size_t errors;
         assert_null(baseline_of(refused[i], &errors));
         assert_int_equal(errors, 1);
     }
     // rows that say nothing are never found
-    const char *empty[] = {"{\"schema\": 3, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
-                           "{\"schema\": 3, \"runs\": [" BASELINE_ROW("scenes/a \\\"b\\\".yaml",
-                                                                      "{\"status\": \"unavailable\"}") "]}"};
-    for (size_t i = 0; i < 2; i++) {
+    const char *empty[] = {"{\"schema\": 4, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
+                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "{}") "]}",
+                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "[]") "]}",
+                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 0]") "]}",
+                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
+    for (size_t i = 0; i < sizeof empty / sizeof *empty; i++) {
         size_t errors;
+        ReportTimes times;
         Baseline *baseline = baseline_of(empty[i], &errors);
         assert_non_null(baseline);
         assert_string_equal(baseline_device(baseline), "");
-        assert_false(baseline_ratio(baseline, &row).found);
+        assert_false(baseline_find(baseline, &row.key, &times));
         baseline_close(baseline);
     }
     bench_row_free(&row);
+}
+
+static void test_peak_that_repeats(void **state)
+{
+    (void)state;
+    PeakWindows windows = {0};
+    const double rates[] = {100, 219, 440, 430}; // 430 is less than 3 % off, and 219 is not
+    for (size_t i = 0; i < 4; i++) {
+        peak_windows_add(&windows, rates[i]);
+        assert_false(peak_windows_stable(&windows));
+    }
+    peak_windows_add(&windows, 435);
+    assert_true(peak_windows_stable(&windows));
+    assert_true(windows.best[0] == 440 && windows.best[1] == 435 && windows.best[2] == 430);
 }
 
 int main(void)
@@ -234,7 +264,7 @@ int main(void)
         cmocka_unit_test(test_clock_that_drifts), cmocka_unit_test(test_event_without_times),
         cmocka_unit_test(test_runs_that_scatter), cmocka_unit_test(test_figures),
         cmocka_unit_test(test_work_of_a_scene),   cmocka_unit_test(test_baseline),
-        cmocka_unit_test(test_broken_baselines),
+        cmocka_unit_test(test_broken_baselines),  cmocka_unit_test(test_peak_that_repeats),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,10 +3,10 @@
 asked of the times themselves.
 
 run_tests: sanitize-long-only"""
-import copy
 import json
+import os
 
-from glint import ROOT, SPHERE, TestCase, main, need_device, write
+from glint import PROGRAM, ROOT, SPHERE, TestCase, main, need_device, write
 
 QUICK = "--size 32x24 --seconds 0.1"
 TRIANGLES = f"{ROOT}/scenes/triangles.yaml"
@@ -28,6 +28,8 @@ class Bench(TestCase):
         for times in run["frame_ms"], run["kernel_ms"]:
             self.assertTrue(0 < times["min"] <= times["median"] <= times["max"] and times["runs"] >= 1, times)
         self.assertEqual(run["frame_ms"]["runs"], run["kernel_ms"]["runs"])
+        for times, samples in (run["frame_ms"], run["frame_samples_ms"]), (run["kernel_ms"], run["kernel_samples_ms"]):
+            self.assertEqual((len(samples), min(samples), max(samples)), (times["runs"], times["min"], times["max"]))
         self.assertTrue(run["clock"] == "event" or (run["clock"] == "host" and run["clock_doubt"]), run)
         self.assertRegex(run["kernel_hash"], "^[0-9a-f]{16}$")
         for figure in *run["build_ms"].values(), run["peak_fraction"], run["bandwidth_fraction"]:
@@ -49,7 +51,10 @@ class Bench(TestCase):
         process = self.glint(f"bench sphere.yaml {TRIANGLES} {QUICK} --precision single,double --launches --json")
         self.assertEqual(process.stderr, "")
         report = json.loads(process.stdout)
-        self.assertEqual(report["schema"], 3)
+        self.assertEqual(report["schema"], 4)
+        self.assertRegex(report["date"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
+        self.assertTrue(report["host"]["name"] and report["build"]["compiler"])
+        self.assertRegex(report["build"]["commit"], "^([0-9a-f]{40}(-dirty)?|unknown)$")
         device = report["device"]
         self.assertTrue(device["name"] and device["driver"] and device["type"] and device["units"] > 0, device)
         for key in "gflops_float", "gflops_double", "gigabytes_per_s":
@@ -72,22 +77,58 @@ class Bench(TestCase):
             self.assertLessEqual(max(counts) - min(counts), 2)
 
     def test_comparison(self):
+        """A busy machine may take many times as long, but not a million times; the speed of the calibration goes along."""
         report = self.json(f"bench sphere.yaml {QUICK} --json")
-        # A busy machine may take many times as long, but not a million times.
-        faster = copy.deepcopy(report)
-        for times in "frame_ms", "kernel_ms":
-            for key in "min", "median", "max":
-                faster["runs"][0][times][key] *= 1e-6
+        for times in report["calibration_ms"], report["runs"][0]["frame_samples_ms"]:
+            times[:] = [times[0]] * 20  # enough for an interval
+        report["runs"][0]["scene"] = "moved.yaml"
         write("report", json.dumps(report))
-        write("faster", json.dumps(faster))
-        command = f"bench sphere.yaml {QUICK} --compare"
-        self.assertRegex(self.glint(f"{command} report --tolerance 1000000").stdout, r"(?m)baseline.* [0-9.]+.* [0-9.]+$")
-        ratio = self.json(f"{command} faster --tolerance 10 --json", status=3)["runs"][0]["ratio"]
-        self.assertIs(ratio["slower"], True)
-        self.assertGreater(min(ratio["frame"], ratio["kernel"]), 10)
-        self.glint(f"{command} report --size 16x16", status=1)  # without a row in common
+        report["runs"][0]["frame_samples_ms"] = [1e-6 * time for time in report["runs"][0]["frame_samples_ms"]]
+        write("faster", json.dumps(report))
+        command, long = f"bench sphere.yaml {QUICK} --compare", "--seconds 3"
+        self.assertRegex(self.glint(f"{command} report {long} --tolerance 1e6").stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
+        process = self.glint(f"{command} faster {long} --json", status=3)
+        comparison = json.loads(process.stdout)["runs"][0]["comparison"]
+        self.assertEqual(comparison["verdict"], "slower")
+        self.assertTrue(10 < comparison["low"] <= comparison["ratio"] <= comparison["high"], comparison)
+        self.assertRegex(process.stderr, "1 of 1 rows are slower than faster")
+        for run in report["runs"]:
+            run["frame_samples_ms"] = run["frame_samples_ms"][:5]
+        write("short", json.dumps(report))
+        self.assertRegex(self.glint(f"{command} short", status=4).stderr, "too noisy")
+        write("sphere.yaml", SPHERE + "# another file\n")
+        self.glint(f"{command} report", status=1)  # without a row in common
         self.glint(f"{command} sphere.yaml", status=1)
         self.glint(f"{command} none", status=1)
+
+    def test_against(self):
+        """The other program is this one, whose worker's times are scaled."""
+        write("other", f"""#!/usr/bin/env python3
+import subprocess, sys
+worker = subprocess.Popen([{str(PROGRAM)!r}, *sys.argv[1:]], stdout=subprocess.PIPE, text=True)
+print(worker.stdout.readline(), end="", flush=True)
+for line in worker.stdout:
+    print(*(1e-6 * float(word) for word in line.split()), flush=True)
+""")
+        os.chmod("other", 0o755)
+        command = "bench sphere.yaml --size 32x24 --samples 1,2 --against"
+        report = self.json(f"{command} ./other --json", status=3)
+        self.assertEqual([run["samples"] for run in report["runs"]], [1, 2])
+        for run in report["runs"]:
+            self.assertEqual(run["comparison"]["verdict"], "slower")
+            self.assertTrue(1000 < run["comparison"]["low"] <= run["comparison"]["ratio"] <= run["comparison"]["high"])
+            self.assertEqual(len(run["pair_ratios"]), 10)
+            self.assertGreaterEqual(len(run["frame_samples_ms"]), 50)
+            self.assertEqual(len(run["frame_samples_ms"]), len(run["against_frame_samples_ms"]))
+        process = self.glint(f"{command} {PROGRAM} --seconds 0.01", status=4)
+        self.assertRegex(process.stdout, "2 samples, 5 bounces: 1 pairs\n.*: too noisy to say")
+        self.refuses(f"{command} ./none", "cannot run './none'")
+        self.refuses(f"{command} /bin/true", "does not answer")
+        self.refuses("bench - --against ./other", "not from '-'")
+        self.refuses(f"{command} ./other --compare report", "exclude")
+        self.refuses(f"{command} ./other --device none-such", "none-such")
+        write("other", f"#!/bin/sh\nexec {PROGRAM} \"$@\" --device none-such\n")
+        self.refuses(f"{command} ./other", "no OpenCL device matches|none-such")
 
     def test_refused(self):
         for arguments, word in (
@@ -97,6 +138,8 @@ class Bench(TestCase):
             ("sphere.yaml --lanes 2", "--lanes"),
             ("sphere.yaml --seconds 0", "--seconds"),
             ("sphere.yaml --tolerance -1", "--tolerance"),
+            ("sphere.yaml --tolerance 0.9", "--tolerance"),
+            ("sphere.yaml --samples 0", "--samples"),
         ):
             with self.subTest(arguments):
                 self.refuses(f"bench {arguments}", word)

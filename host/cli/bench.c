@@ -1,21 +1,35 @@
 // glint bench: interleaved timings of scenes in every requested configuration.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/cli/bench_against.h"
 #include "host/cli/bench_report.h"
 #include "host/cli/commands.h"
 #include "host/cli/variants.h"
+#include "host/measure/baseline.h"
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/utsname.h>
 
-enum { OPTION_JSON = OPTION_BEYOND_VARIANTS, OPTION_COMPARE, OPTION_TOLERANCE, OPTION_LAUNCHES };
+enum {
+    OPTION_JSON = OPTION_BEYOND_VARIANTS,
+    OPTION_COMPARE,
+    OPTION_AGAINST,
+    OPTION_WORKER,
+    OPTION_TOLERANCE,
+    OPTION_LAUNCHES
+};
 
 static const struct option long_options[] = {
     {"json", no_argument, NULL, OPTION_JSON},
     {"compare", required_argument, NULL, OPTION_COMPARE},
+    {"against", required_argument, NULL, OPTION_AGAINST},
+    {"worker", no_argument, NULL, OPTION_WORKER},
     {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
     {"launches", no_argument, NULL, OPTION_LAUNCHES},
+    {"samples", required_argument, NULL, OPTION_SAMPLES},
+    {"bounces", required_argument, NULL, OPTION_BOUNCES},
     VARIANT_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
@@ -23,19 +37,23 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint bench SCENE... [OPTIONS]\n\n"
-    "Benchmarks scenes in every requested configuration, interleaved.\n\n"
-    "      --compare FILE    compare with an earlier report (--json); exit status 3 where "
-    "one is slower\n"
-    "      --tolerance R     largest accepted ratio of new to old time (default: 1.1)\n"
+    "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 same or "
+    "faster,\n3 slower, 4 too noisy to say.\n\n"
+    "      --against GLINT   compare with another build, run alternately; default of --seconds: 30 per row\n"
+    "      --compare FILE    compare with an earlier report (--json), which allows to claim less\n"
+    "      --tolerance R     ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 "
+    "with --compare)\n"
+    "      --worker          answer another glint's --against\n"
     "      --launches        list the kernel launches of each row's last run\n"
-    "      --precision LIST  of fast, single, strict, double (default: single)\n" //
-    HELP_VARIANTS HELP_JSON HELP_HELP;
+    "      --precision LIST  of fast, single, strict, double (default: single)\n"
+    "      --samples LIST    per pixel, one row each (default: 1)\n" //
+    HELP_BOUNCES HELP_VARIANTS HELP_JSON HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
-    double tolerance;
-    const char *baseline;
-    bool as_json, launches;
+    double tolerance; // 0: not given
+    const char *baseline, *against;
+    bool as_json, launches, is_worker;
 } BenchOptions;
 
 typedef struct {
@@ -51,9 +69,18 @@ static bool option_take(BenchOptions *options, int option, const char *value)
     if (variant_option(&options->variants, option, value, &valid)) return valid;
     switch (option) {
     case OPTION_TOLERANCE:
-        return option_positive("tolerance", value, &options->tolerance);
+        if (option_positive("tolerance", value, &options->tolerance) && options->tolerance >= 1) return true;
+        if (options->tolerance > 0)
+            fprintf(stderr, "glint: --tolerance: expected a ratio of at least 1, not \"%s\"\n", value);
+        return false;
     case OPTION_COMPARE:
         options->baseline = value;
+        return true;
+    case OPTION_AGAINST:
+        options->against = value;
+        return true;
+    case OPTION_WORKER:
+        options->is_worker = true;
         return true;
     case OPTION_JSON:
         options->as_json = true;
@@ -66,48 +93,71 @@ static bool option_take(BenchOptions *options, int option, const char *value)
     }
 }
 
-static int bench_tell(const Bench *bench, const Baseline *baseline)
+static const double against_tolerance = 1.02, baseline_tolerance = 1.1, against_seconds = 30;
+
+// Of every row with the baseline's. Caller frees.
+static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
+{
+    const VariantSet *set = &bench->set;
+    const double tolerance = bench->options.tolerance > 0 ? bench->options.tolerance : baseline_tolerance;
+    RowComparison *comparisons = memory_allocate_zeroed(set->count, sizeof *comparisons);
+    for (size_t i = 0; i < set->count; i++) {
+        const BenchRow *row = &set->rows[i];
+        ReportTimes old_times, new_times = {&row->times.frame, &set->calibration};
+        if (!row->failure && baseline_find(baseline, &row->key, &old_times))
+            comparisons[i].result = comparison_of_reports(new_times, old_times, set->count, tolerance);
+        else
+            comparisons[i].why_not = "the baseline has no such row";
+    }
+    return comparisons;
+}
+
+static int bench_print(const Bench *bench, const Baseline *baseline)
 {
     const BenchOptions *options = &bench->options;
     const VariantSet *set = &bench->set;
     const RenderReport **reports = memory_allocate_zeroed(set->count, sizeof *reports);
     for (size_t i = 0; i < set->count; i++)
         if (set->variants[i].renderer) reports[i] = renderer_report(set->variants[i].renderer);
-    BenchReport report = {bench->open.compute.device,
-                          &bench->peak,
-                          set->rows,
-                          options->launches ? reports : NULL,
-                          set->count,
-                          baseline,
-                          options->tolerance};
+    RowComparison *comparisons = baseline ? rows_compare(bench, baseline) : NULL;
+    const Device *device = bench->open.compute.device;
+    BenchReport report = {
+        .device = device,
+        .peak = &bench->peak,
+        .rows = set->rows,
+        .reports = options->launches ? reports : NULL,
+        .count = set->count,
+        .calibration = &set->calibration,
+        .comparisons = comparisons,
+    };
     if (options->as_json)
         bench_print_json(&report);
     else
         bench_print_text(&report, stdout);
     free(reports);
+    int status = EXIT_DONE;
     if (!variant_set_any_measured(set)) {
         fputs("glint bench: no row could be measured\n", stderr);
-        return EXIT_USER;
+        status = EXIT_USER;
+    } else if (baseline) {
+        if (strcmp(baseline_device(baseline), device->name) != 0)
+            fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
+                    baseline_device(baseline));
+        struct utsname host = {0};
+        uname(&host);
+        if (strcmp(baseline_host(baseline), host.nodename) != 0)
+            fprintf(stderr, "glint bench: the baseline was measured on another host, \"%s\"\n",
+                    baseline_host(baseline));
+        status = comparisons_status(comparisons, set->count, options->baseline);
     }
-    if (!baseline) return EXIT_DONE;
-    if (strcmp(baseline_device(baseline), report.device->name) != 0)
-        fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
-                baseline_device(baseline));
-    bool any_common;
-    size_t slower = bench_slower_count(&report, &any_common);
-    if (!any_common) {
-        fprintf(stderr, "glint bench: %s has none of these rows\n", options->baseline);
-        return EXIT_USER;
-    }
-    if (slower == 0) return EXIT_DONE;
-    fprintf(stderr, "glint bench: %zu of %zu rows took more than %g times as long as in %s\n", slower,
-            set->count, options->tolerance, options->baseline);
-    return EXIT_CHECK;
+    free(comparisons);
+    return status;
 }
 
 static int bench_run(Bench *bench, const Baseline *baseline)
 {
     Compute *compute = &bench->open.compute;
+    if (bench->options.is_worker) return bench_work(&bench->set, compute);
     const VariantOptions *options = &bench->options.variants;
     bool with_double = (options->precisions >> PRECISION_DOUBLE & 1) && compute->device->fp64;
     Progress progress;
@@ -119,37 +169,65 @@ static int bench_run(Bench *bench, const Baseline *baseline)
         if (compute_ok(compute)) fputs("glint: interrupted\n", stderr);
         return EXIT_INTERRUPTED;
     }
-    return bench_tell(bench, baseline);
+    return bench_print(bench, baseline);
+}
+
+static int against_run(Bench *bench, int argument_count, char **arguments)
+{
+    const BenchOptions *options = &bench->options;
+    double seconds = options->variants.seconds;
+    AgainstOptions against = {
+        .other = options->against,
+        .tolerance = options->tolerance > 0 ? options->tolerance : against_tolerance,
+        .seconds = seconds > 0 ? seconds : against_seconds * (double)bench->set.count,
+        .as_json = options->as_json,
+        .argument_count = argument_count,
+        .arguments = arguments,
+    };
+    DeviceList devices;
+    const Device *device = device_find(&devices, options->variants.common.device);
+    int status = device ? bench_against(&against, &bench->set, device) : EXIT_USER;
+    device_list_close(&devices);
+    return status;
+}
+
+// With the scenes read.
+static int scenes_bench(Bench *bench, int argument_count, char **arguments)
+{
+    const BenchOptions *options = &bench->options;
+    if (options->against && !options->is_worker) return against_run(bench, argument_count, arguments);
+    MessageList messages = {0};
+    Baseline *baseline = options->baseline ? baseline_open(options->baseline, &messages) : NULL;
+    messages_print(&messages, NULL);
+    int status = EXIT_USER;
+    if ((!options->baseline || baseline) && device_open(&bench->open, options->variants.common.device)) {
+        status = bench_run(bench, baseline);
+        variant_set_close(&bench->set);
+        status = device_close(&bench->open, status);
+    }
+    baseline_close(baseline);
+    return status;
 }
 
 int command_bench(int argument_count, char **arguments)
 {
-    Bench bench = {
-        .options = {.variants = variant_options_default, .tolerance = 1.1},
-    };
+    Bench bench = {.options = {.variants = variant_options_default}};
+    const BenchOptions *options = &bench.options;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
         if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(&bench.options, option, optarg)) return EXIT_USER;
     }
     if (optind == argument_count) return option_usage_fault("bench", "no scene given");
+    if (options->against && options->baseline)
+        return option_usage_fault("bench", "--against and --compare exclude each other");
+    for (int i = optind; options->against && i < argument_count; i++)
+        if (strcmp(arguments[i], "-") == 0)
+            return option_usage_fault("bench", "--against reads each scene again and again: not from '-'");
 
-    size_t scene_count = (size_t)(argument_count - optind);
-    MessageList messages = {0};
-    Baseline *baseline = NULL;
-    if (bench.options.baseline) baseline = baseline_open(bench.options.baseline, &messages);
-    messages_print(&messages, NULL);
     int status = EXIT_USER;
-    if (!bench.options.baseline || baseline) {
-        const VariantOptions *options = &bench.options.variants;
-        if (variant_set_open(&bench.set, options, arguments + optind, scene_count) &&
-            device_open(&bench.open, options->common.device)) {
-            status = bench_run(&bench, baseline);
-            variant_set_close(&bench.set);
-            status = device_close(&bench.open, status);
-        } else {
-            variant_set_close(&bench.set);
-        }
-    }
-    baseline_close(baseline);
+    if (variant_set_open(&bench.set, &options->variants, arguments + optind,
+                         (size_t)(argument_count - optind)))
+        status = scenes_bench(&bench, argument_count, arguments);
+    variant_set_close(&bench.set);
     return status;
 }

@@ -1,31 +1,65 @@
 #include "host/cli/bench_report.h"
 
+#include "host/base/fault.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
+#include "host/measure/baseline.h"
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/utsname.h>
+#include <time.h>
+#include <unistd.h>
 
-static bool ratio_is_slower(Ratio ratio, double tolerance)
+void comparison_print(const RowComparison *comparison, FILE *stream)
 {
-    return ratio.found && (ratio.frame > tolerance || ratio.kernel > tolerance);
-}
-
-static Ratio row_ratio(const BenchReport *report, const BenchRow *row)
-{
-    return report->baseline ? baseline_ratio(report->baseline, row) : (Ratio){0};
-}
-
-size_t bench_slower_count(const BenchReport *report, bool *any_common)
-{
-    size_t count = 0;
-    *any_common = false;
-    for (size_t i = 0; i < report->count; i++) {
-        Ratio ratio = row_ratio(report, &report->rows[i]);
-        *any_common |= ratio.found;
-        count += ratio_is_slower(ratio, report->tolerance);
+    if (comparison->why_not) {
+        fprintf(stream, "    %s\n", comparison->why_not);
+        return;
     }
-    return count;
+    const Comparison *result = &comparison->result;
+    fprintf(stream, "    new over old frame time: %.3f", result->ratio);
+    if (isfinite(result->high)) fprintf(stream, " (%.3f to %.3f)", result->low, result->high);
+    switch (result->verdict) {
+    case VERDICT_UNDECIDED:
+        fputs(": too noisy to say\n", stream);
+        break;
+    case VERDICT_SAME:
+        fprintf(stream, ": same within %.1f %%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
+        break;
+    case VERDICT_SLOWER:
+        fprintf(stream, ": slower by at least %.1f %%\n", 100 * (result->low - 1));
+        break;
+    case VERDICT_FASTER:
+        fprintf(stream, ": faster by at least %.1f %%\n", 100 * (1 / result->high - 1));
+        break;
+    }
+}
+
+int comparisons_status(const RowComparison *comparisons, size_t count, const char *other)
+{
+    size_t counts[VERDICT_FASTER + 1] = {0}, compared = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (comparisons[i].why_not) continue;
+        compared++;
+        counts[comparisons[i].result.verdict]++;
+    }
+    if (compared == 0) {
+        fprintf(stderr, "glint bench: %s has none of these rows\n", other);
+        return EXIT_USER;
+    }
+    if (counts[VERDICT_SLOWER] > 0) {
+        fprintf(stderr, "glint bench: %zu of %zu rows are slower than %s\n", counts[VERDICT_SLOWER], compared,
+                other);
+        return EXIT_CHECK;
+    }
+    if (counts[VERDICT_UNDECIDED] > 0) {
+        fprintf(stderr, "glint bench: too noisy to compare %zu of %zu rows with %s\n",
+                counts[VERDICT_UNDECIDED], compared, other);
+        return EXIT_UNDECIDED;
+    }
+    return EXIT_DONE;
 }
 
 static void peak_print(const BenchReport *report, FILE *stream)
@@ -35,8 +69,8 @@ static void peak_print(const BenchReport *report, FILE *stream)
             report->device->driver);
     fprintf(stream, "measured peak: %.1f GFLOP/s in float", peak->flops_per_second[0] / 1e9);
     if (peak->flops_per_second[1] > 0) fprintf(stream, ", %.1f in double", peak->flops_per_second[1] / 1e9);
-    fprintf(stream, ", %.1f GB/s; by the %s clock\n", peak->bytes_per_second / 1e9,
-            peak->by_events ? "device's" : "host's");
+    fprintf(stream, ", %.1f GB/s; by the %s clock%s\n", peak->bytes_per_second / 1e9,
+            peak->by_events ? "device's" : "host's", peak->is_stable ? "" : "; not stable");
 }
 
 static void summary_print(FILE *stream, Summary seconds)
@@ -81,12 +115,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     fprintf(stream, " %6.1f  %016" PRIx64 "\n", 100 * bench_bandwidth_fraction(row, report->peak),
             row->kernel_hash);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
-    Ratio ratio = row_ratio(report, row);
-    if (ratio.found)
-        fprintf(stream, "    ratio to baseline: frame %.3f, kernel %.3f%s\n", ratio.frame, ratio.kernel,
-                ratio_is_slower(ratio, report->tolerance) ? "  SLOWER" : "");
-    else if (report->baseline)
-        fprintf(stream, "    not in the baseline\n");
+    if (report->comparisons) comparison_print(&report->comparisons[i], stream);
     if (report->reports && report->reports[i]) launches_print(stream, report->reports[i]);
 }
 
@@ -149,6 +178,7 @@ static void report_device_json(Json *json, const BenchReport *report)
                          peak->flops_per_second[1] > 0 ? NULL : "no row computes in double"});
     json_number(json, "gigabytes_per_s", peak->bytes_per_second / 1e9);
     json_text(json, "clock", peak->by_events ? "event" : "host");
+    json_boolean(json, "stable", peak->is_stable);
     json_end(json);
     json_end(json);
 }
@@ -167,23 +197,72 @@ static void launches_json(Json *json, const RenderReport *report)
     json_end(json);
 }
 
-static void ratio_json(Json *json, Ratio ratio, double tolerance)
+void comparison_json(Json *json, const RowComparison *comparison)
 {
-    json_begin_object(json, "ratio");
-    if (ratio.found) {
-        json_number(json, "frame", ratio.frame);
-        json_number(json, "kernel", ratio.kernel);
-        json_boolean(json, "slower", ratio_is_slower(ratio, tolerance));
+    json_begin_object(json, "comparison");
+    if (comparison->why_not) {
+        unavailable_json(json, comparison->why_not);
     } else {
-        unavailable_json(json, "the baseline has no such row");
+        json_text(json, "verdict", verdict_names[comparison->result.verdict]);
+        json_number(json, "ratio", comparison->result.ratio);
+        json_number(json, "low", comparison->result.low);
+        json_number(json, "high", comparison->result.high);
     }
     json_end(json);
 }
 
-static void results_json(Json *json, const BenchReport *report, const BenchRow *row)
+void samples_json(Json *json, const char *key, const Series *seconds)
 {
+    json_begin_array(json, key);
+    for (size_t i = 0; i < seconds->count; i++)
+        json_number(json, NULL, 1e3 * seconds->items[i]);
+    json_end(json);
+}
+
+void report_start_json(Json *json)
+{
+    json_integer(json, "schema", BENCH_SCHEMA);
+    json_text(json, "glint", glint_version());
+    time_t now = time(NULL);
+    struct tm utc;
+    char date[32] = "";
+    if (gmtime_r(&now, &utc)) strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    json_text(json, "date", date);
+    struct utsname host = {0};
+    uname(&host);
+    json_begin_object(json, "host");
+    json_text(json, "name", host.nodename);
+    json_text(json, "system", host.sysname);
+    json_text(json, "release", host.release);
+    json_text(json, "machine", host.machine);
+    json_integer(json, "processors", sysconf(_SC_NPROCESSORS_ONLN));
+    json_end(json);
+    json_begin_object(json, "build");
+    json_text(json, "commit", glint_commit());
+    json_text(json, "compiler", glint_compiler());
+    json_text(json, "flags", glint_flags());
+    json_end(json);
+}
+
+void key_json(Json *json, const BenchKey *key)
+{
+    json_text(json, "scene", key->scene);
+    hash_json(json, "scene_hash", key->scene_hash);
+    json_text(json, "precision", key->precision);
+    json_integer(json, "lanes", key->lanes);
+    json_text(json, "bvh", key->bvh);
+    size_json(json, key->width, key->height);
+    json_integer(json, "samples", key->samples);
+    json_integer(json, "bounces", key->bounces);
+}
+
+static void results_json(Json *json, const BenchReport *report, size_t i)
+{
+    const BenchRow *row = &report->rows[i];
     hash_json(json, "kernel_hash", row->kernel_hash);
     times_json(json, row);
+    samples_json(json, "frame_samples_ms", &row->times.frame);
+    samples_json(json, "kernel_samples_ms", bench_doubt(&row->times) ? &row->times.host : &row->times.event);
     json_begin_object(json, "build_ms");
     figure_json(json, "cold", 1e3, row->build_cold);
     figure_json(json, "cached", 1e3, row->build_cached);
@@ -192,28 +271,24 @@ static void results_json(Json *json, const BenchReport *report, const BenchRow *
     json_boolean(json, "traverses_bvh", row->traverses_bvh);
     figure_json(json, "peak_fraction", 1, bench_peak_fraction(row, report->peak));
     json_number(json, "bandwidth_fraction", bench_bandwidth_fraction(row, report->peak));
-    if (report->baseline) ratio_json(json, row_ratio(report, row), report->tolerance);
+    if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 
 void bench_print_json(const BenchReport *report)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 3);
-    json_text(json, "glint", glint_version());
+    report_start_json(json);
     report_device_json(json, report);
+    samples_json(json, "calibration_ms", report->calibration);
     json_begin_array(json, "runs");
     for (size_t i = 0; i < report->count; i++) {
         const BenchRow *row = &report->rows[i];
         json_begin_object(json, NULL);
-        json_text(json, "scene", row->key.scene);
-        json_text(json, "precision", row->key.precision);
-        json_integer(json, "lanes", row->key.lanes);
-        json_text(json, "bvh", row->key.bvh);
-        size_json(json, row->key.width, row->key.height);
+        key_json(json, &row->key);
         if (row->failure)
             unavailable_json(json, row->failure);
         else
-            results_json(json, report, row);
+            results_json(json, report, i);
         if (report->reports && report->reports[i]) launches_json(json, report->reports[i]);
         json_end(json);
     }

@@ -1,10 +1,17 @@
 // The report of glint bench: a table or JSON.
 #pragma once
 
-#include "host/measure/baseline.h"
+#include "host/base/json.h"
 #include "host/measure/bench.h"
+#include "host/measure/comparison.h"
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
+
+// A row's comparison, or why there is none.
+typedef struct {
+    Comparison result;
+    const char *why_not; // NULL: there is a result
+} RowComparison;
 
 typedef struct {
     const Device *device;
@@ -12,11 +19,20 @@ typedef struct {
     const BenchRow *rows;
     const RenderReport *const *reports; // of each row's last run, for --launches; or NULL
     size_t count;
-    const Baseline *baseline; // or NULL
-    double tolerance;
+    const Series *calibration;
+    const RowComparison *comparisons; // of each row with the baseline; or NULL
 } BenchReport;
 
 void bench_print_text(const BenchReport *report, FILE *stream);
 void bench_print_json(const BenchReport *report);
-// Number of rows slower than the baseline by more than the tolerance, and whether any row is in the baseline.
-size_t bench_slower_count(const BenchReport *report, bool *any_common);
+
+// Parts of a report, shared with glint bench --against.
+void report_start_json(Json *json); // schema, version, date, host and build
+void key_json(Json *json, const BenchKey *key);
+void samples_json(Json *json, const char *key, const Series *seconds); // in milliseconds
+void comparison_json(Json *json, const RowComparison *comparison);
+void comparison_print(const RowComparison *comparison, FILE *stream);
+
+// The exit status that the comparisons give, with a message unless nothing is slower; `other` is what was
+// compared with.
+int comparisons_status(const RowComparison *comparisons, size_t count, const char *other);

@@ -1,6 +1,7 @@
 #include "host/cli/variants.h"
 
 #include "host/base/clock.h"
+#include "host/base/hash.h"
 #include "host/base/memory.h"
 #include <math.h>
 #include <stdio.h>
@@ -10,7 +11,7 @@
 const VariantOptions variant_options_default = {
     .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO, .bounce_count = BOUNCES_DEFAULT};
 
-enum { WARM_UP_RUNS = 3, ENOUGH_RUNS = 20 };
+enum { WARM_UP_RUNS = 3, WARM_UP_SECONDS = 2, ENOUGH_RUNS = 20 };
 
 bool option_positive(const char *option, const char *value, double *result)
 {
@@ -75,13 +76,43 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
     }
 }
 
-static void variant_add(VariantSet *set, const char *path, size_t scene_index, const RenderSettings *settings)
+static void variant_add(VariantSet *set, const char *path, uint64_t scene_hash, size_t scene_index,
+                        const RenderSettings *settings)
 {
     set->variants[set->count] = (Variant){.scene = &set->scenes[scene_index], .settings = *settings};
     set->scene_indices[set->count] = scene_index;
-    set->rows[set->count++] =
-        (BenchRow){.key = {path, precision_names[settings->precision], bvh_choice_names[settings->bvh],
-                           settings->lanes, settings->width, settings->height}};
+    set->rows[set->count++] = (BenchRow){.key = {
+                                             .scene = path,
+                                             .precision = precision_names[settings->precision],
+                                             .bvh = bvh_choice_names[settings->bvh],
+                                             .lanes = settings->lanes,
+                                             .width = settings->width,
+                                             .height = settings->height,
+                                             .samples = settings->sample_count,
+                                             .bounces = settings->bounce_count,
+                                             .scene_hash = scene_hash,
+                                         }};
+}
+
+static uint64_t file_hash(uint64_t hash, const char *path)
+{
+    Text text = {0};
+    MessageList ignored = {0};
+    if (path && text_read_file(&text, path, &ignored)) hash = hash_bytes(hash, text.items, text.count);
+    message_list_free(&ignored);
+    text_free(&text);
+    return hash;
+}
+
+// Of the contents of the scene's file, meshes and textures, whatever their names.
+static uint64_t scene_files_hash(const Scene *scene, const char *path)
+{
+    uint64_t hash = file_hash(HASH_START, path);
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        hash = file_hash(hash, scene->meshes.items[i].path);
+    for (size_t i = 0; i < scene->textures.count; i++)
+        hash = file_hash(hash, scene->textures.items[i].path);
+    return hash;
 }
 
 static void scene_add_variants(VariantSet *set, const VariantOptions *options, const char *path,
@@ -94,6 +125,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
     settings.shift_to_eye = true;
     settings.stop = progress_interrupted;
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
+    const uint64_t hash = scene_files_hash(&set->scenes[scene_index], path);
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
         for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
             for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
@@ -105,7 +137,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
                     settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
                     settings.bvh = (BvhChoice)bvh;
                     settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
-                    variant_add(set, path, scene_index, &settings);
+                    variant_add(set, path, hash, scene_index, &settings);
                 }
 }
 
@@ -134,8 +166,7 @@ static bool all_converged(const VariantSet *set)
     return true;
 }
 
-// Runs every variant once. False if the user interrupted or the device failed.
-static bool round_run(VariantSet *set, bool warm_up)
+bool variant_set_round(VariantSet *set, bool warm_up)
 {
     for (size_t i = 0; i < set->count; i++)
         if (set->variants[i].renderer &&
@@ -144,29 +175,44 @@ static bool round_run(VariantSet *set, bool warm_up)
     return true;
 }
 
-bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool timing_builds,
-                         Progress *progress)
+bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds)
 {
     for (size_t i = 0; i < set->count; i++) {
         if (progress_interrupted()) return false;
         variant_open(compute, &set->variants[i], &set->rows[i], timing_builds);
         if (!compute_ok(compute)) return false;
     }
-    double bound = options->seconds > 0 ? options->seconds : 5 * (double)set->count;
     double start = clock_seconds();
-    for (int i = 0; i < WARM_UP_RUNS && (i == 0 || clock_seconds() - start < bound / 4); i++)
-        if (!round_run(set, true)) return false;
-    start = clock_seconds();
-    double spent = 0;
-    while (spent < bound && !all_converged(set)) {
-        if (!round_run(set, false)) return false;
+    for (int i = 0; i < WARM_UP_RUNS && (i == 0 || clock_seconds() - start < WARM_UP_SECONDS); i++)
+        if (!variant_set_round(set, true)) return false;
+    return true;
+}
+
+// Until the times converge, but a benchmark for a fifth of its time at least, to see other work come and go.
+static bool rounds_run(VariantSet *set, double seconds, Calibration *calibration, Progress *progress)
+{
+    double start = clock_seconds(), spent = 0;
+    while (spent < seconds && ((calibration && spent < seconds / 5) || !all_converged(set))) {
+        if (calibration) series_add(&set->calibration, calibration_seconds(calibration));
+        if (!variant_set_round(set, false)) return false;
         spent = clock_seconds() - start;
-        progress_show(progress, fmin(spent / bound, 1));
+        progress_show(progress, fmin(spent / seconds, 1));
     }
-    for (size_t i = 0; i < set->count; i++)
+    return true;
+}
+
+bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
+                         Progress *progress)
+{
+    if (!variant_set_start(set, compute, is_benchmark)) return false;
+    double seconds = options->seconds > 0 ? options->seconds : 5 * (double)set->count;
+    Calibration *calibration = is_benchmark ? calibration_open(compute) : NULL;
+    bool whole = rounds_run(set, seconds, calibration, progress);
+    calibration_close(calibration);
+    for (size_t i = 0; i < set->count && whole; i++)
         if (set->variants[i].renderer)
             set->rows[i].kernel_hash = renderer_report(set->variants[i].renderer)->kernel_hash;
-    return true;
+    return whole;
 }
 
 bool variant_set_any_measured(const VariantSet *set)
@@ -188,5 +234,6 @@ void variant_set_close(VariantSet *set)
     free(set->variants);
     free(set->rows);
     free(set->scene_indices);
+    series_free(&set->calibration);
     *set = (VariantSet){0};
 }

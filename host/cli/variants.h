@@ -61,14 +61,18 @@ typedef struct {
     BenchRow *rows;
     size_t *scene_indices;
     size_t count;
+    Series calibration; // seconds, before each round of a benchmark
 } VariantSet;
 
 // Reads the scenes. False with a message if one cannot be read; the set must still be closed.
 bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
-// Opens each variant, then measures them interleaved (A B C A B C …), so that drift affects all alike, until
-// times converge or options->seconds pass. `timing_builds`: also time the builds. False if the user
-// interrupted.
-bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool timing_builds,
+// Opens each variant and warms it up. False if the user interrupted or the device failed.
+bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds);
+// Runs every variant once. False as above.
+bool variant_set_round(VariantSet *set, bool warm_up);
+// Measures them interleaved (A B C A B C …), so that drift affects all alike, until times converge or
+// options->seconds pass. `is_benchmark`: also times the builds, and calibrates each round. False as above.
+bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
 bool variant_set_any_measured(const VariantSet *set);
 void variant_set_close(VariantSet *set);

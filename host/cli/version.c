@@ -4,3 +4,22 @@ const char *glint_version(void)
 {
     return GLINT_VERSION;
 }
+
+const char *glint_commit(void)
+{
+    return GLINT_COMMIT;
+}
+
+const char *glint_compiler(void)
+{
+#ifdef __clang__
+    return __VERSION__;
+#else
+    return "gcc " __VERSION__;
+#endif
+}
+
+const char *glint_flags(void)
+{
+    return GLINT_FLAGS;
+}

@@ -3,20 +3,25 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include <inttypes.h>
 #include <libfyaml.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct {
-    char *scene, *precision, *bvh;
-    uint32_t lanes, width, height;
-    double frame_ms, kernel_ms; // medians
+    char *scene_hash, *precision, *bvh;
+    uint32_t lanes, width, height, samples, bounces;
+    Series frame;
 } BaselineRow;
+
+enum { HASH_DIGITS = 16 };
 
 struct Baseline {
     BaselineRow *items;
     size_t count, capacity;
-    char *device;
+    char *device, *host;
+    Series calibration;
 };
 
 static struct fy_node *member(struct fy_node *node, const char *key)
@@ -56,19 +61,37 @@ static struct fy_node *element(struct fy_node *node, int index)
     return node && fy_node_is_sequence(node) ? fy_node_sequence_get_by_index(node, index) : NULL;
 }
 
+// Milliseconds become seconds. Empty where an element is no time.
+static Series times_of(struct fy_node *node)
+{
+    Series times = {0};
+    void *place = NULL;
+    if (!node || !fy_node_is_sequence(node)) return times;
+    for (struct fy_node *item; (item = fy_node_sequence_iterate(node, &place));) {
+        double seconds = 1e-3 * number_of(item);
+        if (!(seconds > 0 && seconds < HUGE_VAL)) {
+            series_free(&times);
+            return times;
+        }
+        series_add(&times, seconds);
+    }
+    return times;
+}
+
 static void rows_read(Baseline *baseline, struct fy_node *runs)
 {
     void *place = NULL;
     for (struct fy_node *run; (run = fy_node_sequence_iterate(runs, &place));) {
         BaselineRow row = {
-            .scene = text_of(member(run, "scene")),
+            .scene_hash = text_of(member(run, "scene_hash")),
             .precision = text_of(member(run, "precision")),
             .bvh = text_of(member(run, "bvh")),
             .lanes = count_of(member(run, "lanes")),
             .width = count_of(element(member(run, "size"), 0)),
             .height = count_of(element(member(run, "size"), 1)),
-            .frame_ms = number_of(member(member(run, "frame_ms"), "median")),
-            .kernel_ms = number_of(member(member(run, "kernel_ms"), "median")),
+            .samples = count_of(member(run, "samples")),
+            .bounces = count_of(member(run, "bounces")),
+            .frame = times_of(member(run, "frame_samples_ms")),
         };
         array_push(*baseline, row);
     }
@@ -78,12 +101,15 @@ static Baseline *baseline_read(struct fy_document *document, const char *path, M
 {
     struct fy_node *root = document ? fy_document_root(document) : NULL;
     struct fy_node *runs = member(root, "runs");
-    if (!runs || !fy_node_is_sequence(runs) || number_of(member(root, "schema")) != 3) {
-        message_add(messages, MESSAGE_ERROR, "'%s' is no report of glint bench --json with schema 3", path);
+    if (!runs || !fy_node_is_sequence(runs) || number_of(member(root, "schema")) != BENCH_SCHEMA) {
+        message_add(messages, MESSAGE_ERROR, "'%s' is no report of glint bench --json with schema %d", path,
+                    BENCH_SCHEMA);
         return NULL;
     }
     Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);
     baseline->device = text_of(member(member(root, "device"), "name"));
+    baseline->host = text_of(member(member(root, "host"), "name"));
+    baseline->calibration = times_of(member(root, "calibration_ms"));
     rows_read(baseline, runs);
     return baseline;
 }
@@ -117,12 +143,15 @@ void baseline_close(Baseline *baseline)
 {
     if (!baseline) return;
     for (size_t i = 0; i < baseline->count; i++) {
-        free(baseline->items[i].scene);
+        free(baseline->items[i].scene_hash);
         free(baseline->items[i].precision);
         free(baseline->items[i].bvh);
+        series_free(&baseline->items[i].frame);
     }
     free(baseline->items);
     free(baseline->device);
+    free(baseline->host);
+    series_free(&baseline->calibration);
     free(baseline);
 }
 
@@ -131,20 +160,24 @@ const char *baseline_device(const Baseline *baseline)
     return baseline->device;
 }
 
-static bool row_matches(const BaselineRow *row, const BenchKey *key)
+const char *baseline_host(const Baseline *baseline)
 {
-    return strcmp(row->scene, key->scene) == 0 && strcmp(row->precision, key->precision) == 0 &&
-           strcmp(row->bvh, key->bvh) == 0 && row->lanes == key->lanes && row->width == key->width &&
-           row->height == key->height;
+    return baseline->host;
 }
 
-Ratio baseline_ratio(const Baseline *baseline, const BenchRow *row)
+bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *times)
 {
-    for (size_t i = 0; i < baseline->count && !row->failure; i++) {
-        const BaselineRow *old = &baseline->items[i];
-        if (!row_matches(old, &row->key) || !(old->frame_ms > 0) || !(old->kernel_ms > 0)) continue;
-        return (Ratio){true, 1e3 * series_summarize(&row->times.frame).median / old->frame_ms,
-                       1e3 * bench_kernel(&row->times).median / old->kernel_ms};
+    char hash[HASH_DIGITS + 1];
+    snprintf(hash, sizeof hash, "%016" PRIx64, key->scene_hash);
+    for (size_t i = 0; i < baseline->count; i++) {
+        const BaselineRow *row = &baseline->items[i];
+        if (strcmp(row->scene_hash, hash) != 0 || strcmp(row->precision, key->precision) != 0 ||
+            strcmp(row->bvh, key->bvh) != 0 || row->lanes != key->lanes || row->width != key->width ||
+            row->height != key->height || row->samples != key->samples || row->bounces != key->bounces ||
+            row->frame.count == 0)
+            continue;
+        *times = (ReportTimes){&row->frame, &baseline->calibration};
+        return true;
     }
-    return (Ratio){0};
+    return false;
 }

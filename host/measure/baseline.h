@@ -3,18 +3,18 @@
 
 #include "host/base/message.h"
 #include "host/measure/bench.h"
+#include "host/measure/comparison.h"
 
 typedef struct Baseline Baseline;
+
+enum { BENCH_SCHEMA = 4 }; // of the reports
 
 // Reads a file that glint bench --json wrote; NULL with a message where it is none.
 Baseline *baseline_open(const char *path, MessageList *messages);
 void baseline_close(Baseline *baseline);
-const char *baseline_device(const Baseline *baseline); // its name, or "" where the report has none
+// Names of the device and the host, or "" where the report has none.
+const char *baseline_device(const Baseline *baseline);
+const char *baseline_host(const Baseline *baseline);
 
-typedef struct {
-    bool found; // the baseline has this row, with times
-    // of medians, new over old: above 1 is slower
-    double frame, kernel;
-} Ratio;
-
-Ratio baseline_ratio(const Baseline *baseline, const BenchRow *row);
+// The times of the row with this key, but for the scene's path; false: the baseline has none.
+bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *times);

@@ -35,10 +35,12 @@ Summary bench_kernel(const BenchTimes *times);
 // Whether the times have converged: at least `enough` runs, and a small interquartile range.
 bool bench_converged(const BenchTimes *times, size_t enough);
 
-// Identifies a row.
+// Identifies a row. The scene is its path, and the hash of all files it was read from, by which rows of
+// reports match.
 typedef struct {
     const char *scene, *precision, *bvh;
-    uint32_t lanes, width, height;
+    uint32_t lanes, width, height, samples, bounces;
+    uint64_t scene_hash;
 } BenchKey;
 
 enum { BENCH_CAMERA, BENCH_CAMERA_HITS, BENCH_REFLECTED, BENCH_REFRACTED, BENCH_SHADOW, BENCH_RAY_KINDS };

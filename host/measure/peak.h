@@ -8,8 +8,27 @@ typedef struct {
     double flops_per_second[2]; // of float, of double; 0: not measured; an fma counts as 2
     double bytes_per_second;    // read and written
     bool by_events;             // whose clock: the device's, else the host's
+    bool is_stable;             // every rate was reached again and again
 } Peak;
 
-// Takes up to about 0.3 s each, after the build of the kernels. `with_double`: also of double, which the
-// device must have.
+// Takes some 0.3 s for each rate, and up to 1 s until it is stable, after the build of the kernels.
+// `with_double`: also of double, which the device must have.
 void peak_measure(Peak *peak, Compute *compute, bool with_double);
+
+// The best rates of the windows of a measurement; zeroed: none yet.
+typedef struct {
+    double best[3]; // descending
+    size_t count;
+} PeakWindows;
+
+void peak_windows_add(PeakWindows *windows, double rate);
+// Whether the three best rates agree within 3 %.
+bool peak_windows_stable(const PeakWindows *windows);
+
+// A short launch of the arithmetic that the peak is measured by; its time follows the machine's speed.
+typedef struct Calibration Calibration;
+
+// Closed by calibration_close, also where the device failed.
+Calibration *calibration_open(Compute *compute);
+double calibration_seconds(Calibration *calibration); // of one launch, by the host's clock
+void calibration_close(Calibration *calibration);     // accepts NULL

@@ -25,13 +25,22 @@ static double sorted_quantile(const double *sorted, size_t count, double fractio
     return sorted[below] + (place - (double)below) * (sorted[below + 1] - sorted[below]);
 }
 
+Series series_sorted(const Series *series)
+{
+    Series copy = {.count = series->count, .capacity = series->count};
+    if (series->count == 0) return copy;
+    copy.items = memory_allocate(series->count, sizeof *copy.items);
+    memcpy(copy.items, series->items, series->count * sizeof *copy.items);
+    qsort(copy.items, copy.count, sizeof *copy.items, number_compare);
+    return copy;
+}
+
 Summary series_summarize(const Series *series)
 {
     size_t count = series->count;
     if (count == 0) return (Summary){0};
-    double *sorted = memory_allocate(count, sizeof *sorted);
-    memcpy(sorted, series->items, count * sizeof *sorted);
-    qsort(sorted, count, sizeof *sorted, number_compare);
+    Series copy = series_sorted(series);
+    const double *sorted = copy.items;
     Summary summary = {
         .min = sorted[0],
         .median = sorted_quantile(sorted, count, 0.5),
@@ -39,7 +48,7 @@ Summary series_summarize(const Series *series)
         .quartile_range = sorted_quantile(sorted, count, 0.75) - sorted_quantile(sorted, count, 0.25),
         .count = count,
     };
-    free(sorted);
+    series_free(&copy);
     return summary;
 }
 

@@ -15,5 +15,6 @@ typedef struct {
 } Summary;
 
 void series_add(Series *series, double value);
+Series series_sorted(const Series *series); // a copy, ascending
 Summary series_summarize(const Series *series);
 void series_free(Series *series); // and zeroes

@@ -9,8 +9,8 @@ _glint_options() {
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
     diff) echo "--heatmap --max-pixels --json -h --help" ;;
-    bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --tolerance --device" \
-        "--lenient --max-pixels -h --help" ;;
+    bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --against --worker" \
+        "--tolerance --samples --bounces --device --lenient --max-pixels -h --help" ;;
     accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
         "--perturb --device --lenient --max-pixels -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --lean --json -h --help" ;;

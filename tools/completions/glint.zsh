@@ -113,7 +113,11 @@ _glint_bench() {
         '--launches[list the launches of the last runs]' \
         '--json[print JSON]' \
         '--compare[compare with an earlier report]:report:_files -g "*.json"' \
-        '--tolerance[new time over old that passes]:ratio:' \
+        '--against[compare with another build]:program:_files' \
+        '--worker[answer the option --against of another glint]' \
+        '--tolerance[ratio of times that are the same]:ratio:' \
+        '--samples[per pixel, a row each]:list:' \
+        '--bounces[reflections and refractions at most]:number:' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '--max-pixels[largest image that is read]:number:' \

@@ -1,0 +1,338 @@
+#include "host/cli/bench_against.h"
+
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/cli/bench_report.h"
+#include "host/cli/report_json.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <math.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+// A worker first prints this line with its number of rows; then, for each line it reads, a line with the
+// seconds of a frame of every row, or 0 of one that the device cannot do.
+static const char greeting[] = "glint bench worker 1: %zu rows\n";
+
+int bench_work(VariantSet *set, Compute *compute)
+{
+    if (!variant_set_start(set, compute, false)) return EXIT_INTERRUPTED;
+    printf(greeting, set->count);
+    fflush(stdout);
+    for (int byte; (byte = getchar()) != EOF;) {
+        if (byte != '\n') continue;
+        if (!variant_set_round(set, false)) return EXIT_INTERRUPTED;
+        for (size_t i = 0; i < set->count; i++) {
+            const Series *frame = &set->rows[i].times.frame;
+            printf("%s%.9g", i > 0 ? " " : "", frame->count > 0 ? frame->items[frame->count - 1] : 0.0);
+        }
+        putchar('\n');
+        fflush(stdout);
+    }
+    return EXIT_DONE;
+}
+
+typedef struct {
+    const char *program;
+    pid_t process;
+    FILE *requests, *replies, *errors;
+} Worker;
+
+typedef struct {
+    const AgainstOptions *options;
+    VariantSet *set;
+    const char *programs[2]; // this one, the other
+    Series *ratios;          // of each row: logarithms, one for each pair
+    Series *frames[2];       // of each row: seconds of all runs, this program's and the other's
+    RowComparison *comparisons;
+} Against;
+
+static const char not_available[] = "not available on this device";
+
+// Ends the worker. Returns its exit status; where that is not 0, its messages are printed.
+static int worker_close(Worker *worker)
+{
+    if (worker->requests) fclose(worker->requests);
+    if (worker->replies) fclose(worker->replies);
+    int status = EXIT_MACHINE, ended = 0;
+    if (worker->process > 0) {
+        while (waitpid(worker->process, &ended, 0) < 0 && errno == EINTR)
+            continue;
+        status = WIFEXITED(ended) ? WEXITSTATUS(ended) : EXIT_MACHINE;
+        if (WIFSIGNALED(ended))
+            fprintf(stderr, "glint bench: '%s' was ended by signal %d\n", worker->program, WTERMSIG(ended));
+    }
+    if (worker->errors) {
+        char line[512];
+        rewind(worker->errors);
+        while (status != EXIT_DONE && fgets(line, sizeof line, worker->errors))
+            fputs(line, stderr);
+        fclose(worker->errors);
+    }
+    *worker = (Worker){0};
+    return status;
+}
+
+static bool worker_spawn(Worker *worker, const AgainstOptions *options, const int *to, const int *from)
+{
+    // --worker stands first, since an argument "--" ends the options
+    char **arguments = memory_allocate_zeroed((size_t)options->argument_count + 3, sizeof *arguments);
+    char bench[] = "bench", work[] = "--worker";
+    arguments[0] = memory_copy_text(worker->program);
+    arguments[1] = bench;
+    arguments[2] = work;
+    for (int i = 1; i < options->argument_count; i++)
+        arguments[i + 2] = options->arguments[i];
+    posix_spawn_file_actions_t actions;
+    int error = posix_spawn_file_actions_init(&actions);
+    if (!error) {
+        posix_spawn_file_actions_adddup2(&actions, to[0], STDIN_FILENO);
+        posix_spawn_file_actions_adddup2(&actions, from[1], STDOUT_FILENO);
+        posix_spawn_file_actions_adddup2(&actions, fileno(worker->errors), STDERR_FILENO);
+        error = posix_spawnp(&worker->process, worker->program, &actions, NULL, arguments, environ);
+        posix_spawn_file_actions_destroy(&actions);
+    }
+    free(arguments[0]);
+    free(arguments);
+    if (error) {
+        worker->process = 0;
+        fprintf(stderr, "glint bench: cannot run '%s': %s\n", worker->program, strerror(error));
+    }
+    return !error;
+}
+
+static bool worker_greets(Worker *worker, size_t row_count)
+{
+    char line[80], expected[80];
+    snprintf(expected, sizeof expected, greeting, row_count);
+    if (fgets(line, sizeof line, worker->replies) && strcmp(line, expected) == 0) return true;
+    if (!progress_interrupted())
+        fprintf(stderr, "glint bench: '%s' does not answer as a glint with bench --against does\n",
+                worker->program);
+    return false;
+}
+
+// Starts a worker and waits until it is warm.
+static bool worker_open(Worker *worker, const char *program, const Against *against)
+{
+    *worker = (Worker){.program = program, .errors = tmpfile()};
+    int to[2] = {-1, -1}, from[2] = {-1, -1};
+    bool ready = worker->errors && pipe2(to, O_CLOEXEC) == 0 && pipe2(from, O_CLOEXEC) == 0;
+    if (!ready) fprintf(stderr, "glint bench: cannot run '%s': %s\n", program, strerror(errno));
+    bool spawned = ready && worker_spawn(worker, against->options, to, from);
+    if (to[0] >= 0) close(to[0]);
+    if (from[1] >= 0) close(from[1]);
+    if (to[1] >= 0) worker->requests = fdopen(to[1], "w");
+    if (from[0] >= 0) worker->replies = fdopen(from[0], "r");
+    return spawned && worker->requests && worker->replies && worker_greets(worker, against->set->count);
+}
+
+// Reads one line of times.
+static bool reply_read(FILE *replies, double *seconds, size_t row_count)
+{
+    char *line = NULL;
+    size_t capacity = 0;
+    bool whole = getline(&line, &capacity, replies) > 0;
+    char *at = line;
+    for (size_t i = 0; i < row_count && whole; i++) {
+        char *end;
+        seconds[i] = strtod(at, &end);
+        whole = end != at && seconds[i] >= 0 && isfinite(seconds[i]);
+        at = end;
+    }
+    free(line);
+    return whole;
+}
+
+// Runs every row once; `seconds` receives the frames' times.
+static bool worker_run(Worker *worker, double *seconds, size_t row_count)
+{
+    fputc('\n', worker->requests);
+    fflush(worker->requests);
+    bool whole = reply_read(worker->replies, seconds, row_count);
+    if (!whole && !progress_interrupted())
+        fprintf(stderr, "glint bench: '%s' ended before its time\n", worker->program);
+    return whole;
+}
+
+// Whether the other program comes first at the n-th turn: the Thue-Morse sequence, which cancels drifts.
+static bool other_is_first(size_t n)
+{
+    return __builtin_popcountll(n) % 2 == 1;
+}
+
+enum { PAIR_ROUNDS_MIN = 5 };
+static const double pair_seconds = 0.25; // of each row
+
+// Alternates rounds of the two warm workers; adds each row's ratio.
+static bool pair_measure(Against *against, Worker *workers, size_t pair)
+{
+    const size_t row_count = against->set->count;
+    double *seconds = memory_allocate(row_count, sizeof *seconds);
+    Series *times = memory_allocate_zeroed(2 * row_count, sizeof *times);
+    bool whole = true;
+    double start = clock_seconds();
+    for (size_t round = 0;
+         whole && (round < PAIR_ROUNDS_MIN || clock_seconds() - start < pair_seconds * (double)row_count);
+         round++)
+        for (size_t turn = 0; turn < 2 && whole; turn++) {
+            size_t which = (turn + other_is_first(pair + round)) % 2;
+            whole = worker_run(&workers[which], seconds, row_count) && !progress_interrupted();
+            for (size_t i = 0; i < row_count && whole; i++) {
+                if (seconds[i] == 0) against->comparisons[i].why_not = not_available;
+                series_add(&times[2 * i + which], seconds[i]);
+                series_add(&against->frames[which][i], seconds[i]);
+            }
+        }
+    for (size_t i = 0; i < 2 * row_count; i++) {
+        if (i % 2 == 0 && whole && !against->comparisons[i / 2].why_not)
+            series_add(&against->ratios[i / 2], comparison_log_ratio(&times[i], &times[i + 1]));
+    }
+    for (size_t i = 0; i < 2 * row_count; i++)
+        series_free(&times[i]);
+    free(times);
+    free(seconds);
+    return whole;
+}
+
+// Two fresh processes. Returns the exit status.
+static int pair_run(Against *against, size_t pair)
+{
+    Worker workers[2] = {{0}};
+    bool whole = true;
+    for (size_t turn = 0; turn < 2 && whole; turn++) {
+        size_t which = (turn + other_is_first(pair)) % 2;
+        whole = worker_open(&workers[which], against->programs[which], against);
+    }
+    whole = whole && pair_measure(against, workers, pair);
+    int status = whole ? EXIT_DONE : EXIT_USER;
+    for (size_t which = 0; which < 2; which++) {
+        bool was_started = workers[which].process > 0;
+        int ended = worker_close(&workers[which]);
+        if (was_started && ended == EXIT_MACHINE) status = EXIT_MACHINE;
+    }
+    return progress_interrupted() ? EXIT_INTERRUPTED : status;
+}
+
+static bool rows_judge(Against *against, size_t look)
+{
+    bool decided = true;
+    for (size_t i = 0; i < against->set->count; i++) {
+        RowComparison *comparison = &against->comparisons[i];
+        if (comparison->why_not) continue;
+        comparison->result =
+            comparison_of_pairs(&against->ratios[i], look, against->set->count, against->options->tolerance);
+        decided = decided && comparison->result.verdict != VERDICT_UNDECIDED;
+    }
+    return decided;
+}
+
+// Adds pairs until every row is decided or the time is over, which is a look, too.
+static int pairs_run(Against *against, Progress *progress)
+{
+    const size_t row_count = against->set->count;
+    const double start = clock_seconds();
+    double spent = 0;
+    for (size_t look = 0, pair = 0;; look++) {
+        while (pair < comparison_pairs_at_look(look, row_count) &&
+               (pair == 0 || spent < against->options->seconds)) {
+            int status = pair_run(against, pair++);
+            if (status != EXIT_DONE) return status;
+            spent = clock_seconds() - start;
+            progress_show(progress, fmin(spent / against->options->seconds, 1));
+        }
+        if (rows_judge(against, look) || spent >= against->options->seconds) return EXIT_DONE;
+    }
+}
+
+static void against_print_json(const Against *against, const Device *device)
+{
+    Json *json = json_open();
+    report_start_json(json);
+    json_begin_object(json, "device");
+    device_json(json, device);
+    json_end(json);
+    json_text(json, "against", against->options->other);
+    json_number(json, "confidence", comparison_confidence);
+    json_begin_array(json, "runs");
+    for (size_t i = 0; i < against->set->count; i++) {
+        json_begin_object(json, NULL);
+        key_json(json, &against->set->rows[i].key);
+        comparison_json(json, &against->comparisons[i]);
+        if (!against->comparisons[i].why_not) {
+            summary_json(json, "frame_ms", series_summarize(&against->frames[0][i]));
+            summary_json(json, "against_frame_ms", series_summarize(&against->frames[1][i]));
+            samples_json(json, "frame_samples_ms", &against->frames[0][i]);
+            samples_json(json, "against_frame_samples_ms", &against->frames[1][i]);
+            json_begin_array(json, "pair_ratios");
+            for (size_t pair = 0; pair < against->ratios[i].count; pair++)
+                json_number(json, NULL, exp(against->ratios[i].items[pair]));
+            json_end(json);
+        }
+        json_end(json);
+    }
+    json_print(json, stdout);
+}
+
+static void against_print_text(const Against *against, const Device *device)
+{
+    printf("%s, %s %s\nagainst %s; intervals of %g %% confidence\n\n", device->name, device->platform_name,
+           device->driver, against->options->other, 100 * comparison_confidence);
+    for (size_t i = 0; i < against->set->count; i++) {
+        const BenchKey *key = &against->set->rows[i].key;
+        printf("%s, %ux%u, %s, %u lanes, BVH %s, %u samples, %u bounces: %zu pairs\n", key->scene, key->width,
+               key->height, key->precision, key->lanes, key->bvh, key->samples, key->bounces,
+               against->ratios[i].count);
+        comparison_print(&against->comparisons[i], stdout);
+    }
+}
+
+int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device)
+{
+    char program[PATH_MAX] = "";
+    if (readlink("/proc/self/exe", program, sizeof program - 1) < 0) {
+        fputs("glint bench: --against needs /proc\n", stderr);
+        return EXIT_MACHINE;
+    }
+    Against against = {
+        .options = options,
+        .set = set,
+        .programs = {program, options->other},
+        .ratios = memory_allocate_zeroed(set->count, sizeof *against.ratios),
+        .frames = {memory_allocate_zeroed(set->count, sizeof *against.ratios),
+                   memory_allocate_zeroed(set->count, sizeof *against.ratios)},
+        .comparisons = memory_allocate_zeroed(set->count, sizeof *against.comparisons),
+    };
+    for (size_t i = 0; i < set->count; i++)
+        if (set->rows[i].key.lanes == 0)
+            set->rows[i].key.lanes =
+                device_lanes(device, set->variants[i].settings.precision == PRECISION_DOUBLE);
+    Progress progress;
+    progress_open(&progress, options->as_json);
+    int status = pairs_run(&against, &progress);
+    progress_close(&progress);
+    if (status == EXIT_DONE) {
+        if (options->as_json)
+            against_print_json(&against, device);
+        else
+            against_print_text(&against, device);
+        status = comparisons_status(against.comparisons, set->count, options->other);
+    }
+    if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);
+    for (size_t i = 0; i < set->count; i++) {
+        series_free(&against.ratios[i]);
+        series_free(&against.frames[0][i]);
+        series_free(&against.frames[1][i]);
+    }
+    free(against.ratios);
+    free(against.frames[0]);
+    free(against.frames[1]);
+    free(against.comparisons);
+    return status;
+}

@@ -1,0 +1,21 @@
+// glint bench --against: two builds, measured interleaved by pairs of processes.
+#pragma once
+
+#include "host/cli/options.h"
+#include "host/cli/variants.h"
+
+typedef struct {
+    const char *other; // the program to compare with
+    double tolerance, seconds;
+    bool as_json;
+    int argument_count; // of glint bench, for the workers
+    char **arguments;
+} AgainstOptions;
+
+// Compares each variant's frame time with the other program's, and prints the report. Returns the exit
+// status. `device` is what both will choose.
+int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device);
+
+// What a worker does: for each line of standard input runs every variant once and prints the seconds of its
+// frames. Returns the exit status.
+int bench_work(VariantSet *set, Compute *compute);

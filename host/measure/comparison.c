@@ -1,0 +1,134 @@
+#include "host/measure/comparison.h"
+
+#include <math.h>
+
+const char *const verdict_names[] = {
+    [VERDICT_UNDECIDED] = "undecided",
+    [VERDICT_SAME] = "same",
+    [VERDICT_SLOWER] = "slower",
+    [VERDICT_FASTER] = "faster",
+};
+
+const double comparison_confidence = 0.99;
+
+// How much the times of two processes of one build may differ, as a ratio.
+static const double process_allowance = 1.03;
+
+// Other work may slow a frame by the square of what it slows the calibration, or not at all.
+static const double exponent_max = 2;
+
+// Consecutive runs are alike; the medians of this many parts of a report are less so.
+enum { REPORT_BLOCKS = 20 };
+
+typedef struct {
+    double low, high;
+} Interval;
+
+// Twice the probability that at most `most` of `count` fair coins show heads.
+static double two_sided_tail(size_t count, size_t most)
+{
+    double term = exp2(-(double)count), sum = term;
+    for (size_t i = 0; i < most; i++) {
+        term *= (double)(count - i) / (double)(i + 1);
+        sum += term;
+    }
+    return 2 * sum;
+}
+
+// Misses the median with a probability of at most `error`.
+static Interval median_interval(const Series *values, double error)
+{
+    const size_t count = values->count;
+    if (count == 0 || two_sided_tail(count, 0) > error) return (Interval){-INFINITY, INFINITY};
+    size_t trimmed = 0;
+    while (two_sided_tail(count, trimmed + 1) <= error)
+        trimmed++;
+    Series sorted = series_sorted(values);
+    Interval interval = {sorted.items[trimmed], sorted.items[count - 1 - trimmed]};
+    series_free(&sorted);
+    return interval;
+}
+
+static Comparison comparison_judge(double log_ratio, Interval interval, double tolerance)
+{
+    Comparison comparison = {.ratio = exp(log_ratio), .low = exp(interval.low), .high = exp(interval.high)};
+    if (comparison.low >= 1 / tolerance && comparison.high <= tolerance)
+        comparison.verdict = VERDICT_SAME;
+    else if (comparison.low > 1)
+        comparison.verdict = VERDICT_SLOWER;
+    else if (comparison.high < 1)
+        comparison.verdict = VERDICT_FASTER;
+    return comparison;
+}
+
+static double row_error(size_t row_count)
+{
+    return (1 - comparison_confidence) / (double)row_count;
+}
+
+static double look_error(size_t look, size_t row_count)
+{
+    return ldexp(row_error(row_count), -1 - (int)look);
+}
+
+size_t comparison_pairs_at_look(size_t look, size_t row_count)
+{
+    size_t first = 1;
+    while (two_sided_tail(first, 0) > look_error(0, row_count))
+        first++;
+    return first << look;
+}
+
+Comparison comparison_of_pairs(const Series *log_ratios, size_t look, size_t row_count, double tolerance)
+{
+    return comparison_judge(series_summarize(log_ratios).median,
+                            median_interval(log_ratios, look_error(look, row_count)), tolerance);
+}
+
+double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds)
+{
+    Series ratios = {0};
+    for (size_t i = 0; i < new_seconds->count && i < old_seconds->count; i++)
+        series_add(&ratios, log(new_seconds->items[i] / old_seconds->items[i]));
+    double median = series_summarize(&ratios).median;
+    series_free(&ratios);
+    return median;
+}
+
+// Logarithms of frame / calibration^exponent: medians of blocks in order.
+static Series report_blocks(ReportTimes times, double exponent)
+{
+    size_t count = times.frame->count;
+    if (count > times.calibration->count) count = times.calibration->count;
+    Series blocks = {0};
+    for (size_t block = 0; block < REPORT_BLOCKS && count >= REPORT_BLOCKS; block++) {
+        Series part = {0};
+        for (size_t i = block * count / REPORT_BLOCKS; i < (block + 1) * count / REPORT_BLOCKS; i++)
+            series_add(&part, log(times.frame->items[i]) - exponent * log(times.calibration->items[i]));
+        series_add(&blocks, series_summarize(&part).median);
+        series_free(&part);
+    }
+    return blocks;
+}
+
+Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
+                                 double tolerance)
+{
+    Interval covering = {INFINITY, -INFINITY};
+    double log_ratio = 0;
+    for (int i = 0; i < 2; i++) {
+        Series new_blocks = report_blocks(new_times, i * exponent_max),
+               old_blocks = report_blocks(old_times, i * exponent_max);
+        // one of the exponents between is right, and the error is shared by two medians
+        Interval new_median = median_interval(&new_blocks, row_error(row_count) / 2),
+                 old_median = median_interval(&old_blocks, row_error(row_count) / 2);
+        covering.low = fmin(covering.low, new_median.low - old_median.high);
+        covering.high = fmax(covering.high, new_median.high - old_median.low);
+        log_ratio += (series_summarize(&new_blocks).median - series_summarize(&old_blocks).median) / 2;
+        series_free(&new_blocks);
+        series_free(&old_blocks);
+    }
+    covering.low -= log(process_allowance);
+    covering.high += log(process_allowance);
+    return comparison_judge(log_ratio, covering, tolerance);
+}

@@ -1,0 +1,244 @@
+// The statistic of glint bench on synthetic times: how often it reports a difference where there is none,
+// how often it finds one, and that it says so where it cannot know. Seeded, so that each run is the same.
+#include "host/measure/comparison.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+static uint64_t random_state;
+
+// splitmix64 (Steele, Lea, Flood: "Fast Splittable Pseudorandom Number Generators", 2014), in [0, 1).
+static double random_unit(void)
+{
+    uint64_t z = random_state += UINT64_C(0x9e3779b97f4a7c15);
+    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
+    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+static double random_normal(void)
+{
+    return sqrt(-2 * log(1 - random_unit())) * cos(6.283185307179586 * random_unit());
+}
+
+// A machine: other work comes in bursts that slow all runs, and the clock's frequency drifts.
+typedef struct {
+    double scatter;              // of a run, as a logarithm, and its outliers are ten times that
+    double burst_share;          // of the runs
+    double burst_slowdown;       // of what runs within one
+    double calibration_slowdown; // the same, of the calibration
+    double drift;                // of a round, as a logarithm: a random walk
+    double placement;            // of a process, as a logarithm
+    // state
+    double speed;
+    bool is_burst;
+} Machine;
+
+static const Machine quiet = {.scatter = 0.005, .placement = 0.005};
+static const Machine busy = {.scatter = 0.03,
+                             .burst_share = 0.4,
+                             .burst_slowdown = 1.8,
+                             .calibration_slowdown = 1.5,
+                             .drift = 0.01,
+                             .placement = 0.01};
+static const Machine hopeless = {
+    .scatter = 0.4, .burst_share = 0.5, .burst_slowdown = 3, .drift = 0.05, .placement = 0.1};
+
+// A burst lasts for 30 rounds on average.
+static void machine_step(Machine *machine)
+{
+    const double ends = 1.0 / 30;
+    double starts = ends * machine->burst_share / (1 - machine->burst_share);
+    machine->is_burst = machine->is_burst ? random_unit() >= ends : random_unit() < starts;
+    machine->speed += machine->drift * random_normal();
+}
+
+static double run_seconds(const Machine *machine, double slowdown)
+{
+    double outlier = random_unit() < 0.1 ? 10 * fabs(random_normal()) : 0;
+    return (machine->is_burst ? slowdown : 1) *
+           exp(machine->speed + machine->scatter * (random_normal() + outlier));
+}
+
+// glint bench --against on such a machine, of a build that takes `slowdown` times as long.
+static Verdict against_simulate(Machine machine, double slowdown, double tolerance)
+{
+    enum { ROWS = 1, LOOKS = 3, ROUNDS = 12 };
+    Series ratios = {0};
+    Comparison comparison = {0};
+    for (size_t look = 0; look < LOOKS && comparison.verdict == VERDICT_UNDECIDED; look++) {
+        while (ratios.count < comparison_pairs_at_look(look, ROWS)) {
+            Series times[2] = {{0}, {0}};
+            double place[2] = {exp(machine.placement * random_normal()),
+                               slowdown * exp(machine.placement * random_normal())};
+            for (int round = 0; round < ROUNDS; round++)
+                for (int turn = 0; turn < 2; turn++) {
+                    int which = (turn + round + (int)ratios.count) % 2;
+                    machine_step(&machine);
+                    series_add(&times[which], place[which] * run_seconds(&machine, machine.burst_slowdown));
+                }
+            series_add(&ratios, comparison_log_ratio(&times[1], &times[0]));
+            series_free(&times[0]);
+            series_free(&times[1]);
+        }
+        comparison = comparison_of_pairs(&ratios, look, ROWS, tolerance);
+    }
+    series_free(&ratios);
+    return comparison.verdict;
+}
+
+// A report of 200 runs: one process.
+static void report_simulate(Machine machine, double slowdown, Series *frame, Series *calibration)
+{
+    double place = slowdown * exp(machine.placement * random_normal());
+    for (int i = 0; i < 200; i++) {
+        machine_step(&machine);
+        series_add(frame, place * run_seconds(&machine, machine.burst_slowdown));
+        series_add(calibration, run_seconds(&machine, machine.calibration_slowdown));
+    }
+}
+
+static Verdict reports_simulate(Machine old_machine, Machine new_machine, double slowdown, double tolerance)
+{
+    Series series[4] = {{0}, {0}, {0}, {0}};
+    report_simulate(old_machine, 1, &series[0], &series[1]);
+    report_simulate(new_machine, slowdown, &series[2], &series[3]);
+    Comparison comparison = comparison_of_reports((ReportTimes){&series[2], &series[3]},
+                                                  (ReportTimes){&series[0], &series[1]}, 1, tolerance);
+    for (int i = 0; i < 4; i++)
+        series_free(&series[i]);
+    return comparison.verdict;
+}
+
+typedef struct {
+    int of[VERDICT_FASTER + 1];
+} Counts;
+
+static Counts against_count(Machine machine, double slowdown, int tries)
+{
+    Counts counts = {{0}};
+    random_state = 1;
+    for (int i = 0; i < tries; i++)
+        counts.of[against_simulate(machine, slowdown, 1.02)]++;
+    return counts;
+}
+
+static Counts reports_count(Machine old_machine, Machine new_machine, double slowdown, int tries)
+{
+    Counts counts = {{0}};
+    random_state = 1;
+    for (int i = 0; i < tries; i++)
+        counts.of[reports_simulate(old_machine, new_machine, slowdown, 1.1)]++;
+    return counts;
+}
+
+static void counts_print(const char *what, Counts counts)
+{
+    print_message("%-44s %5d undecided %5d same %5d slower %5d faster\n", what, counts.of[VERDICT_UNDECIDED],
+                  counts.of[VERDICT_SAME], counts.of[VERDICT_SLOWER], counts.of[VERDICT_FASTER]);
+}
+
+enum { TRIES = 1000 };
+
+// At most 1 % of false alarms, whatever the machine.
+static void test_same_build_against_itself(void **state)
+{
+    (void)state;
+    const Machine *machines[] = {&quiet, &busy, &hopeless};
+    for (int i = 0; i < 3; i++) {
+        Counts counts = against_count(*machines[i], 1, TRIES);
+        counts_print("against itself", counts);
+        assert_true(counts.of[VERDICT_SLOWER] + counts.of[VERDICT_FASTER] <= TRIES / 100);
+        assert_true(i > 0 || counts.of[VERDICT_SAME] >= TRIES * 95 / 100);
+        assert_true(i < 2 || counts.of[VERDICT_UNDECIDED] >= TRIES * 95 / 100);
+    }
+}
+
+static void test_slower_build_is_found(void **state)
+{
+    (void)state;
+    Counts slower = against_count(quiet, 1.05, TRIES), faster = against_count(quiet, 1 / 1.05, TRIES),
+           noisy = against_count(busy, 1.05, TRIES);
+    counts_print("5 % slower, quiet", slower);
+    counts_print("5 % faster, quiet", faster);
+    counts_print("5 % slower, busy", noisy);
+    assert_true(slower.of[VERDICT_SLOWER] >= TRIES * 99 / 100);
+    assert_true(faster.of[VERDICT_FASTER] >= TRIES * 99 / 100);
+    assert_true(noisy.of[VERDICT_SLOWER] >= TRIES * 95 / 100);
+    assert_int_equal(noisy.of[VERDICT_FASTER], 0);
+}
+
+// One report on a quiet machine, one on a busy or slower one: no false alarm, but no claim either.
+static void test_reports_of_one_build(void **state)
+{
+    (void)state;
+    Machine slow = quiet, thermal = quiet;
+    slow.speed = log(1.4);
+    thermal.drift = 0.002;
+    const struct {
+        const char *what;
+        const Machine *old, *new;
+    } cases[] = {
+        {"reports: quiet, quiet", &quiet, &quiet},      {"reports: quiet, busy", &quiet, &busy},
+        {"reports: busy, quiet", &busy, &quiet},        {"reports: busy, busy", &busy, &busy},
+        {"reports: quiet, 1.4 as slow", &quiet, &slow}, {"reports: drift, drift", &thermal, &thermal},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Counts counts = reports_count(*cases[i].old, *cases[i].new, 1, TRIES);
+        counts_print(cases[i].what, counts);
+        assert_true(counts.of[VERDICT_SLOWER] + counts.of[VERDICT_FASTER] <= TRIES / 100);
+        assert_true(i > 0 || counts.of[VERDICT_SAME] >= TRIES * 99 / 100);
+    }
+}
+
+static void test_reports_of_a_slower_build(void **state)
+{
+    (void)state;
+    Counts counts = reports_count(quiet, quiet, 1.2, TRIES);
+    counts_print("reports: quiet, 20 % slower", counts);
+    assert_true(counts.of[VERDICT_SLOWER] >= TRIES * 99 / 100);
+}
+
+// Worked out by hand: the ends are the order statistics that the binomial distribution gives.
+static void test_intervals(void **state)
+{
+    (void)state;
+    // 2 / 2^9 <= 0.01 / 2 < 2 / 2^8, and each further look takes twice as many
+    assert_int_equal(comparison_pairs_at_look(0, 1), 9);
+    assert_int_equal(comparison_pairs_at_look(2, 1), 36);
+    assert_int_equal(comparison_pairs_at_look(0, 10), 12);
+    Series ratios = {0};
+    for (int i = 0; i < 8; i++)
+        series_add(&ratios, 0.01 * (i + 1));
+    Comparison few = comparison_of_pairs(&ratios, 0, 1, 1.02);
+    assert_true(few.low == 0 && few.high == INFINITY && few.verdict == VERDICT_UNDECIDED);
+    series_add(&ratios, 5); // one outlier of nine is an end
+    Comparison nine = comparison_of_pairs(&ratios, 0, 1, 1.02);
+    assert_true(fabs(log(nine.ratio) - 0.05) < 1e-12 && fabs(log(nine.low) - 0.01) < 1e-12);
+    assert_true(fabs(log(nine.high) - 5) < 1e-12 && nine.verdict == VERDICT_SLOWER);
+    assert_true(comparison_of_pairs(&ratios, 0, 1, 200).verdict == VERDICT_SAME);
+    // of 18, 2 (1 + 18 + 153) / 2^18 <= 0.01 / 4: the third from each end, but not the fourth
+    for (int i = 0; i < 9; i++)
+        series_add(&ratios, -0.01 * (i + 1));
+    Comparison eighteen = comparison_of_pairs(&ratios, 1, 1, 1.02);
+    assert_true(fabs(log(eighteen.low) + 0.07) < 1e-12 && fabs(log(eighteen.high) - 0.07) < 1e-12);
+    assert_true(eighteen.verdict == VERDICT_UNDECIDED);
+    series_free(&ratios);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_intervals),
+        cmocka_unit_test(test_same_build_against_itself),
+        cmocka_unit_test(test_slower_build_is_found),
+        cmocka_unit_test(test_reports_of_one_build),
+        cmocka_unit_test(test_reports_of_a_slower_build),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
