@@ -352,6 +352,7 @@ static void test_output_where_there_are_no_modes(void **state)
     (void)state;
     MessageList messages = {0};
     OutputFile output;
+    file_write("new", "old");
     modes_are_refused = true;
     assert_true(output_open(&output, "new", &messages));
     modes_are_refused = false;

@@ -16,7 +16,7 @@
 
 static const char key[] = "device x\ntext y";
 static const char machine_code[] = "machine\0code\xff\n";
-enum { CODE_LENGTH = sizeof machine_code };
+enum { CODE_LENGTH = sizeof machine_code, FORMAT_OFFSET = 8 };
 
 static char *folder;
 
@@ -276,6 +276,17 @@ static void test_list(void **state)
     store(described);
     entry_set_used(described, 1000);
     char *path = cache_entry_path(key);
+    // an entry of another version is no fault
+    Text content = {0};
+    assert_true(text_read_file(&content, path, &messages));
+    content.items[FORMAT_OFFSET]++;
+    file_write(path, content.items, content.count);
+    text_free(&content);
+    assert_true(cache_list(&entries, &messages));
+    assert_int_equal(entries.count, 2);
+    assert_null(entries.items[1].fault);
+    assert_null(entries.items[1].device);
+    cache_entries_free(&entries);
     file_write(path, machine_code, CODE_LENGTH);
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 2);
@@ -289,6 +300,25 @@ static void test_list(void **state)
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 0);
     assert_int_equal(messages.count, 0);
+    free(path);
+}
+
+static void test_clear_that_fails(void **state)
+{
+    (void)state;
+    MessageList messages = {0};
+    char *path = cache_folder_path(), *secret;
+    assert_true(asprintf(&secret, "%s/hash-key", path) > 0);
+    store(key);
+    assert_true(cache_clear(&messages));
+    assert_int_equal(mkdir(secret, 0700), 0);
+    assert_false(cache_clear(&messages));
+    assert_int_equal(messages.count, 1);
+    assert_string_equal(messages.items[0].text,
+                        "cannot remove 'hash-key' of the kernel cache: Is a directory");
+    message_list_free(&messages);
+    rmdir(secret);
+    free(secret);
     free(path);
 }
 
@@ -514,6 +544,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_too_large, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_race_on_an_empty_cache, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_list, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_clear_that_fails, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_of_another_key, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_without_rights, set_up, tear_down),

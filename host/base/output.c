@@ -46,13 +46,6 @@ static void pending_drop(const char *name)
     }
 }
 
-static mode_t mode_by_umask(void)
-{
-    mode_t mask = umask(0);
-    umask(mask);
-    return 0666 & ~mask;
-}
-
 static bool output_failed(OutputFile *output, const char *doing, MessageList *messages)
 {
     message_add(messages, MESSAGE_ERROR, "cannot %s '%s': %s", doing, output->target, strerror(errno));
@@ -118,12 +111,12 @@ static void stale_temporaries_remove(const OutputFile *output)
 
 enum { TEMPORARY_TRIES = 1000 };
 
-static int named_open(OutputFile *output)
+static int named_open(OutputFile *output, mode_t mode)
 {
     stale_temporaries_remove(output);
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
-        int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+        int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
         if (descriptor >= 0 && temporary_lock(descriptor)) {
             output->temporary = name;
             pending_add(output->folder, name);
@@ -151,9 +144,9 @@ static DescriptorPath descriptor_path(int descriptor)
 
 // A file without a name vanishes with its process. -1 where the file system has none, or nothing in /proc to
 // name it by.
-static int unnamed_open(const OutputFile *output)
+static int unnamed_open(const OutputFile *output, mode_t mode)
 {
-    int descriptor = openat(output->folder, ".", O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600);
+    int descriptor = openat(output->folder, ".", O_WRONLY | O_TMPFILE | O_CLOEXEC, mode);
     if (descriptor < 0 || access(descriptor_path(descriptor).path, F_OK) == 0) return descriptor;
     close(descriptor);
     return -1;
@@ -188,13 +181,16 @@ static bool output_open_directly(OutputFile *output, MessageList *messages)
     return output->file || output_failed(output, "write", messages);
 }
 
-// For `output->name` in `output->folder`.
-static bool output_open_beside(OutputFile *output, mode_t mode, MessageList *messages)
+enum { MODE_NEW = 0666, MODE_PRIVATE = 0600, MODE_BITS = 0777 };
+
+// For `output->name` in `output->folder`; `created` is the mode that the umask limits, and `exact` the one
+// that it does not, if given.
+static bool output_open_beside(OutputFile *output, mode_t created, const mode_t *exact, MessageList *messages)
 {
-    int descriptor = unnamed_open(output);
-    if (descriptor < 0) descriptor = named_open(output);
+    int descriptor = unnamed_open(output, created);
+    if (descriptor < 0) descriptor = named_open(output, created);
     if (descriptor < 0) return output_failed(output, "create", messages);
-    fchmod(descriptor, mode); // fails where a file system has no modes, which does not matter
+    if (exact) fchmod(descriptor, *exact); // fails where a file system has no modes, which does not matter
     output->file = fdopen(descriptor, "wb");
     if (output->file) return true;
     int error = errno;
@@ -229,7 +225,8 @@ bool output_open_private(OutputFile *output, int folder, const char *name, Messa
     output->folder = fcntl(folder, F_DUPFD_CLOEXEC, 0);
     output->has_folder = output->folder >= 0;
     if (!output->has_folder) return output_failed(output, "create", messages);
-    return output_open_beside(output, 0600, messages);
+    static const mode_t exact = MODE_PRIVATE;
+    return output_open_beside(output, MODE_PRIVATE, &exact, messages);
 }
 
 // The end of a chain of symbolic links, whether a file exists there or not; `target` itself if it is no link.
@@ -272,7 +269,9 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     // Renaming would replace a read-only file.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
     if (!folder_open(output)) return output_failed(output, "create", messages);
-    return output_open_beside(output, exists ? old.st_mode & 0777 : mode_by_umask(), messages);
+    old.st_mode &= MODE_BITS;
+    return output_open_beside(output, exists ? MODE_PRIVATE : MODE_NEW, exists ? &old.st_mode : NULL,
+                              messages);
 }
 
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages)

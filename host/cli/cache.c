@@ -32,8 +32,9 @@ static bool entries_print(const CacheEntries *entries)
         char used[32] = "?";
         struct tm local;
         if (localtime_r(&entry->used.tv_sec, &local)) strftime(used, sizeof used, "%Y-%m-%d %H:%M", &local);
+        const char *device = entry->device ? entry->device : "of another version of glint";
         printf("  %s  %7.2f MiB  %s  %s%s\n", entry->name, (double)entry->size / mebi, used,
-               entry->fault ? "not used: " : "", entry->fault ? entry->fault : entry->device);
+               entry->fault ? "not used: " : "", entry->fault ? entry->fault : device);
         trusted = trusted && !entry->fault;
     }
     return trusted;

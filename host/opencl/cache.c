@@ -162,12 +162,19 @@ static const char *secret_read(Secret *secret, int folder)
     return why;
 }
 
-// Reads the hash's key, or replaces one that is absent or cannot be trusted.
-static bool secret_make(Secret *secret, int folder)
+// One process at a time makes or removes the hash's key and writes entries with it. Without locks some of
+// them may be lost. Returns a descriptor to close, or -1.
+static int folder_lock(int folder)
 {
     int locked = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (locked < 0) return false;
-    flock(locked, LOCK_EX); // one process makes it; without locks another's entries may be lost
+    while (locked >= 0 && flock(locked, LOCK_EX) != 0 && errno == EINTR)
+        continue;
+    return locked;
+}
+
+// Reads the hash's key, or replaces one that is absent or cannot be trusted. In a locked folder.
+static bool secret_make(Secret *secret, int folder)
+{
     bool has_secret = secret_read(secret, folder) == NULL;
     if (!has_secret && getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES) {
         MessageList ignored = {0};
@@ -180,7 +187,6 @@ static bool secret_make(Secret *secret, int folder)
         }
         message_list_free(&ignored);
     }
-    close(locked);
     return has_secret;
 }
 
@@ -311,28 +317,39 @@ void cache_entries_free(CacheEntries *entries)
     *entries = (CacheEntries){0};
 }
 
-// Removes, too, what is too large to be loaded.
-static void folder_trim(int folder, uint64_t bytes_max)
+// False, with a message, unless the file is gone.
+static bool file_remove(int folder, const char *name, MessageList *messages)
+{
+    if (unlinkat(folder, name, 0) == 0 || errno == ENOENT) return true;
+    message_add(messages, MESSAGE_ERROR, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
+    return false;
+}
+
+// Removes, too, what is too large to be loaded. False, with messages, if something remains.
+static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
 {
     CacheEntries entries = entries_list(folder);
     uint64_t left = entries.size;
+    bool is_trimmed = true;
     for (size_t i = 0; i < entries.count; i++)
         if (entries.items[i].size > CACHE_ENTRY_BYTES_MAX) left -= entries.items[i].size;
     for (size_t i = 0; i < entries.count; i++) {
         bool is_too_large = entries.items[i].size > CACHE_ENTRY_BYTES_MAX;
         if (left <= bytes_max && !is_too_large) continue;
-        unlinkat(folder, entries.items[i].name, 0);
+        is_trimmed &= file_remove(folder, entries.items[i].name, messages);
         if (!is_too_large) left -= entries.items[i].size;
     }
     cache_entries_free(&entries);
+    return is_trimmed;
 }
 
 void cache_trim(uint64_t bytes_max)
 {
-    MessageList messages = {0};
+    MessageList messages = {0}, ignored = {0};
     int folder = folder_open(false, &messages);
     if (folder >= 0) {
-        folder_trim(folder, bytes_max);
+        folder_trim(folder, bytes_max, &ignored);
+        message_list_free(&ignored);
         close(folder);
     }
     warnings_print(&messages);
@@ -351,16 +368,17 @@ void cache_store(const char *key, const Text *binary)
     CacheHeader header = header_of(strlen(key), binary->count);
     if (sizeof header + header.key_length + header.binary_length > CACHE_ENTRY_BYTES_MAX) return;
     MessageList messages = {0}, ignored = {0};
-    int folder = folder_open(true, &messages);
+    int folder = folder_open(true, &messages), locked = folder >= 0 ? folder_lock(folder) : -1;
     Secret secret;
-    if (folder >= 0 && secret_make(&secret, folder)) {
+    if (locked >= 0 && secret_make(&secret, folder)) {
         entry_tag(header.tag, &secret, &header, key, text_c(binary));
         OutputFile output;
         if (output_open_private(&output, folder, entry_name(key).text, &ignored) &&
             !entry_write(&output, &header, key, binary, &ignored))
             output_abandon(&output);
-        folder_trim(folder, CACHE_BYTES_MAX);
+        folder_trim(folder, CACHE_BYTES_MAX, &ignored);
     }
+    if (locked >= 0) close(locked);
     if (folder >= 0) close(folder);
     message_list_free(&ignored);
     warnings_print(&messages);
@@ -370,8 +388,9 @@ static void entry_describe(CacheEntry *entry, int folder)
 {
     Entry read;
     entry->fault = entry_read(&read, folder, entry->name);
-    if (entry->fault == absent) entry->fault = "of another version";
-    if (!entry->fault) {
+    if (entry->fault == absent) {
+        entry->fault = NULL;
+    } else if (!entry->fault) {
         char *key = memory_allocate(read.key_length + 1, 1);
         memcpy(key, read.key, read.key_length);
         key[read.key_length] = '\0';
@@ -403,8 +422,10 @@ bool cache_clear(MessageList *messages)
 {
     int folder = folder_open(false, messages);
     if (folder < 0) return messages->count == 0;
-    folder_trim(folder, 0);
-    unlinkat(folder, secret_name, 0);
+    int locked = folder_lock(folder);
+    bool is_cleared = folder_trim(folder, 0, messages);
+    is_cleared &= file_remove(folder, secret_name, messages);
+    if (locked >= 0) close(locked);
     close(folder);
-    return true;
+    return is_cleared;
 }

@@ -25,7 +25,7 @@ void cache_trim(uint64_t bytes_max);
 
 typedef struct {
     char *name;        // of the file
-    char *device;      // from the entry's key; NULL with a fault
+    char *device;      // from the entry's key; NULL with a fault, or if another version of glint wrote it
     const char *fault; // why the entry is not trusted; NULL: it is
     uint64_t size;
     struct timespec used;
@@ -41,7 +41,7 @@ typedef struct {
 // be trusted.
 bool cache_list(CacheEntries *entries, MessageList *messages);
 void cache_entries_free(CacheEntries *entries);
-// Removes all entries and the hash's key. False as cache_list.
+// Removes all entries and the hash's key. False as cache_list, or if one cannot be removed.
 bool cache_clear(MessageList *messages);
 
 // The folder and the path of the key's entry, which the caller frees; NULL: no cache.
