@@ -34,7 +34,7 @@ NOTES = {
 }
 # A path that begins so has no row, since the introduction, a note or a row names the section that has it.
 ELSEWHERE = {
-    "glint render --timing=json": ("glint", "device"),
+    "glint render --timing=json": ("glint",),
     "glint check": (),
     "glint devices": (),
     "glint diff": (),
@@ -63,6 +63,13 @@ MEANINGS = {
     "kernel_hash": "hash; of the kernel's text",
     "parse_ms": "number; reading the scene",
     "flatten_ms": "number; flattening it to arrays",
+    "by_device[]": "object; what each device did",
+    "by_device[].{name,platform,driver}": "text; from OpenCL",
+    "by_device[].share": "number; of the rows, 0 to 1",
+    "by_device[].bands": "count; that it rendered",
+    "by_device[].busy_ms": "number; rendering bands",
+    "by_device[].idle_ms": "number; the rest of `render_ms`",
+    "render_ms": "number; all bands, builds included",
     "upload_ms": "number; copying the arrays to the device",
     "encode_ms": "number; encoding and writing the files",
     "bvh_ms": "number or null; building the BVH; null without one",

@@ -393,10 +393,14 @@ class Reports(CliTestCase):
 
     def test_timing(self):
         report = self.json(f"render sphere.yaml {SMALL} --timing=json")
-        self.assertEqual((report["schema"], len(report["kernel_hash"]), report["size"]), (2, 16, [8, 6]))
-        for key in "parse_ms flatten_ms build_ms build_from_cache upload_ms read_backs encode_ms".split():
+        device, = report["by_device"]
+        self.assertEqual((report["schema"], len(device["kernel_hash"]), report["size"]), (3, 16, [8, 6]))
+        for key in "parse_ms render_ms encode_ms".split():
             self.assertIn(key, report)
-        self.assertEqual([launch["name"] for launch in report["launches"]], ["render"])
+        for key in "flatten_ms build_ms build_from_cache upload_ms busy_ms idle_ms read_backs".split():
+            self.assertIn(key, device)
+        self.assertEqual((device["share"], device["bands"]), (1, 1))
+        self.assertEqual([launch["name"] for launch in device["launches"]], ["render"])
         process = self.glint(f"render sphere.yaml {SMALL} --timing")
         self.assertRegex(process.stderr, r"(?m)^ +launches +[0-9.]+ ms")
         self.assertEqual(process.stdout, "")

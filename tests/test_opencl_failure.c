@@ -7,9 +7,12 @@
 #include "host/render/renderer.h"
 #include "tests/child.h"
 #include "tests/scene_reading.h"
+#include <pthread.h>
+#include <semaphore.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -22,7 +25,11 @@ static struct {
     size_t index;      // at which of its calls, from 0, or EVERY_CALL
     bool returns_null; // with CL_SUCCESS
     int crash;         // or the signal that ends the driver; 0: none
+    bool in_threads;   // only calls of other threads than the first are counted and fail
 } injected;
+
+static pthread_t first_thread;
+static pthread_mutex_t counts_mutex = PTHREAD_MUTEX_INITIALIZER;
 
 static const size_t EVERY_CALL = SIZE_MAX;
 
@@ -32,7 +39,7 @@ typedef struct {
 } CallCount;
 
 static CallCount counts[64];
-static long live_count; // objects created and mapped, less those released
+static atomic_long live_count; // objects created and mapped, less those released
 
 static CallCount *counted(const char *call)
 {
@@ -45,7 +52,10 @@ static CallCount *counted(const char *call)
 
 static bool call_fails(const char *call)
 {
+    if (injected.in_threads && pthread_equal(pthread_self(), first_thread)) return false;
+    pthread_mutex_lock(&counts_mutex);
     size_t index = counted(call)->count++;
+    pthread_mutex_unlock(&counts_mutex);
     bool fails = injected.call && strcmp(injected.call, call) == 0 &&
                  (injected.index == index || injected.index == EVERY_CALL);
     if (fails && injected.crash == SIGABRT) abort();
@@ -89,7 +99,7 @@ static bool call_fails(const char *call)
     }
 
 // A command whose event is requested creates one.
-#define EVENT(event) (live_count++, (event))
+#define EVENT(event) ((void)live_count++, (event))
 
 typedef void(CL_CALLBACK *ContextNotify)(const char *, const void *, size_t, void *);
 typedef void(CL_CALLBACK *ProgramNotify)(cl_program, void *);
@@ -183,22 +193,23 @@ static bool band_take(void *context, const Film *band, double fraction_done)
     return true;
 }
 
+static RenderSettings settings = {.width = SIDE,
+                                  .height = SIDE,
+                                  .region_width = SIDE,
+                                  .region_height = SIDE,
+                                  .sample_count = 1,
+                                  .precision = PRECISION_SINGLE,
+                                  .lanes = 1,
+                                  .counting = true,
+                                  .shift_to_eye = true,
+                                  .band_rows = BAND_ROWS};
+
 // A render with counted rays and all AOVs, a trace, and a large buffer. Returns whether all was done.
 static bool work(Compute *compute, Answer *answer)
 {
     static const TraceRay rays[RAY_COUNT] = {{{0, 0, 5}, {0, 0, -1}, 0, 100},
                                              {{0, 3, 5}, {0, 0, -1}, 0, 100},
                                              {{1, 1, 5}, {0, -0.25, -1}, 0, 100}};
-    RenderSettings settings = {.width = SIDE,
-                               .height = SIDE,
-                               .region_width = SIDE,
-                               .region_height = SIDE,
-                               .sample_count = 1,
-                               .precision = PRECISION_SINGLE,
-                               .lanes = 1,
-                               .counting = true,
-                               .shift_to_eye = true,
-                               .band_rows = BAND_ROWS};
     MessageList messages = {0};
     memset(answer, 0, sizeof *answer);
     compute_open(compute, device);
@@ -313,6 +324,119 @@ static void test_dispensable_calls(void **state)
     for (size_t i = 0; i < sizeof dispensable / sizeof *dispensable; i++)
         call_fail(dispensable[i], EVERY_CALL, false, false);
     assert_work_is_right();
+}
+
+// Two renderers, as on two devices, of which the second renders in a thread. Each waits until the other has
+// taken a band, or the second has failed.
+static struct {
+    sem_t first_goes_on, second_goes_on;
+    bool first_has_waited, second_has_waited;
+    size_t dropped_count, dropped;
+} pair;
+
+static bool pair_wait(void)
+{
+    bool is_first = pthread_equal(pthread_self(), first_thread);
+    bool *has_waited = is_first ? &pair.first_has_waited : &pair.second_has_waited;
+    if (*has_waited) return false;
+    *has_waited = true;
+    sem_post(is_first ? &pair.second_goes_on : &pair.first_goes_on);
+    sem_wait(is_first ? &pair.first_goes_on : &pair.second_goes_on);
+    return false;
+}
+
+static void pair_dropped(void *context, size_t index)
+{
+    (void)context;
+    pair.dropped_count++;
+    pair.dropped = index;
+    sem_post(&pair.first_goes_on);
+    sem_post(&pair.second_goes_on);
+}
+
+// Whether the image is whole; the computes are left open.
+static bool pair_work(Compute computes[2], Answer *answer)
+{
+    memset(counts, 0, sizeof counts);
+    memset(&pair, 0, sizeof pair);
+    memset(answer, 0, sizeof *answer);
+    sem_init(&pair.first_goes_on, 0, 0);
+    sem_init(&pair.second_goes_on, 0, 0);
+    Renderer *renderers[2];
+    settings.stop = pair_wait;
+    for (size_t i = 0; i < 2; i++) {
+        compute_open(&computes[i], device);
+        renderers[i] = renderer_open(&computes[i], &scene, &settings, NULL);
+    }
+    bool whole = renderers_render(renderers, 2, AOVS_ALL, band_take, pair_dropped, answer);
+    settings.stop = NULL;
+    for (size_t i = 0; i < 2; i++)
+        renderer_close(renderers[i]);
+    sem_destroy(&pair.first_goes_on);
+    sem_destroy(&pair.second_goes_on);
+    return whole;
+}
+
+static void pair_close(Compute computes[2])
+{
+    compute_close(&computes[0]);
+    compute_close_checked(&computes[1]);
+}
+
+// Of two devices one fails, at each call of its first band in turn: the other renders the whole image.
+static void test_one_of_two_devices(void **state)
+{
+    (void)state;
+    static const char *const needed[] = {
+        "clCreateBuffer",       "clCreateKernel",         "clSetKernelArg",
+        "clEnqueueWriteBuffer", "clEnqueueReadBuffer",    "clEnqueueMapBuffer",
+        "clGetEventInfo",       "clEnqueueNDRangeKernel", "clWaitForEvents"};
+    Compute computes[2];
+    Answer answer;
+    injected.in_threads = true;
+    injected.call = NULL;
+    injected.returns_null = false;
+    assert_true(pair_work(computes, &answer));
+    assert_int_equal(pair.dropped_count, 0);
+    assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+    pair_close(computes);
+    CallCount all[64];
+    memcpy(all, counts, sizeof all);
+    for (size_t i = 0; i < sizeof needed / sizeof *needed; i++) {
+        size_t count = 0;
+        for (size_t k = 0; all[k].call; k++)
+            if (strcmp(all[k].call, needed[i]) == 0) count = all[k].count;
+        assert_true(count > 0);
+        for (injected.index = 0; injected.index < count; injected.index++) {
+            injected.call = needed[i];
+            bool whole = pair_work(computes, &answer);
+            if (!whole) fail_msg("%s, call %zu: no image", needed[i], injected.index);
+            assert_int_equal(pair.dropped_count, 1);
+            assert_int_equal(pair.dropped, 1);
+            assert_int_equal(answer.band_count, 2);
+            assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+            assert_true(compute_ok(&computes[0]));
+            assert_string_equal(computes[1].failure.call, needed[i]);
+            pair_close(computes);
+        }
+    }
+    injected.in_threads = false;
+    injected.call = NULL;
+}
+
+static void test_both_of_two_devices(void **state)
+{
+    (void)state;
+    Compute computes[2];
+    Answer answer;
+    injected.call = "clEnqueueNDRangeKernel";
+    injected.index = EVERY_CALL;
+    assert_false(pair_work(computes, &answer));
+    assert_int_equal(pair.dropped_count, 1); // the last one reports for all
+    assert_false(compute_ok(&computes[0]) || compute_ok(&computes[1]));
+    assert_int_equal(answer.band_count, 0);
+    pair_close(computes);
+    injected.call = NULL;
 }
 
 static bool disk_is_full;
@@ -455,22 +579,30 @@ static int tear_down(void **state)
 
 typedef struct {
     int (*run)(int argument_count, char **arguments);
-    const char *arguments[8];
+    const char *arguments[9]; // ended by NULL
 } Command;
 
 static const char *failing_call;
+static size_t failing_index;
+static const char *driver_folder; // with PoCL alone, which then has two devices; NULL: as it is
 static int crash;
 static const char *crash_folder; // for caches
 
 static void command_fail(void *result)
 {
     const Command *command = result;
-    char *arguments[8] = {NULL};
+    char *arguments[9] = {NULL};
     int count = 0;
     for (; command->arguments[count]; count++)
         arguments[count] = memory_copy_text(command->arguments[count]);
     injected.call = failing_call;
+    injected.index = failing_index;
     injected.crash = crash;
+    first_thread = pthread_self();
+    if (driver_folder) {
+        setenv("OCL_ICD_VENDORS", driver_folder, 1);
+        setenv("POCL_DEVICES", "pthread pthread", 1);
+    }
     if (crash) {
         setenv("XDG_CACHE_HOME", crash_folder, 1);
         unsetenv("POCL_CACHE_DIR");
@@ -504,6 +636,63 @@ static void test_commands(void **state)
             assert_memory_equal(end.errors, expected, strlen(expected));
             assert_int_equal(end.status, EXIT_MACHINE);
         }
+}
+
+static void assert_same_bytes(const char *one, const char *other)
+{
+    Text first = {0}, second = {0};
+    MessageList messages = {0};
+    assert_true(text_read_file(&first, one, &messages) && text_read_file(&second, other, &messages));
+    assert_true(first.count > 0);
+    assert_int_equal(first.count, second.count);
+    assert_memory_equal(first.items, second.items, first.count);
+    text_free(&first);
+    text_free(&second);
+}
+
+// One of two devices fails: a warning, and the same image. Both fail: the message and status of a device.
+static void test_several_devices(void **state)
+{
+    (void)state;
+    static const char pocl[] = "/etc/OpenCL/vendors/pocl.icd";
+    if (access(pocl, R_OK) != 0) skip();
+    char one[] = "/tmp/glint-test-XXXXXX.npy", other[] = "/tmp/glint-test-XXXXXX.npy";
+    assert_true(close(mkstemps(one, 4)) == 0 && close(mkstemps(other, 4)) == 0);
+    const char *files[] = {one, other, "/dev/null/none.npy"};
+    const struct {
+        const char *call;
+        size_t index;
+        const char *expected;
+        int status;
+    } runs[] = {
+        {NULL, 0, "", EXIT_DONE},
+        {"clEnqueueNDRangeKernel", 0,
+         "glint: warning: the other devices go on without one: clEnqueueNDRangeKernel: "
+         "CL_OUT_OF_RESOURCES (-5) on ",
+         EXIT_DONE},
+        {"clCreateContext", 0,
+         "glint: warning: the other devices go on without one: clCreateContext: CL_OUT_OF_RESOURCES (-5) on ",
+         EXIT_DONE},
+        {"clEnqueueNDRangeKernel", EVERY_CALL,
+         "\nglint: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE}};
+    driver_folder = pocl;
+    for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
+        const char *file = files[i == 0 ? 0 : i == 3 ? 2 : 1];
+        Command command = {
+            command_render,
+            {"render", "scenes/spheres16.yaml", "--size", "64x48", "--device", "all", "-o", file}};
+        failing_call = runs[i].call;
+        failing_index = runs[i].index;
+        ChildEnd end = child_run(command_fail, &command, sizeof command);
+        if (!strstr(end.errors, runs[i].expected)) print_error("%s\n", end.errors);
+        assert_non_null(strstr(end.errors, runs[i].expected));
+        assert_int_equal(end.status, runs[i].status);
+        if (i == 1 || i == 2) assert_same_bytes(one, other);
+    }
+    driver_folder = NULL;
+    failing_index = 0;
+    unlink(one);
+    unlink(other);
 }
 
 // An image that is complete is written whatever a release says.
@@ -564,15 +753,21 @@ static void test_crashes(void **state)
 
 int main(void)
 {
+    first_thread = pthread_self();
     // each command is a process of its own, and forks before this one has opened a device
-    const struct CMUnitTest command_tests[] = {cmocka_unit_test(test_commands),
-                                               cmocka_unit_test(test_release_after_the_output),
-                                               cmocka_unit_test(test_crashes)};
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_needed_calls),   cmocka_unit_test(test_unmaps),
-        cmocka_unit_test(test_needed_objects), cmocka_unit_test(test_dispensable_calls),
-        cmocka_unit_test(test_builds),         cmocka_unit_test(test_empty_build_log),
-        cmocka_unit_test(test_discovery),      cmocka_unit_test(test_unknown_memory)};
+    const struct CMUnitTest command_tests[] = {
+        cmocka_unit_test(test_commands), cmocka_unit_test(test_several_devices),
+        cmocka_unit_test(test_release_after_the_output), cmocka_unit_test(test_crashes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_needed_calls),
+                                       cmocka_unit_test(test_unmaps),
+                                       cmocka_unit_test(test_needed_objects),
+                                       cmocka_unit_test(test_dispensable_calls),
+                                       cmocka_unit_test(test_builds),
+                                       cmocka_unit_test(test_empty_build_log),
+                                       cmocka_unit_test(test_discovery),
+                                       cmocka_unit_test(test_unknown_memory),
+                                       cmocka_unit_test(test_one_of_two_devices),
+                                       cmocka_unit_test(test_both_of_two_devices)};
     int failed = cmocka_run_group_tests(command_tests, NULL, NULL);
     return cmocka_run_group_tests(tests, set_up, tear_down) + failed;
 }

@@ -20,7 +20,8 @@ class Timing(TestCase):
         if not has_device(env=env):
             self.skipTest("not installed")
         command = f"render {write('plane.yaml', PLANE)} --size 320x180 --quiet"
-        return self.json(f"{command} --timing=json", env=env)["launches"], self.glint(f"{command} --timing", env=env).stderr
+        device, = self.json(f"{command} --timing=json", env=env)["by_device"]
+        return device["launches"], self.glint(f"{command} --timing", env=env).stderr
 
     def test_pocl_events_are_trusted(self):
         launches, text = self.timings("pocl")

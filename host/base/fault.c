@@ -10,7 +10,10 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-static const char *volatile noted_call;
+// The call of this thread, and the last of any, which stands for those of a driver's own threads.
+static _Thread_local const char *volatile noted_call;
+static const char *_Atomic last_call;
+static _Atomic int calling_threads;
 static volatile sig_atomic_t is_complete, complete_status;
 static char limits[128];
 
@@ -27,7 +30,9 @@ _Noreturn void fault(const char *format, ...)
 
 void fault_note_call(const char *call)
 {
+    calling_threads += (call != NULL) - (noted_call != NULL);
     noted_call = call;
+    if (call) last_call = call;
 }
 
 void fault_output_is_complete(int status)
@@ -70,7 +75,7 @@ static void error_write(const char *text, size_t length)
 // Only what a signal handler may call.
 static void crash_report(int signal_number)
 {
-    const char *call = noted_call;
+    const char *call = noted_call ? noted_call : calling_threads > 0 ? last_call : NULL;
     static const char start[] = "glint: ", warning[] = "warning: ", driver[] = ": the OpenCL driver ";
     const char *how = signal_number == SIGABRT ? "aborted" : "crashed";
     if (!call && !is_complete) {

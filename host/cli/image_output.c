@@ -22,8 +22,8 @@ struct ImageOutput {
     const char *scene_path;
     const Scene *scene;
     const RenderSettings *settings;
-    const Renderer *renderer;
-    const Device *device;
+    Renderer *const *renderers;
+    size_t renderer_count;
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted; // a band's values in another type
@@ -58,15 +58,16 @@ bool image_output_path_known(const char *path)
 }
 
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
-                               const RenderSettings *settings, const Renderer *renderer, const Device *device)
+                               const RenderSettings *settings, Renderer *const *renderers,
+                               size_t renderer_count)
 {
     ImageOutput *output = memory_allocate_zeroed(1, sizeof *output);
     *output = (ImageOutput){.options = options,
                             .scene_path = scene_path,
                             .scene = scene,
                             .settings = settings,
-                            .renderer = renderer,
-                            .device = device};
+                            .renderers = renderers,
+                            .renderer_count = renderer_count};
     return output;
 }
 
@@ -84,29 +85,56 @@ static void notes_add(Notes *notes, const char *key, const char *value)
     text_append(&notes->text, value, strlen(value) + 1);
 }
 
+// Whether the devices may round differently: neither strict nor all of one make.
+static bool is_mixed(const ImageOutput *output)
+{
+    const Device *first = renderer_report(output->renderers[0])->device;
+    bool differs = false;
+    for (size_t i = 1; i < output->renderer_count; i++) {
+        const Device *device = renderer_report(output->renderers[i])->device;
+        differs =
+            differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
+    }
+    return differs && output->settings->precision != PRECISION_STRICT;
+}
+
 // The settings that made the image: enough to make it again.
 static void notes_write(Notes *notes, const ImageOutput *output)
 {
     const RenderSettings *settings = output->settings;
-    const RenderReport *report = renderer_report(output->renderer);
     const char *slash = strrchr(output->scene_path, '/');
     Text value = {0};
 #define NOTE(key, ...)                                                                                       \
     (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
+// of each device
+#define NOTE_EACH(key, ...)                                                                                  \
+    do {                                                                                                     \
+        text_free(&value);                                                                                   \
+        for (size_t i = 0; i < output->renderer_count; i++) {                                                \
+            const Renderer *renderer = output->renderers[i];                                                 \
+            const RenderReport *report = renderer_report(renderer);                                          \
+            (void)report;                                                                                    \
+            text_appendf(&value, "%s", i > 0 ? " + " : "");                                                  \
+            text_appendf(&value, __VA_ARGS__);                                                               \
+        }                                                                                                    \
+        notes_add(notes, key, text_c(&value));                                                               \
+    } while (0)
     NOTE("Software", "glint %s", glint_version());
     NOTE("Scene", "%s", slash ? slash + 1 : output->scene_path);
-    NOTE("Device", "%s", output->device->name);
-    NOTE("Driver", "%s, %s", output->device->platform_name, output->device->driver);
+    NOTE_EACH("Device", "%s", report->device->name);
+    NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
     NOTE("Precision", "%s", precision_names[settings->precision]);
-    NOTE("Lanes", "%u", report->lanes);
+    NOTE_EACH("Lanes", "%u", report->lanes);
     NOTE("Samples", "%u", settings->sample_count);
     NOTE("Bounces", "%u", settings->bounce_count);
     NOTE("Size", "%ux%u", settings->width, settings->height);
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
     NOTE("Transfer", "%s", output->options->transfer == TRANSFER_SRGB ? "srgb" : "none");
-    NOTE("Kernel", "%016llx", (unsigned long long)report->kernel_hash);
+    NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
+    if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
 #undef NOTE
+#undef NOTE_EACH
     text_free(&value);
 }
 

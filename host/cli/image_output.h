@@ -22,10 +22,10 @@ bool image_output_path_known(const char *path); // false: the endings there are 
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path);
 
-// Files are opened with the first band, when the kernels' hash is known.
+// Files are opened with the first band. Their notes name the devices of all renderers.
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
-                               const RenderSettings *settings, const Renderer *renderer,
-                               const Device *device);
+                               const RenderSettings *settings, Renderer *const *renderers,
+                               size_t renderer_count);
 // Encodes a copy of the band while the caller goes on, unless options.synchronous; the messages belong to the
 // output until it is committed or abandoned. False: this band could not be written, or an earlier one.
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages);

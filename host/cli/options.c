@@ -3,6 +3,7 @@
 #include "host/import/load.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <getopt.h>
 #include <math.h>
@@ -260,9 +261,9 @@ bool device_open(OpenDevice *open, const char *selector)
     return true;
 }
 
-int device_close(OpenDevice *open, int status)
+// Returns the exit status, see device_close.
+static int compute_end(Compute *compute, int status)
 {
-    Compute *compute = &open->compute;
     char *unmap_failure = compute_unmap_failure_text(compute);
     if (compute_ok(compute) && unmap_failure) fprintf(stderr, "glint: warning: %s\n", unmap_failure);
     free(unmap_failure);
@@ -276,6 +277,57 @@ int device_close(OpenDevice *open, int status)
         compute->queue = NULL;
     }
     compute_close(compute);
+    return status;
+}
+
+int device_close(OpenDevice *open, int status)
+{
+    status = compute_end(&open->compute, status);
+    device_list_close(&open->devices);
+    return status;
+}
+
+bool devices_open(OpenDevices *open, const char *selector)
+{
+    *open = (OpenDevices){0};
+    device_list_open(&open->devices);
+    MessageList messages = {0};
+    const Device **devices;
+    open->count = devices_choose(&open->devices, device_selector(selector), &devices, &messages);
+    messages_print(&messages, NULL);
+    open->items = memory_allocate_zeroed(open->count, sizeof *open->items);
+    for (size_t i = 0; i < open->count; i++)
+        compute_open(&open->items[i].compute, devices[i]);
+    free(devices);
+    if (open->count > 0) return true;
+    devices_close(open, EXIT_USER);
+    return false;
+}
+
+void devices_drop(OpenDevices *open, size_t index)
+{
+    char *failure = compute_failure_text(&open->items[index].compute);
+    fprintf(stderr, "glint: warning: the other devices go on without one: %s\n", failure);
+    free(failure);
+    open->items[index].is_dropped = true;
+}
+
+void devices_remove(OpenDevices *open, size_t index)
+{
+    compute_close(&open->items[index].compute);
+    open->count--;
+    memmove(&open->items[index], &open->items[index + 1], (open->count - index) * sizeof *open->items);
+}
+
+int devices_close(OpenDevices *open, int status)
+{
+    for (size_t i = 0; i < open->count; i++) {
+        if (open->items[i].is_dropped)
+            compute_close(&open->items[i].compute);
+        else
+            status = compute_end(&open->items[i].compute, status);
+    }
+    free(open->items);
     device_list_close(&open->devices);
     return status;
 }

@@ -51,6 +51,9 @@ enum {
 #define HELP_DEVICE                                                                                          \
     "      --device D        index, part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "       \
     "else a CPU)\n"
+#define HELP_DEVICES                                                                                         \
+    "      --device LIST     all, or several: each an index, part of the name, cpu or gpu, with commas\n"    \
+    "                        between (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
 #define HELP_LANES                                                                                           \
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
 #define HELP_BOUNCES                                                                                         \
@@ -64,9 +67,8 @@ enum {
 #define HELP_JSON "      --json            print JSON\n"
 #define HELP_HELP "  -h, --help            print this help\n"
 
-// For COMMON_LONG_OPTIONS.
+// For COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES.
 #define HELP_COMMON                                                                                          \
-    HELP_DEVICE                                                                                              \
     "      --precision P     fast, single, strict or double (default: single)\n" HELP_LANES                  \
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT HELP_MAX_PIXELS
@@ -130,3 +132,22 @@ bool device_open(OpenDevice *open, const char *selector);
 // `status`. Unless failed or interrupted, the context is left to the process's end: PoCL takes 80 ms to free
 // its compiler.
 int device_close(OpenDevice *open, int status);
+
+// Several devices, for one image.
+typedef struct {
+    DeviceList devices;
+    struct {
+        Compute compute;
+        bool is_dropped; // it failed, and the others did its work
+    } * items;
+    size_t count;
+} OpenDevices;
+
+// As device_open, for all devices of a list or of "all".
+bool devices_open(OpenDevices *open, const char *selector);
+// Warns that the device failed and that the others do its work.
+void devices_drop(OpenDevices *open, size_t index);
+// Closes a device that was dropped; those after it move up.
+void devices_remove(OpenDevices *open, size_t index);
+// As device_close, for all that were not dropped.
+int devices_close(OpenDevices *open, int status);

@@ -1,6 +1,7 @@
 // glint render: a scene file becomes an image.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/image_output.h"
 #include "host/cli/options.h"
@@ -55,7 +56,7 @@ static const char help_text[] =
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
                     "      --quiet           no progress\n" //
-    HELP_BOUNCES HELP_COMMON HELP_PERTURB HELP_HELP;
+    HELP_BOUNCES HELP_DEVICES HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -169,6 +170,7 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
 
 typedef struct {
     ImageOutput *output;
+    OpenDevices *devices;
     Progress *progress;
     MessageList *messages;
     const RenderSettings *settings;
@@ -206,7 +208,66 @@ static bool band_take(void *context, const Film *band, double fraction_done)
     return written;
 }
 
-static int scene_render(RenderOptions *options, const Scene *scene, Compute *compute, double parse_seconds)
+static void device_drop(void *context, size_t index)
+{
+    devices_drop(((BandContext *)context)->devices, index);
+}
+
+// Opens a renderer on each device; those that fail are removed, if others are left. False: with messages, the
+// scene or settings do not fit a device, else the device failed.
+static bool renderers_open(Renderer **renderers, OpenDevices *devices, const Scene *scene,
+                           const RenderSettings *settings, MessageList *messages)
+{
+    for (size_t i = 0; i < devices->count;) {
+        renderers[i] = renderer_open(&devices->items[i].compute, scene, settings, messages);
+        if (renderers[i]) {
+            i++;
+        } else {
+            if (messages->count > 0 || devices->count == 1) return false;
+            devices_drop(devices, i);
+            devices_remove(devices, i);
+        }
+    }
+    return true;
+}
+
+// Renders, writes the files and reports the times.
+static int image_render(RenderOptions *options, const Scene *scene, OpenDevices *devices,
+                        Renderer *const *renderers, const RenderSettings *settings, HostTimes *times)
+{
+    MessageList messages = {0};
+    Progress progress;
+    progress_open(&progress, options->quiet);
+    ImageOutput *output =
+        image_output_open(&options->output, options->scene, scene, settings, renderers, devices->count);
+    BandContext context = {.output = output,
+                           .devices = devices,
+                           .progress = &progress,
+                           .messages = &messages,
+                           .settings = settings,
+                           .is_quiet = options->quiet};
+    double start = clock_seconds();
+    bool whole =
+        renderers_render(renderers, devices->count, options->output.aovs, band_take, device_drop, &context);
+    times->render_seconds = clock_seconds() - start;
+    if (whole)
+        whole = image_output_commit(output, &messages, &times->encode_seconds);
+    else
+        image_output_abandon(output);
+    progress_close(&progress);
+    bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
+    messages_print(&messages, NULL);
+    int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
+    if (status == EXIT_INTERRUPTED && progress_interrupted())
+        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
+                options->output.path);
+    if (whole && options->timing != TIMING_NONE)
+        timing_print(options->timing, renderers, devices->count, settings, times);
+    if (whole) fault_output_is_complete(status);
+    return status;
+}
+
+static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices *devices, HostTimes *times)
 {
     RenderSettings settings;
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
@@ -214,38 +275,14 @@ static int scene_render(RenderOptions *options, const Scene *scene, Compute *com
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
     options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
-    Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
-    if (!renderer) {
-        messages_print(&messages, NULL);
-        return EXIT_USER;
-    }
-    Progress progress;
-    progress_open(&progress, options->quiet);
-    ImageOutput *output =
-        image_output_open(&options->output, options->scene, scene, &settings, renderer, compute->device);
-    BandContext context = {.output = output,
-                           .progress = &progress,
-                           .messages = &messages,
-                           .settings = &settings,
-                           .is_quiet = options->quiet};
-    bool whole = renderer_render(renderer, options->output.aovs, band_take, &context);
-    double encode_seconds = 0;
-    if (whole)
-        whole = image_output_commit(output, &messages, &encode_seconds);
-    else
-        image_output_abandon(output);
-    progress_close(&progress);
-    bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
+    Renderer **renderers = memory_allocate_zeroed(devices->count, sizeof *renderers);
+    int status = EXIT_USER;
+    if (renderers_open(renderers, devices, scene, &settings, &messages))
+        status = image_render(options, scene, devices, renderers, &settings, times);
     messages_print(&messages, NULL);
-    int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
-    if (status == EXIT_INTERRUPTED && compute_ok(compute))
-        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
-                options->output.path);
-    if (whole && options->timing != TIMING_NONE)
-        timing_print(options->timing, renderer_report(renderer), compute->device, &settings,
-                     &(HostTimes){parse_seconds, encode_seconds});
-    if (whole) fault_output_is_complete(status);
-    renderer_close(renderer);
+    for (size_t i = 0; i < devices->count; i++)
+        renderer_close(renderers[i]);
+    free(renderers);
     return status;
 }
 
@@ -258,15 +295,15 @@ int command_render(int argument_count, char **arguments)
     if (!options.output.path) options.output.path = default_path;
 
     Scene scene = {0};
-    OpenDevice open;
+    OpenDevices devices;
     double start = clock_seconds();
     status = EXIT_USER;
     if (image_output_path_known(options.output.path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
-        double parse_seconds = clock_seconds() - start;
-        if (device_open(&open, options.common.device)) {
-            status = scene_render(&options, &scene, &open.compute, parse_seconds);
-            status = device_close(&open, status);
+        HostTimes times = {.parse_seconds = clock_seconds() - start};
+        if (devices_open(&devices, options.common.device)) {
+            status = scene_render(&options, &scene, &devices, &times);
+            status = devices_close(&devices, status);
         }
     }
     scene_free(&scene);

@@ -72,21 +72,40 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
             sum.untrusted_count, count);
 }
 
-static void text_print(const RenderReport *report, const Device *device, const RenderSettings *settings,
-                       const HostTimes *host)
+// Of the rows and of the time, where several devices render.
+static void share_print(const RenderReport *report, const RenderSettings *settings)
 {
-    fprintf(stderr, "%ux%u, %u %s per pixel, precision %s, %u %s, on %s (kernel %016llx)\n",
-            settings->region_width, settings->region_height, settings->sample_count,
-            settings->sample_count == 1 ? "sample" : "samples", precision_names[settings->precision],
-            report->lanes, report->lanes == 1 ? "lane" : "lanes", device->name,
-            (unsigned long long)report->kernel_hash);
-    line_print("parse", host->parse_seconds, "");
+    const WorkerShare *share = &report->share;
+    fprintf(stderr, "  %.1f %% of the rows in %u %s; busy %.3f ms, idle %.3f ms\n",
+            100.0 * share->rows / settings->region_height, share->bands, share->bands == 1 ? "band" : "bands",
+            1e3 * share->busy_seconds, 1e3 * share->idle_seconds);
+}
+
+static void device_print(const RenderReport *report)
+{
     line_print("flatten", report->flatten_seconds, "");
     if (report->features & FEATURE_BVH) line_print("bvh", report->bvh_seconds, "");
     line_print("build", report->build_seconds, report->build_from_cache ? "from the cache" : "compiled");
     line_print("upload", report->upload_seconds, "");
     launches_print("launches", report->launches.items, report->launches.count);
     launches_print("read-back", report->reads.items, report->reads.count);
+}
+
+static void text_print(Renderer *const *renderers, size_t count, const RenderSettings *settings,
+                       const HostTimes *host)
+{
+    fprintf(stderr, "%ux%u, %u %s per pixel, precision %s\n", settings->region_width, settings->region_height,
+            settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
+            precision_names[settings->precision]);
+    line_print("parse", host->parse_seconds, "");
+    for (size_t i = 0; i < count; i++) {
+        const RenderReport *report = renderer_report(renderers[i]);
+        fprintf(stderr, "%s, %u %s (kernel %016llx)\n", report->device->name, report->lanes,
+                report->lanes == 1 ? "lane" : "lanes", (unsigned long long)report->kernel_hash);
+        if (count > 1) share_print(report, settings);
+        device_print(report);
+    }
+    line_print("render", host->render_seconds, "");
     line_print("encode", host->encode_seconds, "");
 }
 
@@ -108,23 +127,14 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
     json_end(json);
 }
 
-static void json_report(const RenderReport *report, const Device *device, const RenderSettings *settings,
-                        const HostTimes *host)
+static void render_device_json(Json *json, const RenderReport *report, const RenderSettings *settings)
 {
-    Json *json = json_open();
-    json_integer(json, "schema", 2);
-    json_text(json, "glint", glint_version());
-    json_begin_object(json, "device");
-    json_text(json, "name", device->name);
-    json_text(json, "platform", device->platform_name);
-    json_text(json, "driver", device->driver);
-    json_end(json);
-    size_json(json, settings->region_width, settings->region_height);
-    json_integer(json, "samples", settings->sample_count);
-    json_text(json, "precision", precision_names[settings->precision]);
+    json_begin_object(json, NULL);
+    json_text(json, "name", report->device->name);
+    json_text(json, "platform", report->device->platform_name);
+    json_text(json, "driver", report->device->driver);
     json_integer(json, "lanes", report->lanes);
     hash_json(json, "kernel_hash", report->kernel_hash);
-    json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
     if (report->features & FEATURE_BVH)
         json_number(json, "bvh_ms", 1e3 * report->bvh_seconds);
@@ -133,17 +143,39 @@ static void json_report(const RenderReport *report, const Device *device, const 
     json_number(json, "build_ms", 1e3 * report->build_seconds);
     json_boolean(json, "build_from_cache", report->build_from_cache);
     json_number(json, "upload_ms", 1e3 * report->upload_seconds);
+    json_number(json, "share", (double)report->share.rows / settings->region_height);
+    json_integer(json, "bands", report->share.bands);
+    json_number(json, "busy_ms", 1e3 * report->share.busy_seconds);
+    json_number(json, "idle_ms", 1e3 * report->share.idle_seconds);
     launches_json(json, "launches", report->launches.items, report->launches.count);
     launches_json(json, "read_backs", report->reads.items, report->reads.count);
+    json_end(json);
+}
+
+static void json_report(Renderer *const *renderers, size_t count, const RenderSettings *settings,
+                        const HostTimes *host)
+{
+    Json *json = json_open();
+    json_integer(json, "schema", 3);
+    json_text(json, "glint", glint_version());
+    size_json(json, settings->region_width, settings->region_height);
+    json_integer(json, "samples", settings->sample_count);
+    json_text(json, "precision", precision_names[settings->precision]);
+    json_number(json, "parse_ms", 1e3 * host->parse_seconds);
+    json_begin_array(json, "by_device");
+    for (size_t i = 0; i < count; i++)
+        render_device_json(json, renderer_report(renderers[i]), settings);
+    json_end(json);
+    json_number(json, "render_ms", 1e3 * host->render_seconds);
     json_number(json, "encode_ms", 1e3 * host->encode_seconds);
     json_print(json, stdout);
 }
 
-void timing_print(TimingStyle style, const RenderReport *report, const Device *device,
-                  const RenderSettings *settings, const HostTimes *host)
+void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const RenderSettings *settings,
+                  const HostTimes *host)
 {
     if (style == TIMING_JSON)
-        json_report(report, device, settings, host);
+        json_report(renderers, count, settings, host);
     else
-        text_print(report, device, settings, host);
+        text_print(renderers, count, settings, host);
 }

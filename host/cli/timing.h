@@ -1,7 +1,6 @@
 // The time of every stage and launch of a render, as text or JSON.
 #pragma once
 
-#include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
 typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON } TimingStyle;
@@ -10,8 +9,9 @@ bool timing_style_read(const char *value, TimingStyle *style); // value NULL: te
 
 typedef struct {
     double parse_seconds, encode_seconds;
+    double render_seconds; // from the first band to the last, builds included
 } HostTimes;
 
-// Text goes to stderr, JSON to stdout.
-void timing_print(TimingStyle style, const RenderReport *report, const Device *device,
-                  const RenderSettings *settings, const HostTimes *host);
+// Of all renderers of the image. Text goes to stderr, JSON to stdout.
+void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const RenderSettings *settings,
+                  const HostTimes *host);

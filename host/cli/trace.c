@@ -34,7 +34,7 @@ static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\
                                 "decimal or C hexadecimal; - is\n"
                                 "                        standard input; # starts a comment\n"
                                 "  -o, --output FILE     CSV file (default: standard output)\n" //
-    HELP_COMMON HELP_PERTURB HELP_HELP;
+    HELP_DEVICE HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;

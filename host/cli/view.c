@@ -27,7 +27,7 @@ static const char help_text[] =
     "usage: glint view SCENE [OPTIONS]\n\n"
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel, once the camera rests (default: 16)\n" //
-    HELP_BOUNCES HELP_COMMON HELP_HELP;
+    HELP_BOUNCES HELP_DEVICE HELP_COMMON HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -82,18 +82,16 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
 
 typedef struct {
     const char *scene_path;
-    const Device *device;
     Transfer transfer;
 } SaveContext;
 
 // As glint render writes it.
 static bool image_save(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
-                       const Renderer *renderer, const Film *film, MessageList *messages)
+                       Renderer *renderer, const Film *film, MessageList *messages)
 {
     const SaveContext *save = context;
     const ImageOutputOptions options = {.path = path, .transfer = save->transfer, .bits = 8};
-    ImageOutput *output =
-        image_output_open(&options, save->scene_path, scene, settings, renderer, save->device);
+    ImageOutput *output = image_output_open(&options, save->scene_path, scene, settings, &renderer, 1);
     double seconds;
     if (image_output_write(output, film, messages)) return image_output_commit(output, messages, &seconds);
     image_output_abandon(output);
@@ -104,7 +102,7 @@ static bool image_save(void *context, const char *path, const Scene *scene, cons
 static int scene_view(ViewOptions *options, Scene *scene, const Device *device)
 {
     image_size_choose(scene, &options->width, &options->height);
-    SaveContext save = {options->scene, device,
+    SaveContext save = {options->scene,
                         scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB};
     WindowOptions window = {
         .frames = {.device = device,

@@ -12,6 +12,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <sodium.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -225,11 +226,8 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
 // At most one warning per process.
 static void warnings_print(MessageList *messages)
 {
-    static bool is_printed;
-    if (messages->count > 0 && !is_printed) {
-        message_list_print(messages, stderr);
-        is_printed = true;
-    }
+    static atomic_flag is_printed = ATOMIC_FLAG_INIT; // each device's thread loads its programs
+    if (messages->count > 0 && !atomic_flag_test_and_set(&is_printed)) message_list_print(messages, stderr);
     message_list_free(messages);
 }
 

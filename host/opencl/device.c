@@ -333,3 +333,54 @@ const Device *device_choose(const DeviceList *list, const char *selector, Messag
     if (!best) report_no_match(list, selector, messages);
     return best;
 }
+
+static bool any_matches(const DeviceList *list, const char *selector)
+{
+    for (size_t i = 0; i < list->count; i++)
+        if (device_matches(&list->items[i], selector)) return true;
+    return false;
+}
+
+static size_t devices_choose_all(const DeviceList *list, const Device **chosen, MessageList *messages)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < list->count; i++)
+        if (device_usable(&list->items[i], NULL)) chosen[count++] = &list->items[i];
+    if (count == 0) report_no_match(list, NULL, messages);
+    return count;
+}
+
+static bool is_listed(const Device *const *chosen, size_t count, const Device *device)
+{
+    for (size_t i = 0; i < count; i++)
+        if (chosen[i] == device) return true;
+    return false;
+}
+
+size_t devices_choose(const DeviceList *list, const char *selector, const Device ***devices,
+                      MessageList *messages)
+{
+    const Device **chosen = *devices = memory_allocate_zeroed(list->count + 1, sizeof *chosen);
+    if (selector && strcasecmp(selector, "all") == 0) return devices_choose_all(list, chosen, messages);
+    // a name may have a comma, as llvmpipe's has
+    bool is_single = !selector || !strchr(selector, ',') || any_matches(list, selector);
+    size_t count = 0;
+    for (const char *at = selector, *end;; at = end + 1) {
+        end = is_single ? NULL : strchr(at, ',');
+        char *part = at ? strndup(at, end ? (size_t)(end - at) : strlen(at)) : NULL;
+        const Device *device = NULL;
+        if (part && part[0] == '\0')
+            report_no_match(list, part, messages);
+        else
+            device = device_choose(list, part, messages);
+        free(part);
+        if (!device) return 0;
+        if (is_listed(chosen, count, device)) {
+            message_add(messages, MESSAGE_ERROR, "device %u (%s) is listed twice", device->index,
+                        device->name);
+            return 0;
+        }
+        chosen[count++] = device;
+        if (!end) return count;
+    }
+}

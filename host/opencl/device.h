@@ -48,6 +48,12 @@ char *device_list_failure_text(const DeviceList *list);
 // are none.
 const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages);
 
+// The devices of `selector`: "all" of them, or those of a list with commas between selectors as above.
+// Returns their number; 0, with an error message, if none matches one of the selectors or a device is listed
+// twice. The caller frees *devices.
+size_t devices_choose(const DeviceList *list, const char *selector, const Device ***devices,
+                      MessageList *messages);
+
 // The selector the user gave: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
 // NULL.
 const char *device_selector(const char *option);

@@ -5,7 +5,9 @@
 #include "host/base/memory.h"
 #include "host/render/pace.h"
 #include "host/render/renderer_state.h"
+#include "host/render/scheduler.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 
 static const double PASS_SECONDS = 0.1; // of renderer_accumulate, about
@@ -87,10 +89,6 @@ static void buffers_close(BandBuffers *buffers)
     *buffers = (BandBuffers){0};
 }
 
-typedef struct {
-    uint32_t first_row, row_count;
-} BandRows;
-
 static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows)
 {
     TileShape item = item_shape(renderer->report.lanes);
@@ -170,18 +168,20 @@ static void *lengths_restored(const Renderer *renderer, void *lengths, size_t co
     return restored;
 }
 
-// Where a band goes: to a BandSink, or to a PassSink with its number of samples.
+// Where a band goes: to the scheduler that the worker took its rows from, or to a PassSink with its number of
+// samples.
 typedef struct {
-    BandSink sink;
+    Scheduler *scheduler;
+    size_t worker;
     PassSink pass_sink;
     uint32_t samples;
     void *context;
 } Delivery;
 
-static bool deliver(const Delivery *delivery, const Film *band, double fraction_done)
+static bool deliver(const Delivery *delivery, const Film *band)
 {
-    return delivery->sink ? delivery->sink(delivery->context, band, fraction_done)
-                          : delivery->pass_sink(delivery->context, band, delivery->samples);
+    return delivery->scheduler ? scheduler_give(delivery->scheduler, delivery->worker, band)
+                               : delivery->pass_sink(delivery->context, band, delivery->samples);
 }
 
 static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigned layers, BandRows rows,
@@ -196,8 +196,7 @@ static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigne
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
             band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
     }
-    double done = (double)(rows.first_row + rows.row_count) / renderer->settings.region_height;
-    bool go_on = compute_ok(renderer->compute) && deliver(delivery, &band, done);
+    bool go_on = compute_ok(renderer->compute) && deliver(delivery, &band);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
         renderer_unmap(renderer, buffers->layers[layer], mapped[layer]);
@@ -245,9 +244,15 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
 
+static bool is_stopped(const Renderer *renderer, const Delivery *delivery)
+{
+    return (renderer->settings.stop && renderer->settings.stop()) ||
+           (delivery->scheduler && scheduler_has_ended(delivery->scheduler));
+}
+
 // Samples first..end-1 of a band, in launches of the pace. False: failed or stopped.
 static bool band_sample(Renderer *renderer, const BandBuffers *buffers, BandRows rows, Pace *pace,
-                        uint32_t first, uint32_t end)
+                        uint32_t first, uint32_t end, const Delivery *delivery)
 {
     const RenderSettings *settings = &renderer->settings;
     uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
@@ -258,7 +263,7 @@ static bool band_sample(Renderer *renderer, const BandBuffers *buffers, BandRows
         double seconds = band_render(renderer, buffers, rows, first, first + samples);
         pace_note_launch(pace, pixels, samples, seconds);
         first += samples;
-        go_on = compute_ok(renderer->compute) && !(settings->stop && settings->stop());
+        go_on = compute_ok(renderer->compute) && !is_stopped(renderer, delivery);
     }
     return go_on;
 }
@@ -275,28 +280,80 @@ static Pace pace_start(const RenderSettings *settings)
     return (Pace){.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
 }
 
-bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
+// Renders the rows that the scheduler hands out. A failed device is dropped.
+static void renderer_work(Renderer *renderer, unsigned aovs, const Delivery *delivery)
 {
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
-    const Delivery delivery = {.sink = sink, .context = context};
+    Scheduler *scheduler = delivery->scheduler;
+    const uint32_t step = settings->band_rows > 0 ? settings->band_rows : rows_step(renderer);
     BandBuffers buffers = {0};
     buffers_open(&buffers, renderer, aovs, rows_max(renderer, aovs));
+    renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
     Pace pace = pace_start(settings);
     bool go_on = compute_ok(compute);
-    BandRows rows = {0};
-    while (go_on && rows.first_row < settings->region_height) {
-        uint32_t left = settings->region_height - rows.first_row;
-        rows.row_count =
-            band_rows(renderer, &pace, settings->sample_count, left < buffers.rows ? left : buffers.rows);
-        go_on = band_sample(renderer, &buffers, rows, &pace, 0, settings->sample_count);
+    while (go_on) {
+        uint32_t wanted = band_rows(renderer, &pace, settings->sample_count, buffers.rows);
+        BandRows rows = scheduler_take(scheduler, delivery->worker, wanted, step);
+        if (rows.row_count == 0) break;
+        go_on = band_sample(renderer, &buffers, rows, &pace, 0, settings->sample_count, delivery);
         if (!go_on) break;
         band_fill_aovs(renderer, &buffers, aovs, rows);
-        go_on = band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
-        rows.first_row += rows.row_count;
+        go_on = band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, delivery);
     }
     buffers_close(&buffers);
-    return go_on && compute_ok(compute);
+    if (!compute_ok(compute))
+        scheduler_drop(scheduler, delivery->worker);
+    else if (!go_on)
+        scheduler_end(scheduler);
+}
+
+typedef struct {
+    Renderer *renderer;
+    unsigned aovs;
+    Delivery delivery;
+    pthread_t thread;
+} RenderWorker;
+
+static void *worker_run(void *argument)
+{
+    const RenderWorker *worker = argument;
+    renderer_work(worker->renderer, worker->aovs, &worker->delivery);
+    return NULL;
+}
+
+bool renderers_render(Renderer *const *renderers, size_t count, unsigned aovs, BandSink sink,
+                      WorkerDropped dropped, void *context)
+{
+    const SchedulerSettings settings = {.row_count = renderers[0]->settings.region_height,
+                                        .worker_count = count,
+                                        .sink = sink,
+                                        .dropped = dropped,
+                                        .context = context};
+    Scheduler *scheduler = scheduler_open(&settings);
+    RenderWorker *workers = memory_allocate_zeroed(count, sizeof *workers);
+    for (size_t i = 0; i < count; i++) {
+        workers[i] = (RenderWorker){
+            .renderer = renderers[i], .aovs = aovs, .delivery = {.scheduler = scheduler, .worker = i}};
+        if (i == 0) continue; // the caller's thread
+        if (pthread_create(&workers[i].thread, NULL, worker_run, &workers[i]) != 0)
+            fault("cannot start a thread for %s%s", renderers[i]->compute->device->name, fault_limits());
+    }
+    worker_run(&workers[0]);
+    for (size_t i = 1; i < count; i++)
+        pthread_join(workers[i].thread, NULL);
+    free(workers);
+    WorkerShare *shares = memory_allocate_zeroed(count, sizeof *shares);
+    bool whole = scheduler_close(scheduler, shares);
+    for (size_t i = 0; i < count; i++)
+        renderers[i]->report.share = shares[i];
+    free(shares);
+    return whole;
+}
+
+bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
+{
+    return renderers_render(&renderer, 1, aovs, sink, NULL, context) && compute_ok(renderer->compute);
 }
 
 typedef struct {
@@ -321,7 +378,7 @@ static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Pace
         PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
         buffers_open(&band.buffers, renderer, aovs, band.rows.row_count);
         array_push(*bands, band);
-        go_on = band_sample(renderer, &band.buffers, band.rows, pace, 0, 1) &&
+        go_on = band_sample(renderer, &band.buffers, band.rows, pace, 0, 1, delivery) &&
                 band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);
         row += band.rows.row_count;
     }
@@ -357,7 +414,8 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
         start = clock_seconds();
         for (size_t i = 0; go_on && i < bands.count; i++) {
             const PassBand *band = &bands.items[i];
-            go_on = band_sample(renderer, &band->buffers, band->rows, &pace, first, delivery.samples) &&
+            go_on = band_sample(renderer, &band->buffers, band->rows, &pace, first, delivery.samples,
+                                &delivery) &&
                     band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);
         }
         seconds_of_sample = (clock_seconds() - start) / (delivery.samples - first);

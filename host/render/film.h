@@ -64,7 +64,8 @@ size_t film_layer_size(const Film *film, Layer layer);
 
 // A film of zeros in double with the color and the AOVs of the set.
 Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs);
-void film_free(Film *film); // and zeroes
+Film film_copy(const Film *band); // with layers of its own
+void film_free(Film *film);       // and zeroes
 
 // Copies the rows of a band into the film, all layers that both have; reals become doubles.
 void film_copy_band(Film *film, const Film *band);

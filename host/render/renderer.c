@@ -1,5 +1,6 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
+#include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/compile/compile.h"
 #include "host/render/renderer_state.h"
@@ -220,6 +221,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
+    renderer->report.device = compute->device;
     renderer->report.build_from_cache = true;
     if (!scene_take(renderer, scene, settings, messages)) {
         renderer_close(renderer);
@@ -261,6 +263,14 @@ size_t renderer_scalar_size(const Renderer *renderer)
 char *renderer_kernel_text(const Renderer *renderer)
 {
     return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&renderer->prelude));
+}
+
+uint64_t renderer_kernel_hash(const Renderer *renderer)
+{
+    char *text = renderer_kernel_text(renderer);
+    uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
+    free(text);
+    return hash;
 }
 
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)

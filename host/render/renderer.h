@@ -5,6 +5,7 @@
 #include "host/compile/settings.h"
 #include "host/opencl/compute.h"
 #include "host/render/film.h"
+#include "host/render/scheduler.h"
 #include "host/render/trace.h"
 #include "host/scene/scene.h"
 #include <stdbool.h>
@@ -47,12 +48,16 @@ void renderer_close(Renderer *renderer);
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);
 
-// Called for each band from the top, whose layers are valid until it returns; returns false to stop.
-typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
-
 // Renders the color and the AOVs of the set in bands of about band_seconds each. False: the device failed
 // (compute_ok says so), else settings.stop or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
+
+// The same by several renderers of one scene and one set of settings, each on a device of its own: see
+// Scheduler. `dropped` gets the renderer's index. False: the last device failed, too, or settings.stop or the
+// sink ended it.
+bool renderers_render(Renderer *const *renderers, size_t count, unsigned aovs, BandSink sink,
+                      WorkerDropped dropped, void *context);
+
 // Called for each band of a pass. Its color is the sum of `samples` samples, or their mean where they are
 // all; a band of AOVs has no color.
 typedef bool (*PassSink)(void *context, const Film *band, uint32_t samples);
@@ -77,6 +82,7 @@ typedef struct {
 } NamedLaunch;
 
 typedef struct {
+    const Device *device;
     FeatureSet features;
     uint32_t lanes;
     bool is_double; // structs in double
@@ -88,10 +94,13 @@ typedef struct {
         NamedLaunch *items;
         size_t count, capacity;
     } launches, reads;
+    WorkerShare share; // of the last render
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
 
 // The composed text of the kernel that renders, for other compilers. Caller frees.
 char *renderer_kernel_text(const Renderer *renderer);
+// Its hash, which the report has once the kernel is built.
+uint64_t renderer_kernel_hash(const Renderer *renderer);
 // Clears launches, reads and counted rays, so that the next render has its own report.
 void renderer_report_restart(Renderer *renderer);

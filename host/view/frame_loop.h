@@ -22,7 +22,7 @@ typedef struct {
     // Writes a complete image: its color, in the precision that it was rendered in. False with a message if
     // it cannot.
     bool (*save)(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
-                 const Renderer *renderer, const Film *film, MessageList *messages);
+                 Renderer *renderer, const Film *film, MessageList *messages);
     void *save_context;
 } FrameLoopOptions;
 

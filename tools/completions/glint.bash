@@ -34,7 +34,7 @@ _glint() {
     --bvh) words="auto on off" ;;
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
-    --device) words="cpu gpu" ;;
+    --device) words="cpu gpu all" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
     --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance | --max-pixels) return ;;

@@ -11,7 +11,7 @@ _glint_render() {
         '--size[width and height in pixels]:WxH:' \
         '--samples[rays for each pixel]:number:' \
         '--region[pixels of the whole image to render]:X,Y,W,H:' \
-        '--device[device to render on]:device:(cpu gpu)' \
+        '--device[device to render on, or several]:device:(cpu gpu all)' \
         '--precision[arithmetic]:precision:(fast single strict double)' \
         '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--bvh[use a BVH]:choice:(auto on off)' \

@@ -1,0 +1,280 @@
+// Guided self-scheduling (Polychronopoulos and Kuck, 1987, "Guided Self-Scheduling", with shares by pace): a
+// worker gets at most half of its share of the rows that are left, so that the last bands are short.
+#include "host/render/scheduler.h"
+
+#include "host/base/array.h"
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+
+enum { WAITING_BYTES_MAX = 64 << 20 }; // of bands that wait for one above them, about
+
+typedef struct {
+    BandRows rows; // taken and not given yet
+    double taken_seconds;
+    double rows_per_second; // of the last band; 0: unknown
+    bool is_dropped;
+    WorkerShare share;
+} Worker;
+
+struct Scheduler {
+    SchedulerSettings settings;
+    pthread_mutex_t mutex;
+    pthread_cond_t changed;
+    double start_seconds;
+    uint32_t delivered_rows; // to the sink
+    bool is_delivering, has_ended;
+    Worker *workers;
+    struct {
+        BandRows *items; // neither taken nor rendered, from the top
+        size_t count, capacity;
+    } free_rows;
+    struct {
+        Film *items; // copies
+        size_t count, capacity;
+    } waiting;
+    size_t row_bytes; // of a waiting band; 0: unknown
+};
+
+Scheduler *scheduler_open(const SchedulerSettings *settings)
+{
+    Scheduler *scheduler = memory_allocate_zeroed(1, sizeof *scheduler);
+    scheduler->settings = *settings;
+    scheduler->start_seconds = clock_seconds();
+    scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
+    if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
+        fault("out of memory: mutex");
+    array_push(scheduler->free_rows, ((BandRows){0, settings->row_count}));
+    return scheduler;
+}
+
+bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
+{
+    const double seconds = clock_seconds() - scheduler->start_seconds;
+    const bool is_whole = scheduler->delivered_rows == scheduler->settings.row_count;
+    for (size_t i = 0; shares && i < scheduler->settings.worker_count; i++) {
+        shares[i] = scheduler->workers[i].share;
+        shares[i].idle_seconds = fmax(0, seconds - shares[i].busy_seconds);
+    }
+    for (size_t i = 0; i < scheduler->waiting.count; i++)
+        film_free(&scheduler->waiting.items[i]);
+    free(scheduler->waiting.items);
+    free(scheduler->free_rows.items);
+    free(scheduler->workers);
+    pthread_cond_destroy(&scheduler->changed);
+    pthread_mutex_destroy(&scheduler->mutex);
+    free(scheduler);
+    return is_whole;
+}
+
+// The part of the rest that the worker would render if all ended together. Unknown paces count as the mean of
+// the known ones.
+static double share_of(const Scheduler *scheduler, size_t worker)
+{
+    double sum = 0;
+    size_t known = 0, active = 0;
+    for (size_t i = 0; i < scheduler->settings.worker_count; i++) {
+        const Worker *other = &scheduler->workers[i];
+        if (other->is_dropped) continue;
+        active++;
+        known += other->rows_per_second > 0;
+        sum += other->rows_per_second;
+    }
+    double pace = scheduler->workers[worker].rows_per_second;
+    if (known == 0) return 1 / (double)active;
+    double mean = sum / (double)known;
+    return (pace > 0 ? pace : mean) / (mean * (double)active);
+}
+
+static uint32_t rows_free(const Scheduler *scheduler)
+{
+    uint32_t rows = 0;
+    for (size_t i = 0; i < scheduler->free_rows.count; i++)
+        rows += scheduler->free_rows.items[i].row_count;
+    return rows;
+}
+
+// Whether all other workers are dropped or were never there.
+static bool is_alone(const Scheduler *scheduler, size_t worker)
+{
+    for (size_t i = 0; i < scheduler->settings.worker_count; i++)
+        if (i != worker && !scheduler->workers[i].is_dropped) return false;
+    return true;
+}
+
+// The row where bands must end for now, so that those that wait fit into memory. The uppermost band is never
+// too far down, which is why the render always gets on.
+static uint32_t row_limit(const Scheduler *scheduler)
+{
+    if (scheduler->row_bytes == 0) return UINT32_MAX;
+    return scheduler->delivered_rows + (uint32_t)(WAITING_BYTES_MAX / scheduler->row_bytes);
+}
+
+// The rows for the worker from the first that are free; none while they are too far down.
+static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
+{
+    const BandRows *first = &scheduler->free_rows.items[0];
+    uint32_t rows = rows_max, limit = row_limit(scheduler);
+    if (!is_alone(scheduler, worker)) {
+        double fair = 0.5 * share_of(scheduler, worker) * rows_free(scheduler);
+        uint32_t steps = (uint32_t)fmax(1, fair / step);
+        if (rows > steps * step) rows = steps * step;
+    }
+    if (rows > first->row_count) rows = first->row_count;
+    if (first->first_row > scheduler->delivered_rows && first->first_row + rows > limit) rows = 0;
+    return (BandRows){first->first_row, rows};
+}
+
+static bool rows_are_out(const Scheduler *scheduler)
+{
+    for (size_t i = 0; i < scheduler->settings.worker_count; i++)
+        if (scheduler->workers[i].rows.row_count > 0) return true;
+    return false;
+}
+
+BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
+{
+    BandRows rows = {0};
+    pthread_mutex_lock(&scheduler->mutex);
+    while (!scheduler->has_ended && rows.row_count == 0) {
+        bool is_free = scheduler->free_rows.count > 0;
+        if (is_free) rows = rows_choose(scheduler, worker, rows_max, step);
+        if (!is_free && !rows_are_out(scheduler)) break;
+        if (rows.row_count == 0) pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
+    }
+    if (rows.row_count > 0) {
+        BandRows *first = &scheduler->free_rows.items[0];
+        first->first_row += rows.row_count;
+        first->row_count -= rows.row_count;
+        if (first->row_count == 0) {
+            scheduler->free_rows.count--;
+            for (size_t i = 0; i < scheduler->free_rows.count; i++)
+                first[i] = first[i + 1];
+        }
+        scheduler->workers[worker].rows = rows;
+        scheduler->workers[worker].taken_seconds = clock_seconds();
+    }
+    pthread_mutex_unlock(&scheduler->mutex);
+    return rows;
+}
+
+// Passes the band, which is the next one, to the sink; the mutex is not held meanwhile.
+static void band_pass(Scheduler *scheduler, const Film *band)
+{
+    const uint32_t end = band->first_row + band->height;
+    scheduler->is_delivering = true;
+    pthread_mutex_unlock(&scheduler->mutex);
+    bool go_on = scheduler->settings.sink(scheduler->settings.context, band,
+                                          (double)end / scheduler->settings.row_count);
+    pthread_mutex_lock(&scheduler->mutex);
+    scheduler->is_delivering = false;
+    if (go_on)
+        scheduler->delivered_rows = end;
+    else
+        scheduler->has_ended = true;
+}
+
+// Takes the next band from those that wait; false: it is not among them.
+static bool waiting_take(Scheduler *scheduler, Film *band)
+{
+    for (size_t i = 0; i < scheduler->waiting.count; i++) {
+        if (scheduler->waiting.items[i].first_row != scheduler->delivered_rows) continue;
+        *band = scheduler->waiting.items[i];
+        scheduler->waiting.items[i] = scheduler->waiting.items[--scheduler->waiting.count];
+        return true;
+    }
+    return false;
+}
+
+static bool is_next(const Scheduler *scheduler, const Film *band)
+{
+    return !scheduler->is_delivering && band->first_row == scheduler->delivered_rows;
+}
+
+// Keeps a copy of the band until those above it are there.
+static void band_keep(Scheduler *scheduler, const Film *band)
+{
+    size_t bytes = 0;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (band->layers[layer]) bytes += film_layer_size(band, layer);
+    scheduler->row_bytes = bytes / band->height;
+    pthread_mutex_unlock(&scheduler->mutex);
+    Film copy = film_copy(band);
+    pthread_mutex_lock(&scheduler->mutex);
+    array_push(scheduler->waiting, copy);
+}
+
+static void rows_done(Worker *worker)
+{
+    double seconds = clock_seconds() - worker->taken_seconds;
+    worker->share.rows += worker->rows.row_count;
+    worker->share.bands++;
+    worker->share.busy_seconds += seconds;
+    worker->rows_per_second = worker->rows.row_count / fmax(seconds, 1e-9);
+}
+
+bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band)
+{
+    pthread_mutex_lock(&scheduler->mutex);
+    rows_done(&scheduler->workers[worker]);
+    if (scheduler->has_ended)
+        ;
+    else if (is_next(scheduler, band))
+        band_pass(scheduler, band);
+    else
+        band_keep(scheduler, band);
+    scheduler->workers[worker].rows = (BandRows){0};
+    Film next;
+    while (!scheduler->has_ended && !scheduler->is_delivering && waiting_take(scheduler, &next)) {
+        band_pass(scheduler, &next);
+        film_free(&next);
+    }
+    bool go_on = !scheduler->has_ended;
+    pthread_cond_broadcast(&scheduler->changed);
+    pthread_mutex_unlock(&scheduler->mutex);
+    return go_on;
+}
+
+static void rows_return(Scheduler *scheduler, BandRows rows)
+{
+    array_push(scheduler->free_rows, rows);
+    size_t at = scheduler->free_rows.count - 1;
+    for (; at > 0 && scheduler->free_rows.items[at - 1].first_row > rows.first_row; at--)
+        scheduler->free_rows.items[at] = scheduler->free_rows.items[at - 1];
+    scheduler->free_rows.items[at] = rows;
+}
+
+void scheduler_drop(Scheduler *scheduler, size_t worker)
+{
+    pthread_mutex_lock(&scheduler->mutex);
+    Worker *dropped = &scheduler->workers[worker];
+    dropped->is_dropped = true;
+    if (dropped->rows.row_count > 0) rows_return(scheduler, dropped->rows);
+    dropped->rows = (BandRows){0};
+    bool is_last = true;
+    for (size_t i = 0; i < scheduler->settings.worker_count; i++)
+        is_last = is_last && scheduler->workers[i].is_dropped;
+    if (!is_last && scheduler->settings.dropped)
+        scheduler->settings.dropped(scheduler->settings.context, worker);
+    pthread_cond_broadcast(&scheduler->changed);
+    pthread_mutex_unlock(&scheduler->mutex);
+}
+
+void scheduler_end(Scheduler *scheduler)
+{
+    pthread_mutex_lock(&scheduler->mutex);
+    scheduler->has_ended = true;
+    pthread_cond_broadcast(&scheduler->changed);
+    pthread_mutex_unlock(&scheduler->mutex);
+}
+
+bool scheduler_has_ended(Scheduler *scheduler)
+{
+    pthread_mutex_lock(&scheduler->mutex);
+    bool has_ended = scheduler->has_ended;
+    pthread_mutex_unlock(&scheduler->mutex);
+    return has_ended;
+}

@@ -1,0 +1,267 @@
+// Rows handed out to workers: the bands reach the sink in order from the top whatever the order they end in,
+// sizes follow the paces, and what a failed worker leaves goes to the others.
+#include "host/base/memory.h"
+#include "host/render/scheduler.h"
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+enum { WIDTH = 4, ROWS = 64, STEP = 4, ROWS_MAX = 16, COMPONENTS = 3 };
+
+typedef struct {
+    uint32_t rows, bands; // of the sink, in order
+    uint32_t bands_max;   // the sink ends the render after these; 0: never
+    size_t dropped, dropped_count;
+    bool is_right;
+} Sink;
+
+// Each value of a band is its row.
+static bool band_sink(void *context, const Film *band, double fraction_done)
+{
+    Sink *sink = context;
+    const float *values = band->layers[LAYER_COLOR];
+    sink->is_right = sink->is_right && band->first_row == sink->rows;
+    for (uint32_t row = 0; row < band->height; row++)
+        for (uint32_t i = 0; i < WIDTH * COMPONENTS; i++)
+            sink->is_right =
+                sink->is_right && values[row * WIDTH * COMPONENTS + i] == (float)(sink->rows + row);
+    sink->rows += band->height;
+    sink->is_right = sink->is_right && fraction_done == (double)sink->rows / ROWS;
+    sink->bands++;
+    return sink->bands != sink->bands_max;
+}
+
+static void worker_dropped(void *context, size_t worker)
+{
+    Sink *sink = context;
+    sink->dropped = worker;
+    sink->dropped_count++;
+}
+
+static Scheduler *start(Sink *sink, size_t worker_count)
+{
+    *sink = (Sink){.is_right = true};
+    return scheduler_open(&(SchedulerSettings){.row_count = ROWS,
+                                               .worker_count = worker_count,
+                                               .sink = band_sink,
+                                               .dropped = worker_dropped,
+                                               .context = sink});
+}
+
+static BandRows take(Scheduler *scheduler, size_t worker)
+{
+    return scheduler_take(scheduler, worker, ROWS_MAX, STEP);
+}
+
+static bool give(Scheduler *scheduler, size_t worker, BandRows rows)
+{
+    float values[ROWS * WIDTH * COMPONENTS];
+    for (uint32_t row = 0; row < rows.row_count; row++)
+        for (uint32_t i = 0; i < WIDTH * COMPONENTS; i++)
+            values[row * WIDTH * COMPONENTS + i] = (float)(rows.first_row + row);
+    Film band = {
+        .width = WIDTH, .height = rows.row_count, .first_row = rows.first_row, .real_size = sizeof(float)};
+    band.layers[LAYER_COLOR] = values;
+    bool go_on = scheduler_give(scheduler, worker, &band);
+    memset(values, 0, sizeof values); // the renderer's memory is for its next band
+    return go_on;
+}
+
+static void work(Scheduler *scheduler, size_t worker)
+{
+    for (BandRows rows; (rows = take(scheduler, worker)).row_count > 0;)
+        if (!give(scheduler, worker, rows)) break;
+}
+
+static void test_one_worker_gets_what_it_asks_for(void **state)
+{
+    (void)state;
+    Sink sink;
+    WorkerShare share;
+    Scheduler *scheduler = start(&sink, 1);
+    work(scheduler, 0);
+    assert_true(scheduler_close(scheduler, &share));
+    assert_true(sink.is_right);
+    assert_int_equal(sink.bands, ROWS / ROWS_MAX);
+    assert_int_equal(share.rows, ROWS);
+    assert_int_equal(share.bands, ROWS / ROWS_MAX);
+}
+
+static void test_lower_bands_wait(void **state)
+{
+    (void)state;
+    Sink sink;
+    WorkerShare shares[3];
+    Scheduler *scheduler = start(&sink, 3);
+    BandRows first = take(scheduler, 0), second = take(scheduler, 1), third = take(scheduler, 2);
+    assert_int_equal(first.first_row, 0);
+    assert_int_equal(second.first_row, first.row_count);
+    assert_int_equal(third.first_row, second.first_row + second.row_count);
+    assert_true(give(scheduler, 2, third));
+    assert_true(give(scheduler, 1, second));
+    assert_int_equal(sink.rows, 0);
+    assert_true(give(scheduler, 0, first));
+    assert_int_equal(sink.bands, 3);
+    work(scheduler, 2);
+    assert_true(scheduler_close(scheduler, shares));
+    assert_true(sink.is_right);
+    assert_int_equal(shares[0].rows + shares[1].rows + shares[2].rows, ROWS);
+    assert_int_equal(shares[1].rows, second.row_count);
+}
+
+// Half of a worker's share of the rows that are left, in whole steps, until all are taken. No pace is known,
+// so that shares are equal.
+static void test_bands_shrink(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    static const uint32_t expected[] = {16, 12}; // of 64 and 48, then of 36 …
+    for (size_t i = 0; i < 2; i++)
+        assert_int_equal(take(scheduler, i).row_count, expected[i]);
+    scheduler_end(scheduler);
+    assert_false(scheduler_close(scheduler, NULL));
+
+    scheduler = start(&sink, 16); // less than a step each: a step
+    for (size_t i = 0; i < 16; i++)
+        assert_int_equal(take(scheduler, i).row_count, STEP);
+    scheduler_end(scheduler);
+    assert_false(scheduler_close(scheduler, NULL));
+}
+
+// The slower worker gets fewer rows.
+static void test_bands_follow_the_pace(void **state)
+{
+    (void)state;
+    enum { MANY = 1000 };
+    Sink sink = {.is_right = true};
+    Scheduler *scheduler = scheduler_open(
+        &(SchedulerSettings){.row_count = MANY, .worker_count = 2, .sink = band_sink, .context = &sink});
+    BandRows slow = scheduler_take(scheduler, 0, 1, 1), fast = scheduler_take(scheduler, 1, 1, 1);
+    give(scheduler, 1, fast);
+    usleep(20000); // for a clear difference; any is enough
+    give(scheduler, 0, slow);
+    fast = scheduler_take(scheduler, 1, MANY, 1);
+    slow = scheduler_take(scheduler, 0, MANY, 1);
+    assert_true(fast.row_count > slow.row_count && slow.row_count > 0);
+    scheduler_end(scheduler);
+    assert_false(scheduler_close(scheduler, NULL));
+}
+
+static void test_a_dropped_workers_rows_go_to_others(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    BandRows lost = take(scheduler, 1), kept = take(scheduler, 0);
+    assert_int_equal(lost.first_row, 0);
+    scheduler_drop(scheduler, 1);
+    assert_int_equal(sink.dropped_count, 1);
+    assert_int_equal(sink.dropped, 1);
+    assert_true(give(scheduler, 0, kept));
+    assert_int_equal(sink.rows, 0);
+    BandRows again = take(scheduler, 0);
+    assert_int_equal(again.first_row, 0);
+    assert_true(give(scheduler, 0, again));
+    work(scheduler, 0);
+    assert_true(scheduler_close(scheduler, NULL));
+    assert_true(sink.is_right);
+}
+
+static void test_nobody_is_left(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    take(scheduler, 0);
+    scheduler_drop(scheduler, 0);
+    take(scheduler, 1);
+    scheduler_drop(scheduler, 1);
+    assert_int_equal(sink.dropped_count, 1); // the last has nobody to go on
+    assert_false(scheduler_close(scheduler, NULL));
+}
+
+static void test_the_sink_ends_the_render(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    sink.bands_max = 2;
+    BandRows first = take(scheduler, 0), second = take(scheduler, 1);
+    assert_true(give(scheduler, 0, first));
+    BandRows third = take(scheduler, 0);
+    assert_false(scheduler_has_ended(scheduler));
+    assert_false(give(scheduler, 1, second));
+    assert_false(give(scheduler, 0, third));
+    assert_true(scheduler_has_ended(scheduler));
+    assert_int_equal(take(scheduler, 1).row_count, 0);
+    assert_false(scheduler_close(scheduler, NULL));
+    assert_int_equal(sink.bands, 2);
+}
+
+typedef struct {
+    Scheduler *scheduler;
+    size_t worker;
+} WorkerThread;
+
+static void *thread_work(void *argument)
+{
+    const WorkerThread *thread = argument;
+    work(thread->scheduler, thread->worker);
+    return NULL;
+}
+
+// A worker without rows waits: those of a worker that fails later are its own.
+static void test_idle_workers_wait_for_lost_rows(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    take(scheduler, 0);
+    WorkerThread other = {scheduler, 1};
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, thread_work, &other), 0);
+    scheduler_drop(scheduler, 0); // before or after the other has done the rest
+    pthread_join(thread, NULL);
+    assert_true(scheduler_close(scheduler, NULL));
+    assert_true(sink.is_right);
+}
+
+static void test_many_threads(void **state)
+{
+    (void)state;
+    enum { COUNT = 4, ROUNDS = 200 };
+    for (int round = 0; round < ROUNDS; round++) {
+        Sink sink;
+        WorkerThread workers[COUNT];
+        pthread_t threads[COUNT];
+        Scheduler *scheduler = start(&sink, COUNT);
+        for (size_t i = 0; i < COUNT; i++) {
+            workers[i] = (WorkerThread){scheduler, i};
+            assert_int_equal(pthread_create(&threads[i], NULL, thread_work, &workers[i]), 0);
+        }
+        for (size_t i = 0; i < COUNT; i++)
+            pthread_join(threads[i], NULL);
+        assert_true(scheduler_close(scheduler, NULL));
+        assert_true(sink.is_right);
+    }
+}
+
+int main(void)
+{
+    alarm(60); // a worker that waits for ever
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_one_worker_gets_what_it_asks_for),
+                                       cmocka_unit_test(test_lower_bands_wait),
+                                       cmocka_unit_test(test_bands_shrink),
+                                       cmocka_unit_test(test_bands_follow_the_pace),
+                                       cmocka_unit_test(test_a_dropped_workers_rows_go_to_others),
+                                       cmocka_unit_test(test_nobody_is_left),
+                                       cmocka_unit_test(test_the_sink_ends_the_render),
+                                       cmocka_unit_test(test_idle_workers_wait_for_lost_rows),
+                                       cmocka_unit_test(test_many_threads)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,83 @@
+#!/usr/bin/env -S python3 -B
+"""One image by several devices: the same bytes as by one, at `strict` even by three OpenCL implementations together.
+
+run_tests: sanitize-long-only"""
+import os
+import unittest
+from pathlib import Path
+
+from glint import IS_SANITIZED, SPHERE, TestCase, find_icd, has_device, main, png_read, skip_all, write
+
+POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
+TWO = {"env": POCL["env"] | {"POCL_DEVICES": "pthread pthread"}}
+OCLGRIND_DRIVER = Path("/usr/lib/oclgrind/liboclgrind-rt-icd.so")
+SIZE = "--size 64x48 --quiet"
+AOVS = "position", "object", "path"
+
+
+class SeveralDevices(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("sphere.yaml", SPHERE)
+
+    def mixed(self):
+        """PoCL with rusticl and Oclgrind, where they are installed, as options of run."""
+        os.mkdir("vendors")
+        for name, library in ("pocl", None), ("rusticl", None), ("oclgrind", OCLGRIND_DRIVER):
+            source = Path(find_icd(name))
+            text = source.read_text(encoding="utf-8") if source.exists() else library and library.exists() and f"{library}\n"
+            if text:
+                write(f"vendors/{name}.icd", text)
+        env = {"OCL_ICD_VENDORS": os.path.abspath("vendors"), "RUSTICL_ENABLE": "llvmpipe"}
+        env["OCLGRIND_BUILD_OPTIONS"] = "-cl-opt-disable"  # optimized, LLVM leaves calls that Oclgrind 21.10 does not know
+        implementations = {"env": env}
+        names = {device["platform"] for device in self.json("devices --json", **implementations)["devices"]}
+        if len(names) < 2:
+            self.skipTest("only one OpenCL implementation is installed")
+        return implementations
+
+    def test_two_of_one_make(self):
+        for precision in "single", "strict", "double":
+            command = f"render sphere.yaml {SIZE} --samples 3 --precision {precision} --aov {','.join(AOVS)}"
+            self.glint(f"{command} -o one.npy", **POCL)
+            report = self.json(f"{command} -o two.npy --device all --timing=json", **TWO)
+            for end in "npy", *(f"{aov}.npy" for aov in AOVS):
+                self.assertSameBytes(f"one.{end}", f"two.{end}")
+            self.assertEqual(len(report["by_device"]), 2)
+            self.assertAlmostEqual(sum(device["share"] for device in report["by_device"]), 1)
+            for device in report["by_device"]:
+                self.assertEqual(device["bands"], sum(launch["name"] == "aov" for launch in device["launches"]))
+
+    def test_names(self):
+        """The files' notes name both; those of one make round alike."""
+        self.glint(f"render sphere.yaml {SIZE} --device 1,0 -o two.png", **TWO)
+        _, _, texts, _ = png_read("two.png")
+        for key in "Device", "Driver", "Lanes", "Kernel":
+            one, _, other = texts[key].partition(" + ")
+            self.assertEqual(one, other, key)
+        self.assertNotIn("Comment", texts)
+        process = self.glint(f"render sphere.yaml {SIZE} --device all --timing -o two.png", **TWO)
+        self.assertEqual(process.stderr.count("% of the rows in "), 2, process.stderr)
+
+    def test_wrong_lists(self):
+        for devices, pattern in (("0,0", "device 0 .* is listed twice"), ("pthread,0", "device 0 .* is listed twice"),
+                                 ("0,2", 'no usable device matches "2"'), ("0,", 'no usable device matches ""')):
+            self.refuses(f"render sphere.yaml {SIZE} --device {devices}", pattern, **TWO)
+
+    @unittest.skipIf(IS_SANITIZED, "Mesa's drivers leak")
+    def test_three_makes(self):
+        implementations = self.mixed()
+        command = f"render sphere.yaml {SIZE} --precision strict"
+        self.glint(f"{command} -o one.npy", **POCL)
+        self.glint(f"{command} -o all.npy --device all", **implementations)
+        self.assertSameBytes("one.npy", "all.npy")
+        self.glint(f"{command} -o all.png --device all", **implementations)
+        self.assertNotIn("Comment", png_read("all.png")[2])
+        self.glint(f"render sphere.yaml {SIZE} --device all -o mixed.png", **implementations)
+        self.assertEqual(png_read("mixed.png")[2]["Comment"], "rendered by devices that may round differently")
+
+
+if __name__ == "__main__":
+    if not has_device(**POCL):
+        skip_all("PoCL is not installed")
+    main()
