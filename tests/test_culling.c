@@ -83,9 +83,8 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
 static void trial_make(Trial *trial, bool from_eye)
 {
     FlatArray *arrays = trial->flat.arrays;
-    arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, 1);
-    arrays[FLAT_FIRST_SHAPE + KIND_SPHERES] =
-        flat_array_make(FLAT_FIRST_SHAPE + KIND_SPHERES, SPHERES_PER_ORIGIN);
+    flat_array_renew(&trial->flat, FLAT_LIGHTS, 1);
+    flat_array_renew(&trial->flat, FLAT_FIRST_SHAPE + KIND_SPHERES, SPHERES_PER_ORIGIN);
     // elsewhere float's fourth powers of lengths vanish or are infinite, and no sphere is culled
     trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 16));
     Vector3 common_origin =

@@ -553,7 +553,8 @@ static void ids_count_the_triangles(void **state)
     for (uint32_t id = 0; id < 11; id++) {
         uint4 entry = entries[id].kind_index_material;
         assert_int_equal(entry.x, id == 0 || id == 10 ? KIND_SPHERES : KIND_TRIANGLES);
-        assert_int_equal(*flat_id(&flat.arrays[FLAT_FIRST_SHAPE + entry.x], entry.y), id);
+        const FlatArray *array = &flat.arrays[FLAT_FIRST_SHAPE + entry.x];
+        assert_int_equal(*flat_id(array, flat_array_at(array, entry.y)), id);
     }
     compiled_scene_free(&flat);
     scene_free(&scene);

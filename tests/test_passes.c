@@ -87,11 +87,12 @@ static void passes_stop(void **state)
     scene_free(&scene);
 }
 
-static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
+static void check_moved_renderer(bool moves)
 {
-    (void)state;
     Scene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.moves = moves;
+    settings.bvh = BVH_ON;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
     Film film;
@@ -110,14 +111,61 @@ static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
     film_free(&film);
 
     // a camera that does not fit leaves the renderer as it was
+    const Camera camera = scene.camera;
     scene.camera.half_tangent = 1e300;
+    scene.camera.position.x += 1;
     assert_false(renderer_move(renderer, &scene, &settings, &messages));
     assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
     message_list_free(&messages);
     assert_true(renderer_render_film(renderer, AOVS, &film));
     film_assert_same(&film, &expected, "after a camera that does not fit");
     film_free(&film);
+    scene.camera = camera;
+    assert_true(renderer_move(renderer, &scene, &settings, &messages));
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    film_assert_same(&film, &expected, "back from a camera that does not fit");
+    film_free(&film);
     film_free(&expected);
+    renderer_close(renderer);
+    scene_free(&scene);
+}
+
+static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
+{
+    (void)state;
+    check_moved_renderer(false);
+    check_moved_renderer(true);
+}
+
+// Next to a sphere it is defined by its power, in a kernel of its own: an eye that goes to and fro builds
+// each once.
+static void eye_next_to_a_sphere_builds_two_kernels(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("two.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 50}\n"
+                                            "lights: [{point: {position: [0, 9, -9]}}]\n"
+                                            "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125}}]\n");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.extra_features = 0;
+    settings.moves = true;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    uint64_t hashes[4];
+    double build_seconds[4];
+    for (size_t i = 0; i < 4; i++) {
+        scene.camera.position.z = i % 2 ? 0.3749 : -4;
+        assert_true(renderer_move(renderer, &scene, &settings, &messages));
+        Film film, expected = film_render(&probe_compute, &scene, &settings, 0);
+        assert_true(renderer_render_film(renderer, 0, &film));
+        film_assert_same(&film, &expected, "near or far");
+        film_free(&film);
+        film_free(&expected);
+        hashes[i] = renderer_report(renderer)->kernel_hash;
+        build_seconds[i] = renderer_report(renderer)->build_seconds;
+    }
+    assert_true(hashes[0] != hashes[1]);
+    assert_true(hashes[2] == hashes[0] && hashes[3] == hashes[1]);
+    assert_true(build_seconds[1] > build_seconds[0] && build_seconds[3] == build_seconds[1]);
     renderer_close(renderer);
     scene_free(&scene);
 }
@@ -128,6 +176,7 @@ int main(void)
         cmocka_unit_test(passes_give_the_bits_of_one_render),
         cmocka_unit_test(passes_stop),
         cmocka_unit_test(moved_renderer_gives_the_bits_of_a_new_one),
+        cmocka_unit_test(eye_next_to_a_sphere_builds_two_kernels),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

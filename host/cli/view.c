@@ -119,6 +119,7 @@ static int scene_view(ViewOptions *options, Scene *scene, const Device *device)
     window.frames.settings.sample_count = options->sample_count;
     window.frames.settings.bounce_count = options->bounce_count;
     window.frames.settings.shift_to_eye = true;
+    window.frames.settings.moves = true;
     Progress progress;
     progress_open(&progress, true); // for the interrupts
     switch (window_run(&window)) {

@@ -1,4 +1,5 @@
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/compile/bvh_widen.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
@@ -95,7 +96,7 @@ static void array_reorder(CompiledScene *compiled, size_t kind, const Bvh *bvh, 
     free(from);
     ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < array->count; i++)
-        entries[*flat_id(array, i)].kind_index_material.y = (uint32_t)i;
+        entries[*flat_id(array, flat_array_at(array, i))].kind_index_material.y = (uint32_t)i;
 }
 
 // Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
@@ -106,27 +107,44 @@ static Bounds empty_place(const Bounds *bounds)
     return (Bounds){vector_add(bounds->max, extent), vector_subtract(bounds->min, extent)};
 }
 
-static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
-                       const Bounds *empty, unsigned width, void *node)
+// The parts of a node of FLAT_NODES.
+typedef struct {
+    double *planes;
+    uint32_t *child_index, *child_kind;
+    unsigned width;
+} FlatNode;
+
+static FlatNode flat_node_at(const FlatArray *nodes, size_t index)
 {
-    double *planes = node;
-    uint32_t *child_index = (void *)(planes + (size_t)BVH_PLANES * width), *child_kind = child_index + width;
+    const unsigned width = (unsigned)(4 * nodes->layout.scalar4_count / BVH_PLANES);
+    double *planes = flat_array_at(nodes, index);
+    uint32_t *child_index = (void *)(planes + (size_t)BVH_PLANES * width);
+    return (FlatNode){planes, child_index, child_index + width, width};
+}
+
+static void child_box_write(const FlatNode *node, unsigned child, const Bounds *box)
+{
+    const double low[3] = {box->min.x, box->min.y, box->min.z};
+    const double high[3] = {box->max.x, box->max.y, box->max.z};
+    for (unsigned axis = 0; axis < 3; axis++) {
+        node->planes[(BVH_LOW + axis) * node->width + child] = low[axis];
+        node->planes[(BVH_HIGH + axis) * node->width + child] = high[axis];
+    }
+}
+
+static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
+                       const Bounds *empty, const FlatNode *node)
+{
     uint32_t next_node = wide->first_node;
-    for (unsigned i = 0; i < width; i++) {
+    for (unsigned i = 0; i < node->width; i++) {
         const BvhChild *child = i < wide->child_count ? wide->children[i] : NULL;
-        const Bounds *box = child ? &child->box : empty;
-        const double low[3] = {box->min.x, box->min.y, box->min.z};
-        const double high[3] = {box->max.x, box->max.y, box->max.z};
-        for (unsigned axis = 0; axis < 3; axis++) {
-            planes[(BVH_LOW + axis) * width + i] = low[axis];
-            planes[(BVH_HIGH + axis) * width + i] = high[axis];
-        }
+        child_box_write(node, i, child ? &child->box : empty);
         if (child && child->count > 0) {
-            child_index[i] = order[child->first];
-            child_kind[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+            node->child_index[i] = order[child->first];
+            node->child_kind[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
         } else if (child) {
-            child_index[i] = next_node++;
-            child_kind[i] = BVH_NODE;
+            node->child_index[i] = next_node++;
+            node->child_kind[i] = BVH_NODE;
         }
     }
 }
@@ -135,15 +153,16 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, const Bounded *
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
-    FlatArray *nodes = &compiled->arrays[FLAT_NODES];
-    free(nodes->items);
-    *nodes = flat_nodes_make(wide.node_count, width);
+    flat_nodes_renew(compiled, wide.node_count, width);
+    const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     // a visit replaces a node by at most `width` children: a ray from far away meets the empty places, too
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
     uint32_t *order = order_in_kinds(bvh, bounded);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
-    for (size_t i = 0; i < wide.node_count; i++)
-        node_write(&wide.nodes[i], bvh, bounded, order, &empty, width, flat_array_at(nodes, i));
+    for (size_t i = 0; i < wide.node_count; i++) {
+        const FlatNode node = flat_node_at(nodes, i);
+        node_write(&wide.nodes[i], bvh, bounded, order, &empty, &node);
+    }
     free(order);
     bvh_wide_free(&wide);
 }
@@ -169,7 +188,7 @@ static bool bvh_is_wanted(const CompiledScene *compiled, BvhChoice choice)
 
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
 {
-    compiled->arrays[FLAT_NODES] = flat_array_make(FLAT_NODES, 1); // leads nowhere: a kernel may visit it
+    flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
     if (!bvh_is_wanted(compiled, settings->bvh)) return;
     compiled->features |= FEATURE_BVH;
     Bounded bounded;
@@ -185,4 +204,60 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
     bvh_free(&bvh);
     bounded_free(&bounded);
+}
+
+// The boxes of the leaves around their primitives.
+static void leaves_fit(void *context, size_t begin, size_t end)
+{
+    const CompiledScene *compiled = context;
+    for (size_t i = begin; i < end; i++) {
+        const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
+        for (unsigned k = 0; k < node.width; k++) {
+            const size_t kind = node.child_kind[k] & 0xff, count = node.child_kind[k] >> 8;
+            if (count == 0) continue;
+            const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
+            Bounds all = bounds_empty(), box;
+            for (size_t p = node.child_index[k]; p < node.child_index[k] + count; p++)
+                if (primitive_bounds(kind, flat_array_at(array, p), &box)) all = bounds_join(all, box);
+            child_box_write(&node, k, &all);
+        }
+    }
+}
+
+static Bounds node_bounds(const FlatNode *node)
+{
+    Bounds all = bounds_empty();
+    for (unsigned k = 0; k < node->width; k++) {
+        if (node->child_kind[k] == 0) continue;
+        const double *low = node->planes + k, *high = low + (size_t)BVH_HIGH * node->width;
+        const size_t y = node->width, z = 2 * y;
+        all = bounds_join(all, (Bounds){{low[0], low[y], low[z]}, {high[0], high[y], high[z]}});
+    }
+    return all;
+}
+
+void bvh_refit(CompiledScene *compiled)
+{
+    if (!(compiled->features & FEATURE_BVH)) return;
+    const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
+    compiled->changed[FLAT_NODES] = true;
+    parallel_run(nodes->count, FLAT_RANGE_MIN / 16, leaves_fit, compiled);
+    // children come after their parent
+    for (size_t i = nodes->count; i-- > 0;) {
+        const FlatNode node = flat_node_at(nodes, i);
+        for (unsigned k = 0; k < node.width; k++) {
+            if (node.child_kind[k] != BVH_NODE) continue;
+            const FlatNode child = flat_node_at(nodes, node.child_index[k]);
+            const Bounds box = node_bounds(&child);
+            child_box_write(&node, k, &box);
+        }
+    }
+    const FlatNode root = flat_node_at(nodes, 0);
+    compiled->bvh_bounds = node_bounds(&root);
+    const Bounds empty = empty_place(&compiled->bvh_bounds);
+    for (size_t i = 0; i < nodes->count; i++) {
+        const FlatNode node = flat_node_at(nodes, i);
+        for (unsigned k = 0; k < node.width; k++)
+            if (node.child_kind[k] == 0) child_box_write(&node, k, &empty);
+    }
 }

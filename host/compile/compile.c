@@ -8,6 +8,11 @@ const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict"
 
 const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
 
+static Vector3 eye_of(const Scene *scene, const CompileSettings *settings)
+{
+    return settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+}
+
 // The stages of a scene in the device's unit.
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
@@ -16,7 +21,8 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
         !textures_load(compiled, scene, settings, messages))
         return false;
     const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {settings->shift_to_eye ? scene->camera.position : (Vector3){0}, is_double};
+    const Rounding rounding = {eye_of(scene, settings), is_double};
+    compiled->eye = rounding.eye;
     objects_flatten(compiled, scene, &rounding);
     materials_flatten(compiled, scene, &rounding);
     lights_flatten(compiled, scene, &rounding);
@@ -44,4 +50,47 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
     if (!done) compiled_scene_free(compiled);
     compiled->flatten_seconds = clock_seconds() - start - compiled->bvh_seconds;
     return done;
+}
+
+// What depends on the eye.
+static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                     MessageList *messages)
+{
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
+    const Rounding rounding = {eye_of(scene, settings), is_double};
+    compiled->eye = rounding.eye;
+    objects_move(compiled, scene, &rounding);
+    compiled->features |= settings->extra_features;
+    materials_flatten(compiled, scene, &rounding);
+    lights_flatten(compiled, scene, &rounding);
+    if (!numbers_fit(compiled, scene, settings, messages)) return false;
+    double start = clock_seconds();
+    bvh_refit(compiled);
+    compiled->bvh_seconds = clock_seconds() - start;
+    culling_fill(compiled, is_double);
+    if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
+    return true;
+}
+
+bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                MessageList *messages)
+{
+    double start = clock_seconds();
+    const double unit = scene_unit(scene, settings);
+    if (unit != 1 || compiled->unit != 1) {
+        CompiledScene moved;
+        if (!scene_compile(&moved, scene, settings, messages)) return false;
+        compiled_scene_free(compiled);
+        *compiled = moved;
+        return true;
+    }
+    compiled->bvh_seconds = 0;
+    if (!lights_fit(compiled, scene, settings, messages)) return false;
+    const bool is_same_eye = vectors_equal(compiled->eye, eye_of(scene, settings));
+    if (is_same_eye ? !numbers_fit(compiled, scene, settings, messages)
+                    : !eye_move(compiled, scene, settings, messages))
+        return false;
+    header_write(compiled, scene, settings);
+    compiled->flatten_seconds = clock_seconds() - start - compiled->bvh_seconds;
+    return true;
 }

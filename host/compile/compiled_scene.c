@@ -1,6 +1,7 @@
 #include "host/compile/compiled_scene.h"
 
 #include "host/base/fault.h"
+#include "host/base/parallel.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +18,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     SHAPE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
-    // the widest; flat_nodes_make makes them as wide as the kernel's
+    // the widest; flat_nodes_renew makes them as wide as the kernel's
     [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
@@ -29,26 +30,28 @@ static const FlatLayout layouts[FLAT_COUNT] = {
 };
 // clang-format on
 
-static FlatArray array_make(FlatLayout layout, size_t count)
+static void array_renew(CompiledScene *compiled, size_t kind, FlatLayout layout, size_t count)
 {
+    FlatArray *array = &compiled->arrays[kind];
     size_t size = count * layout.size;
-    FlatArray array = {aligned_alloc(64, (size + 127) / 64 * 64), count, layout};
-    if (!array.items) fault("out of memory for %zu flat structs", count);
-    memset(array.items, 0, size);
-    return array;
+    free(array->items);
+    *array = (FlatArray){aligned_alloc(64, (size + 127) / 64 * 64), count, layout};
+    if (!array->items) fault("out of memory for %zu flat structs", count);
+    memset(array->items, 0, size);
+    compiled->changed[kind] = true;
 }
 
-FlatArray flat_array_make(size_t kind, size_t count)
+void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count)
 {
-    return array_make(layouts[kind], count);
+    array_renew(compiled, kind, layouts[kind], count);
 }
 
-FlatArray flat_nodes_make(size_t count, unsigned width)
+void flat_nodes_renew(CompiledScene *compiled, size_t count, unsigned width)
 {
     const FlatLayout widest = layouts[FLAT_NODES];
     const unsigned parts = BVH_WIDTH_MAX / width;
-    return array_make(
-        (FlatLayout){widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts}, count);
+    const FlatLayout layout = {widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts};
+    array_renew(compiled, FLAT_NODES, layout, count);
 }
 
 void *flat_array_at(const FlatArray *array, size_t index)
@@ -57,10 +60,9 @@ void *flat_array_at(const FlatArray *array, size_t index)
 }
 
 // A shape's struct has its id in its first uint4, right behind its scalar4 members.
-uint32_t *flat_id(const FlatArray *array, size_t index)
+uint32_t *flat_id(const FlatArray *array, void *primitive)
 {
-    size_t offset = array->layout.scalar4_count * sizeof(scalar4);
-    return (uint32_t *)(void *)((char *)flat_array_at(array, index) + offset);
+    return (uint32_t *)(void *)((char *)primitive + array->layout.scalar4_count * sizeof(scalar4));
 }
 
 void compiled_scene_free(CompiledScene *compiled)
@@ -79,16 +81,19 @@ size_t flat_array_size(const FlatArray *array, bool is_double)
     return array->count * size;
 }
 
-void flat_array_write(const FlatArray *array, bool is_double, void *target)
+typedef struct {
+    const FlatArray *array;
+    void *target;
+} Narrowing;
+
+static void range_narrow(void *context, size_t begin, size_t end)
 {
-    const FlatLayout *layout = &array->layout;
-    if (is_double) {
-        memcpy(target, array->items, flat_array_size(array, is_double));
-        return;
-    }
-    char *out = target;
-    for (size_t i = 0; i < array->count; i++) {
-        const double *numbers = flat_array_at(array, i);
+    const Narrowing *narrowing = context;
+    const FlatLayout *layout = &narrowing->array->layout;
+    char *out = narrowing->target;
+    out += begin * (4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count);
+    for (size_t i = begin; i < end; i++) {
+        const double *numbers = flat_array_at(narrowing->array, i);
         float *narrow = (float *)(void *)out;
         for (size_t k = 0; k < 4 * layout->scalar4_count; k++)
             narrow[k] = (float)numbers[k];
@@ -96,4 +101,13 @@ void flat_array_write(const FlatArray *array, bool is_double, void *target)
         memcpy(out, numbers + 4 * layout->scalar4_count, sizeof(uint4) * layout->uint4_count);
         out += sizeof(uint4) * layout->uint4_count;
     }
+}
+
+void flat_array_write(const FlatArray *array, bool is_double, void *target)
+{
+    Narrowing narrowing = {array, target};
+    if (is_double)
+        memcpy(target, array->items, flat_array_size(array, is_double));
+    else
+        parallel_run(array->count, FLAT_RANGE_MIN, range_narrow, &narrowing);
 }

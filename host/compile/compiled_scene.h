@@ -40,6 +40,7 @@ typedef struct CompiledTexture {
 
 typedef struct {
     FlatArray arrays[FLAT_COUNT];  // in the order of the kernels' arguments
+    bool changed[FLAT_COUNT];      // since the caller cleared it
     FeatureSet features;           // that the kernels need
     double unit;                   // scene units per unit of length in the arrays, a power of two
     uint32_t pending_children_max; // of the BVH, while a ray visits it; 0 without one
@@ -50,6 +51,7 @@ typedef struct {
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;                   // of these; 0 where there are none
     uint32_t cull_sphere_count;          // of each common origin
+    Vector3 eye;                         // from which the arrays are seen
     Bounds contact;                      // where transparent and opaque primitives may touch
 } CompiledScene;
 
@@ -65,11 +67,15 @@ static inline scalar4 scalar4_of(Vector3 v, double w)
     return (scalar4){v.x, v.y, v.z, w};
 }
 
-FlatArray flat_array_make(size_t kind, size_t count);    // zeroed
-FlatArray flat_nodes_make(size_t count, unsigned width); // of `width` children: a power of two, 4 to 16
+// Replaces an array by one of `count` zeroed structs; nodes have `width` children: a power of two, 4 to 16.
+void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count);
+void flat_nodes_renew(CompiledScene *compiled, size_t count, unsigned width);
 void *flat_array_at(const FlatArray *array, size_t index);
-// The object's id in a shape's struct.
-uint32_t *flat_id(const FlatArray *array, size_t index);
+// The object's id in a shape's struct of this array.
+uint32_t *flat_id(const FlatArray *array, void *primitive);
+
+// Flat structs for which a thread is worthwhile.
+enum { FLAT_RANGE_MIN = 16384 };
 
 // Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
 size_t flat_array_size(const FlatArray *array, bool is_double);

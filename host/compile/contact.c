@@ -109,7 +109,8 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++) {
-            const FlatMaterial *material = &materials[entries[*flat_id(array, i)].kind_index_material.z];
+            const FlatMaterial *material =
+                &materials[entries[*flat_id(array, flat_array_at(array, i))].kind_index_material.z];
             if (transparent != (material->reflection_transmission_ior.y > 0)) continue;
             list->items[list->count] = region_of(kind, flat_array_at(array, i));
             largest = fmax(largest, list->items[list->count++].largest_coordinate);

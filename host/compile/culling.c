@@ -61,11 +61,11 @@ void culling_fill(CompiledScene *compiled, bool is_double)
     }
     if (count > CULL_SPHERES_MAX / (1 + lights->count)) {
         // a kernel's argument all the same
-        compiled->arrays[FLAT_CULL_SPHERES] = flat_array_make(FLAT_CULL_SPHERES, 1);
+        flat_array_renew(compiled, FLAT_CULL_SPHERES, 1);
         return;
     }
     compiled->cull_sphere_count = (uint32_t)count;
-    compiled->arrays[FLAT_CULL_SPHERES] = flat_array_make(FLAT_CULL_SPHERES, count * (1 + lights->count));
+    flat_array_renew(compiled, FLAT_CULL_SPHERES, count * (1 + lights->count));
     CullSphere *row = compiled->arrays[FLAT_CULL_SPHERES].items;
     row_fill(compiled, (Vector3){0, 0, 0}, roundoff, row);
     for (size_t i = 0; i < lights->count; i++)

@@ -8,8 +8,12 @@ typedef struct {
     CompiledScene *compiled;
     const Scene *scene;
     Rounding rounding;
+    void *moved;         // the flat struct to replace, as another eye saw it; NULL: they are appended
+    size_t part;         // of the object: which of a mesh's triangles
+    FeatureSet features; // that primitives need beyond those of their kinds
     size_t counts[KIND_COUNT], normals_count, uvs_count, primitive_count; // so far
 } Flattening;
 
-// Appends a flat struct to its kind's array and gives it the next id, in id.x.
+// Appends a flat struct to its kind's array and gives it the next id, in id.x; or replaces the one that is
+// moved.
 void primitive_add(Flattening *flattening, int kind, const void *primitive, uint32_t material);

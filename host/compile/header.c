@@ -41,6 +41,6 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         counts[kind] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + kind].count;
     memcpy(header.counts, counts, sizeof counts);
     memcpy(header.bvh_counts, compiled->bounded_counts, sizeof compiled->bounded_counts);
-    compiled->arrays[FLAT_HEADER] = flat_array_make(FLAT_HEADER, 1);
+    flat_array_renew(compiled, FLAT_HEADER, 1);
     *(SceneHeader *)compiled->arrays[FLAT_HEADER].items = header;
 }

@@ -14,7 +14,7 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         [LIGHT_DIRECTIONAL] = LIGHT_KIND_DIRECTIONAL,
         [LIGHT_SPOT] = LIGHT_KIND_SPOT,
     };
-    compiled->arrays[FLAT_LIGHTS] = flat_array_make(FLAT_LIGHTS, scene->lights.count);
+    flat_array_renew(compiled, FLAT_LIGHTS, scene->lights.count);
     FlatLight *lights = compiled->arrays[FLAT_LIGHTS].items;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];

@@ -1,6 +1,8 @@
+#include "host/base/parallel.h"
 #include "host/compile/camera_basis.h"
 #include "host/compile/stages.h"
 #include <float.h>
+#include <stdatomic.h>
 
 bool size_fits(const Scene *scene, MessageList *messages)
 {
@@ -37,14 +39,30 @@ static bool vector_fits(Vector3 v, double largest)
     return fabs(v.x) <= largest && fabs(v.y) <= largest && fabs(v.z) <= largest;
 }
 
+typedef struct {
+    const FlatArray *array;
+    double largest;
+    atomic_bool exceeds;
+} ArrayLimit;
+
+static void range_check(void *context, size_t begin, size_t end)
+{
+    ArrayLimit *limit = context;
+    for (size_t i = begin; i < end; i++) {
+        const double *numbers = flat_array_at(limit->array, i);
+        for (size_t k = 0; k < 4 * limit->array->layout.scalar4_count; k++)
+            if (!(fabs(numbers[k]) <= limit->largest)) {
+                atomic_store(&limit->exceeds, true);
+                return;
+            }
+    }
+}
+
 static bool array_fits(const FlatArray *array, double largest)
 {
-    for (size_t i = 0; i < array->count; i++) {
-        const double *numbers = flat_array_at(array, i);
-        for (size_t k = 0; k < 4 * array->layout.scalar4_count; k++)
-            if (!(fabs(numbers[k]) <= largest)) return false;
-    }
-    return true;
+    ArrayLimit limit = {array, largest, false};
+    parallel_run(array->count, FLAT_RANGE_MIN, range_check, &limit);
+    return !limit.exceeds;
 }
 
 bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
@@ -57,7 +75,7 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
                 vector_fits(basis.forward, largest) && vector_fits(basis.right, largest) &&
                 vector_fits(basis.up, largest);
     for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)
-        fits = array_fits(&compiled->arrays[kind], largest);
+        fits = !compiled->changed[kind] || array_fits(&compiled->arrays[kind], largest);
     if (fits) return true;
     message_add(messages, MESSAGE_ERROR,
                 "a number of the scene does not fit precision %s: its magnitude is beyond %s",

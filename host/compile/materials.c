@@ -10,7 +10,7 @@ static uint4 optical_depth_of(double transmission)
 
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
-    compiled->arrays[FLAT_MATERIALS] = flat_array_make(FLAT_MATERIALS, scene->materials.count);
+    flat_array_renew(compiled, FLAT_MATERIALS, scene->materials.count);
     FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *material = &scene->materials.items[i];

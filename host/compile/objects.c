@@ -1,15 +1,24 @@
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
+#include <stdatomic.h>
+#include <stdlib.h>
 #include <string.h>
 
 void primitive_add(Flattening *flattening, int kind, const void *primitive, uint32_t material)
 {
-    const uint32_t id = (uint32_t)flattening->primitive_count++, index = (uint32_t)flattening->counts[kind]++;
+    const uint32_t id = (uint32_t)flattening->primitive_count++;
     FlatArray *array = &flattening->compiled->arrays[FLAT_FIRST_SHAPE + kind];
-    memcpy(flat_array_at(array, index), primitive, array->layout.size);
-    *flat_id(array, index) = id;
-    ObjectEntry *entries = flattening->compiled->arrays[FLAT_OBJECTS].items;
-    entries[id].kind_index_material = (uint4){(uint32_t)kind, index, material, 0};
+    void *target = flattening->moved;
+    if (!target) {
+        const uint32_t index = (uint32_t)flattening->counts[kind]++;
+        ObjectEntry *entries = flattening->compiled->arrays[FLAT_OBJECTS].items;
+        entries[id].kind_index_material = (uint4){(uint32_t)kind, index, material, 0};
+        target = flat_array_at(array, index);
+    }
+    memcpy(target, primitive, array->layout.size);
+    *flat_id(array, target) = id;
 }
 
 static void arrays_make(CompiledScene *compiled, const Scene *scene)
@@ -26,10 +35,10 @@ static void arrays_make(CompiledScene *compiled, const Scene *scene)
         if (mesh && mesh->uvs && scene->textures.count > 0) uvs_count += count;
     }
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        compiled->arrays[FLAT_FIRST_SHAPE + kind] = flat_array_make(FLAT_FIRST_SHAPE + kind, counts[kind]);
-    compiled->arrays[FLAT_TRIANGLE_NORMALS] = flat_array_make(FLAT_TRIANGLE_NORMALS, normals_count);
-    compiled->arrays[FLAT_TRIANGLE_UVS] = flat_array_make(FLAT_TRIANGLE_UVS, uvs_count);
-    compiled->arrays[FLAT_OBJECTS] = flat_array_make(FLAT_OBJECTS, scene_primitive_count(scene));
+        flat_array_renew(compiled, FLAT_FIRST_SHAPE + kind, counts[kind]);
+    flat_array_renew(compiled, FLAT_TRIANGLE_NORMALS, normals_count);
+    flat_array_renew(compiled, FLAT_TRIANGLE_UVS, uvs_count);
+    flat_array_renew(compiled, FLAT_OBJECTS, scene_primitive_count(scene));
 }
 
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
@@ -38,8 +47,62 @@ void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding
     Flattening flattening = {.compiled = compiled, .scene = scene, .rounding = *rounding};
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        shape_ops[object->kind]->flatten(&flattening, object);
+        const size_t count = object_primitive_count(scene, object);
+        for (flattening.part = 0; flattening.part < count; flattening.part++)
+            shape_ops[object->kind]->flatten(&flattening, object);
     }
+    compiled->features |= flattening.features;
     compiled->arrays[FLAT_TRIANGLE_NORMALS].count = flattening.normals_count;
     compiled->arrays[FLAT_TRIANGLE_UVS].count = flattening.uvs_count;
+}
+
+typedef struct {
+    Flattening flattening;
+    const FlatArray *array;    // that is being moved
+    const uint32_t *first_ids; // of each object's primitives, and behind the last
+    _Atomic FeatureSet features;
+} Move;
+
+// In the order of the array, so that memory is written one after the other.
+static void range_move(void *context, size_t begin, size_t end)
+{
+    Move *move = context;
+    Flattening flattening = move->flattening;
+    const Scene *scene = flattening.scene;
+    const uint32_t *first_ids = move->first_ids;
+    size_t object = 0; // neighbors are mostly of the same
+    for (size_t i = begin; i < end; i++) {
+        flattening.moved = flat_array_at(move->array, i);
+        const uint32_t id = *flat_id(move->array, flattening.moved);
+        if (id < first_ids[object] || id >= first_ids[object + 1]) {
+            size_t low = 0, high = scene->objects.count;
+            while (high - low > 1) {
+                size_t middle = (low + high) / 2;
+                *(first_ids[middle] <= id ? &low : &high) = middle;
+            }
+            object = low;
+        }
+        flattening.primitive_count = id;
+        flattening.part = id - first_ids[object];
+        const Object *of_id = &scene->objects.items[object];
+        shape_ops[of_id->kind]->flatten(&flattening, of_id);
+    }
+    atomic_fetch_or(&move->features, flattening.features);
+}
+
+void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
+{
+    uint32_t *first_ids = memory_allocate(scene->objects.count + 1, sizeof *first_ids);
+    first_ids[0] = 0;
+    for (size_t i = 0; i < scene->objects.count; i++)
+        first_ids[i + 1] = first_ids[i] + (uint32_t)object_primitive_count(scene, &scene->objects.items[i]);
+    Move move = {.flattening = {.compiled = compiled, .scene = scene, .rounding = *rounding},
+                 .first_ids = first_ids};
+    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
+        move.array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
+        compiled->changed[FLAT_FIRST_SHAPE + kind] = true;
+        parallel_run(move.array->count, FLAT_RANGE_MIN, range_move, &move);
+    }
+    free(first_ids);
+    compiled->features = (compiled->features & ~(FeatureSet)FEATURE_EYE_POWERS) | move.features;
 }

@@ -2,17 +2,48 @@
 #pragma once
 
 #include "host/compile/compiled_scene.h"
+#include <string.h>
 
 typedef struct {
     Vector3 eye;
     bool is_double; // the kernel's precision is double: numbers stay
 } Rounding;
 
-double rounded(const Rounding *rounding, double value);
-Vector3 vector_rounded(const Rounding *rounding, Vector3 v);
-Vector3 point_from_eye(const Rounding *rounding, Vector3 point);
+// GCC 12 at -O2 drops a conversion to float and back where it merges stores (-ftree-slp-vectorize); volatile
+// keeps it.
+static inline double rounded(const Rounding *rounding, double value)
+{
+    if (rounding->is_double) return value;
+    volatile float narrow = (float)value;
+    return narrow;
+}
+
+static inline Vector3 vector_rounded(const Rounding *rounding, Vector3 v)
+{
+    return (Vector3){rounded(rounding, v.x), rounded(rounding, v.y), rounded(rounding, v.z)};
+}
+
+static inline Vector3 point_from_eye(const Rounding *rounding, Vector3 point)
+{
+    return vector_rounded(rounding, vector_subtract(point, rounding->eye));
+}
 
 // The same direction, scaled by a power of two so that its largest component lies in 1/2..1: exact.
-Vector3 axis_scaled(Vector3 axis);
+static inline Vector3 axis_scaled(Vector3 axis)
+{
+    const double largest = vector_largest(axis);
+    if (!(largest > 0x1p-1000 && largest < 0x1p1000)) { // the power of two may not be a double
+        int exponent;
+        frexp(largest, &exponent);
+        return (Vector3){ldexp(axis.x, -exponent), ldexp(axis.y, -exponent), ldexp(axis.z, -exponent)};
+    }
+    uint64_t bits;
+    memcpy(&bits, &largest, sizeof bits);
+    bits = (2045 - (bits >> 52)) << 52; // biased exponents
+    double scale;
+    memcpy(&scale, &bits, sizeof scale);
+    return vector_scale(axis, scale);
+}
+
 // A plane's normal, not unit, and in w one over its length.
 scalar4 normal_and_inverse_length(const Rounding *rounding, Vector3 normal);

@@ -22,7 +22,7 @@ typedef struct {
     void (*restore)(Object *object);
     // False where it is unbounded, and *bounds stays.
     bool (*bounds)(const Scene *scene, const Object *object, Bounds *bounds);
-    // Adds its primitives (host/compile/flatten.h).
+    // Adds the primitive that `part` says (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
 
     // What a random one can be, up to the first NULL.

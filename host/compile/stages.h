@@ -24,16 +24,22 @@ bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSet
 // objects.c, materials.c, lights.c: the arrays of each shape, FLAT_TRIANGLE_NORMALS, FLAT_TRIANGLE_UVS,
 // FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS.
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
+// The arrays of each shape as another eye sees them, in their order; FEATURE_EYE_POWERS.
+void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 
-// limits.c: false with a message where a number overflows the precision.
+// limits.c: false with a message where a number of the camera, or of an array that has changed, overflows the
+// precision.
 bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                  MessageList *messages);
 
 // bvh_flatten.c: builds the BVH (bvh.c), widens it for the kernel's lanes (bvh_widen.c) and fills FLAT_NODES;
 // orders each shape's array as the leaves have it, unbounded shapes last. Without a BVH, one empty node.
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
+
+// The same tree, with boxes around the primitives as they are now.
+void bvh_refit(CompiledScene *compiled);
 
 // culling.c: FLAT_CULL_SPHERES, of the BVH and of each primitive outside it; none where they would be more
 // than a million. `is_double`: the kernel's precision is double.

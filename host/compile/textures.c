@@ -143,8 +143,8 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
 
 static void levels_flatten(CompiledScene *compiled, const LevelList *list)
 {
-    compiled->arrays[FLAT_TEXTURE_LEVELS] = flat_array_make(FLAT_TEXTURE_LEVELS, list->levels.count);
-    compiled->arrays[FLAT_TEXELS] = flat_array_make(FLAT_TEXELS, list->texel_count);
+    flat_array_renew(compiled, FLAT_TEXTURE_LEVELS, list->levels.count);
+    flat_array_renew(compiled, FLAT_TEXELS, list->texel_count);
     TextureLevel *levels = compiled->arrays[FLAT_TEXTURE_LEVELS].items;
     Texel *texels = compiled->arrays[FLAT_TEXELS].items;
     uint32_t first = 0;

@@ -146,6 +146,21 @@ bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *byte
                        clEnqueueWriteBuffer(compute->queue, buffer, CL_TRUE, 0, size, bytes, 0, NULL, NULL));
 }
 
+void *buffer_map(Compute *compute, cl_mem buffer, size_t size)
+{
+    if (!compute_ok(compute)) return NULL;
+    cl_int status;
+    fault_note_call("clEnqueueMapBuffer");
+    void *mapped = clEnqueueMapBuffer(compute->queue, buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0,
+                                      size ? size : 1, 0, NULL, NULL, &status);
+    return compute_check_object(compute, mapped, status, "clEnqueueMapBuffer") ? mapped : NULL;
+}
+
+void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped)
+{
+    compute_try(compute, clEnqueueUnmapMemObject(compute->queue, buffer, mapped, 0, NULL, NULL));
+}
+
 // The largest type of OpenCL C has 128 bytes, and no device requires more alignment than that.
 enum { BUFFER_ALIGNMENT = 128, LARGE_PAGE = 1 << 21 };
 

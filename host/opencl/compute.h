@@ -89,6 +89,10 @@ void buffer_release(cl_mem buffer); // accepts NULL
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
+// Memory to which to write all of a buffer's new contents; NULL: failed. buffer_write_mapped hands them over.
+void *buffer_map(Compute *compute, cl_mem buffer, size_t size);
+void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
+
 // Memory for a buffer's contents, at least `size` bytes, to be passed to buffer_take. Large contents use
 // large pages where the system has them, which spares a CPU that reads them at random most address
 // translations.

@@ -161,10 +161,10 @@ static void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, cons
 // else a float copy, which the caller frees.
 static void *lengths_restored(const Renderer *renderer, void *lengths, size_t count)
 {
-    if (renderer->unit == 1) return lengths;
+    if (renderer->compiled.unit == 1) return lengths;
     float *restored = memory_allocate(count, sizeof *restored);
     for (size_t i = 0; i < count; i++)
-        restored[i] = ((const float *)lengths)[i] * (float)renderer->unit;
+        restored[i] = ((const float *)lengths)[i] * (float)renderer->compiled.unit;
     return restored;
 }
 

@@ -64,25 +64,45 @@ static bool device_has_room(const CompiledScene *compiled, const Device *device,
     return false;
 }
 
-// Frees each host array after its upload, so that the scene is never in memory twice. Textures that are on
-// the device stay there.
-static void upload(Renderer *renderer, CompiledScene *compiled)
+// Whether scene_move leaves an array as it is, and does not read it.
+static bool is_without_eye(size_t kind)
 {
-    bool is_double = renderer->report.is_double;
+    return kind == FLAT_TRIANGLE_NORMALS || kind == FLAT_TRIANGLE_UVS || kind == FLAT_TEXTURE_LEVELS ||
+           kind == FLAT_TEXELS;
+}
+
+static void array_upload(Renderer *renderer, size_t kind)
+{
+    Compute *compute = renderer->compute;
+    const FlatArray *array = &renderer->compiled.arrays[kind];
+    const bool is_double = renderer->report.is_double;
+    const size_t size = flat_array_size(array, is_double);
+    if (renderer->arrays[kind] && renderer->array_sizes[kind] == size) {
+        void *mapped = buffer_map(compute, renderer->arrays[kind], size);
+        if (!mapped) return;
+        flat_array_write(array, is_double, mapped);
+        buffer_write_mapped(compute, renderer->arrays[kind], mapped);
+        return;
+    }
+    void *bytes = buffer_bytes_allocate(size);
+    flat_array_write(array, is_double, bytes);
+    buffer_release(renderer->arrays[kind]);
+    renderer->arrays[kind] = buffer_take(compute, size, bytes);
+    renderer->array_sizes[kind] = size;
+}
+
+// The arrays that have changed. Frees each host array after its upload, so that the scene is never in memory
+// twice, unless the renderer moves.
+static void upload(Renderer *renderer)
+{
+    CompiledScene *compiled = &renderer->compiled;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        bool is_kept = (kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS) && renderer->textures;
-        if (is_kept) continue;
-        size_t size = flat_array_size(&compiled->arrays[kind], is_double);
-        void *bytes = buffer_bytes_allocate(size);
-        flat_array_write(&compiled->arrays[kind], is_double, bytes);
+        if (compiled->changed[kind]) array_upload(renderer, kind);
+        compiled->changed[kind] = false;
+        if (renderer->settings.moves && !is_without_eye(kind)) continue;
         free(compiled->arrays[kind].items);
         compiled->arrays[kind].items = NULL;
-        buffer_release(renderer->arrays[kind]);
-        renderer->arrays[kind] = buffer_take(renderer->compute, size, bytes);
     }
-    free(renderer->textures);
-    renderer->textures = compiled->textures;
-    compiled->textures = NULL;
 }
 
 static void offsets_upload(Renderer *renderer)
@@ -101,6 +121,21 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
         kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
 }
 
+// For the first time, or for another camera. False with a message.
+static bool compile(Renderer *renderer, const Scene *scene, const CompileSettings *settings,
+                    MessageList *messages)
+{
+    CompiledScene *compiled = &renderer->compiled;
+    if (renderer->settings.moves) return scene_move(compiled, scene, settings, messages);
+    CompiledScene fresh;
+    if (!scene_compile(&fresh, scene, settings, messages)) return false;
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
+    const bool has_room = device_has_room(&fresh, renderer->compute->device, is_double, messages);
+    compiled_scene_free(has_room ? compiled : &fresh);
+    if (has_room) *compiled = fresh;
+    return has_room;
+}
+
 // Compiles and uploads the scene. False, with nothing changed, as renderer_open.
 static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                        MessageList *messages)
@@ -117,30 +152,21 @@ static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSetti
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
-        .textures = renderer->textures,
+        .textures = renderer->compiled.textures,
     };
-    CompiledScene compiled;
-    if (!scene_compile(&compiled, scene, &compile_settings, messages)) return false;
-    if (!device_has_room(&compiled, device, is_double, messages)) {
-        compiled_scene_free(&compiled);
-        return false;
-    }
+    if (!compile(renderer, scene, &compile_settings, messages)) return false;
+    const CompiledScene *compiled = &renderer->compiled;
     renderer->settings = *settings;
     renderer->light_count = scene->lights.count;
-    renderer->unit = compiled.unit;
-    renderer->pending_children_max = compiled.pending_children_max;
-    renderer->report.features = compiled.features;
+    renderer->report.features = compiled->features;
     renderer->report.lanes = compile_settings.lanes;
     renderer->report.is_double = is_double;
-    renderer->report.flatten_seconds = compiled.flatten_seconds;
-    renderer->report.bvh_seconds = compiled.bvh_seconds;
+    renderer->report.flatten_seconds = compiled->flatten_seconds;
+    renderer->report.bvh_seconds = compiled->bvh_seconds;
     double start = clock_seconds();
-    upload(renderer, &compiled);
+    upload(renderer);
     offsets_upload(renderer);
-    for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
-        if (renderer->kernels[kind].kernel) scene_arguments_set(renderer, renderer->kernels[kind].kernel);
     renderer->report.upload_seconds = clock_seconds() - start;
-    compiled_scene_free(&compiled);
     return compute_ok(renderer->compute);
 }
 
@@ -160,22 +186,22 @@ static uint32_t pending_max(const Renderer *renderer)
     return capacity_for(renderer->settings.bounce_count, 8);
 }
 
-static void kernels_close(Renderer *renderer)
+static void variant_close(Renderer *renderer, KernelVariant *variant)
 {
     for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
-        KernelSlot *slot = &renderer->kernels[kind];
+        KernelSlot *slot = &variant->kernels[kind];
         if (slot->kernel) {
             // it has been launched: its program's binary holds finished machine code
             program_store(renderer->compute, &slot->request, &slot->program);
             clReleaseKernel(slot->kernel);
         }
         program_close(&slot->program);
-        *slot = (KernelSlot){0};
     }
+    text_free(&variant->prelude);
+    *variant = (KernelVariant){0};
 }
 
-// The definitions and compiler options that distinguish the variants of the kernels. Kernels of another
-// variant are closed.
+// The definitions and compiler options that distinguish the variants of the kernels.
 static void variant_set(Renderer *renderer)
 {
     Precision precision = renderer->settings.precision;
@@ -195,24 +221,30 @@ static void variant_set(Renderer *renderer)
     text_appendf(text, "#define HAS_FMA %d\n", has_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
     // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
-    text_appendf(text, "#define STACK_CAPACITY %u\n", capacity_for(renderer->pending_children_max, 40));
+    text_appendf(text, "#define STACK_CAPACITY %u\n",
+                 capacity_for(renderer->compiled.pending_children_max, 40));
     text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
     text_appendf(text, "#define PERTURB %d\n", seed != 0);
     text_appendf(text, "#define PERTURB_SEED %uu\n", seed);
     text_appendf(text, "#define PERTURB_SCALE %u\n", scale > 0 ? scale : 1);
     features_write_prelude(text, renderer->report.features);
-    if (strcmp(text_c(&prelude), text_c(&renderer->prelude)) == 0) {
-        text_free(&prelude);
-        return;
+    if (strcmp(text_c(&prelude), text_c(&renderer->variant.prelude)) != 0) {
+        const KernelVariant variant = renderer->variant;
+        renderer->variant = renderer->other_variant;
+        renderer->other_variant = variant;
     }
-    kernels_close(renderer);
-    text_free(&renderer->prelude);
-    renderer->prelude = prelude;
-
-    renderer->options = "-cl-std=CL1.2";
-    if (precision == PRECISION_FAST) renderer->options = "-cl-std=CL1.2 -cl-fast-relaxed-math";
-    if (precision == PRECISION_STRICT && correct)
-        renderer->options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
+    if (strcmp(text_c(&prelude), text_c(&renderer->variant.prelude)) == 0) {
+        text_free(&prelude);
+    } else {
+        variant_close(renderer, &renderer->variant);
+        renderer->variant = (KernelVariant){.prelude = prelude, .options = "-cl-std=CL1.2"};
+        if (precision == PRECISION_FAST) renderer->variant.options = "-cl-std=CL1.2 -cl-fast-relaxed-math";
+        if (precision == PRECISION_STRICT && correct)
+            renderer->variant.options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
+    }
+    for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
+        if (renderer->variant.kernels[kind].kernel)
+            scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
 }
 
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
@@ -244,12 +276,12 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
 void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
-    kernels_close(renderer);
+    variant_close(renderer, &renderer->variant);
+    variant_close(renderer, &renderer->other_variant);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
         buffer_release(renderer->arrays[kind]);
     buffer_release(renderer->offsets);
-    free(renderer->textures);
-    text_free(&renderer->prelude);
+    compiled_scene_free(&renderer->compiled);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
     free(renderer);
@@ -262,7 +294,7 @@ size_t renderer_scalar_size(const Renderer *renderer)
 
 char *renderer_kernel_text(const Renderer *renderer)
 {
-    return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&renderer->prelude));
+    return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&renderer->variant.prelude));
 }
 
 uint64_t renderer_kernel_hash(const Renderer *renderer)
@@ -275,17 +307,21 @@ uint64_t renderer_kernel_hash(const Renderer *renderer)
 
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
 {
-    KernelSlot *slot = &renderer->kernels[kind];
-    if (slot->kernel) return slot->kernel;
+    KernelSlot *slot = &renderer->variant.kernels[kind];
+    // AOV kernels do not change the hash that identifies an image
+    const bool is_of_image = kind != KERNEL_AOV && kind != KERNEL_PATH;
+    if (slot->kernel) {
+        if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
+        return slot->kernel;
+    }
     slot->request = (ProgramRequest){
         .root = kernel_sources[kind].file,
-        .prelude = text_c(&renderer->prelude),
-        .options = renderer->options,
+        .prelude = text_c(&renderer->variant.prelude),
+        .options = renderer->variant.options,
         .no_cache = renderer->settings.no_cache,
     };
     program_build(renderer->compute, &slot->request, &slot->program);
-    // AOV kernels do not change the hash that identifies an image
-    if (kind != KERNEL_AOV && kind != KERNEL_PATH) renderer->report.kernel_hash = slot->program.text_hash;
+    if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
     slot->kernel = program_kernel(renderer->compute, &slot->program, kernel_sources[kind].name);
@@ -296,7 +332,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
 LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
                            const size_t *group)
 {
-    KernelSlot *slot = &renderer->kernels[kind];
+    KernelSlot *slot = &renderer->variant.kernels[kind];
     LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, items, group);
     array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
     return time;

@@ -24,6 +24,7 @@ typedef struct {
     uint32_t perturb_scale;    // multiplies that error, up to PERTURB_SCALE_MAX; 0: 1
     FeatureSet extra_features; // built in beyond the scene's own, for tests
     bool shift_to_eye;         // the eye is the origin, for images; false for explicit rays
+    bool moves;                // the flat arrays stay in the host's memory, so that renderer_move is fast
     bool no_cache;
     double band_seconds; // target duration of a launch; 0: 0.1
     bool (*stop)(void);  // called between launches; true ends the render; NULL: never

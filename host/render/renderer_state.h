@@ -12,19 +12,24 @@ typedef struct {
     cl_kernel kernel; // NULL until first requested
 } KernelSlot;
 
+// Kernels with the same definitions before their text.
+typedef struct {
+    Text prelude;
+    const char *options;
+    KernelSlot kernels[KERNEL_COUNT];
+} KernelVariant;
+
 struct Renderer {
     Compute *compute;
     RenderSettings settings;
     RenderReport report;
-    Text prelude;
-    const char *options;
+    CompiledScene compiled; // without the arrays that are only on the device
     cl_mem arrays[FLAT_COUNT];
-    CompiledTexture *textures; // of the scene, once uploaded
-    cl_mem offsets;            // of a pixel's samples
+    size_t array_sizes[FLAT_COUNT];
+    cl_mem offsets; // of a pixel's samples
     size_t light_count;
-    double unit;                   // scene lengths per device length, a power of two
-    uint32_t pending_children_max; // of the BVH
-    KernelSlot kernels[KERNEL_COUNT];
+    // The one in use, and the one before: near a sphere a moving eye goes to and fro between two.
+    KernelVariant variant, other_variant;
 };
 
 size_t renderer_scalar_size(const Renderer *renderer);

@@ -52,7 +52,7 @@ static TraceHit hit_at(const void *scalars, size_t index, bool is_double, uint32
 static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t count)
 {
     bool is_double = renderer->report.is_double;
-    double unit = renderer->unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
+    double unit = renderer->compiled.unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
     void *scalars = memory_allocate((size_t)count * RAY_SCALARS, renderer_scalar_size(renderer));
     for (uint32_t i = 0; i < count; i++) {
         const double *origin = rays[i].origin, *direction = rays[i].direction;
@@ -84,8 +84,8 @@ static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_m
     const void *result = renderer_map(renderer, results, result_size);
     const uint32_t *object = renderer_map(renderer, objects, (size_t)count * sizeof *object);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
-        hits[i] =
-            hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i], renderer->unit);
+        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i],
+                         renderer->compiled.unit);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     compute_try(compute, clFinish(compute->queue));

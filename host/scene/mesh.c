@@ -30,11 +30,6 @@ static uint64_t vector_hash(uint64_t hash, Vector3 v)
     return hash_mix(hash_mix(hash_mix(hash, v.x), v.y), v.z);
 }
 
-static bool vectors_equal(Vector3 a, Vector3 b)
-{
-    return a.x == b.x && a.y == b.y && a.z == b.z;
-}
-
 static uint64_t vertex_hash(const Mesh *mesh, size_t index)
 {
     uint64_t hash = vector_hash(0, mesh->vertices[index]);

@@ -76,6 +76,11 @@ static inline bool vector_is_zero(Vector3 a)
     return a.x == 0 && a.y == 0 && a.z == 0;
 }
 
+static inline bool vectors_equal(Vector3 a, Vector3 b)
+{
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
 // The world axis least aligned with a direction, the first of x, y, z where several are.
 static inline Vector3 vector_least_aligned_axis(Vector3 direction)
 {

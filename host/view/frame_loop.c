@@ -166,11 +166,6 @@ static void distances_fill(FrameLoop *loop)
     numbers_narrow(loop->frame.distances, loop->film.t, count);
 }
 
-static bool vectors_equal(Vector3 a, Vector3 b)
-{
-    return a.x == b.x && a.y == b.y && a.z == b.z;
-}
-
 static bool cameras_equal(const Camera *a, const Camera *b)
 {
     return vectors_equal(a->position, b->position) && vectors_equal(a->look_at, b->look_at) &&

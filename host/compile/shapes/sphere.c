@@ -45,7 +45,7 @@ static void sphere_take_power(Sphere *sphere, Flattening *flattening, const Obje
     const double roundoff = (rounding->is_double ? DBL_EPSILON : FLT_EPSILON) / 2;
     const double power = rounded(rounding, eye.power);
     if (!(eye.moved > 4 * roundoff * distance) || !isfinite(power)) return;
-    flattening->compiled->features |= FEATURE_EYE_POWERS;
+    flattening->features |= FEATURE_EYE_POWERS;
     sphere->id.y |= SPHERE_HAS_POWER;
     const float single = (float)power;
     if (!rounding->is_double) {

@@ -1,29 +1,33 @@
 // Triangles, alone and in meshes.
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF // gcc's default: one result with and without instructions for fma
+#endif
 #include "host/compile/shapes.h"
 #include "host/compile/texture_mapping.h"
 
 // a b - c d to 1.5 ulp (Kahan's; Jeannerod, Louvet, Muller, Further analysis of Kahan's algorithm for the
 // accurate computation of 2x2 determinants, Mathematics of Computation 82, 2013).
-static double product_difference(double a, double b, double c, double d)
+static inline __attribute__((always_inline)) double product_difference(double a, double b, double c, double d)
 {
     double cd = c * d;
     return fma(a, b, -cd) + fma(-c, d, cd);
 }
 
-static Vector3 cross_product(Vector3 a, Vector3 b)
+static inline __attribute__((always_inline)) Vector3 cross_product(Vector3 a, Vector3 b)
 {
     return (Vector3){product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),
                      product_difference(a.x, b.y, a.y, b.x)};
 }
 
-static bool has_area(Vector3 a, Vector3 b, Vector3 c)
+static inline bool has_area(Vector3 a, Vector3 b, Vector3 c)
 {
     return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
 }
 
 // One without area shrinks to a point, which no ray meets: the kernels rotate vertices, and what was a line
 // could then have an area. One that loses its area in rounding stays: it fills what its neighbors leave open.
-static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
+static inline __attribute__((always_inline)) Triangle triangle_of(const Rounding *rounding, Vector3 a,
+                                                                  Vector3 b, Vector3 c)
 {
     if (!has_area(a, b, c)) b = c = a;
     Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
@@ -36,6 +40,23 @@ static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Ve
     Vector3 normal = vector_rounded(rounding, axis_scaled(cross_product(ab, ac)));
     return (Triangle){
         scalar4_of(seen_a, normal.x), scalar4_of(seen_b, normal.y), scalar4_of(seen_c, normal.z), {0}};
+}
+
+// The same with instructions for fma, where the processor has them: a call takes as long as the rest.
+#ifdef __x86_64__
+__attribute__((target("fma"))) static Triangle triangle_of_fma(const Rounding *rounding, Vector3 a, Vector3 b,
+                                                               Vector3 c)
+{
+    return triangle_of(rounding, a, b, c);
+}
+#endif
+
+static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("fma")) return triangle_of_fma(rounding, a, b, c);
+#endif
+    return triangle_of(rounding, a, b, c);
 }
 
 // What a triangle's id.y holds; a triangle with a vertex without a normal is flat.
@@ -62,7 +83,9 @@ static void triangle_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
     Triangle triangle = triangle_make(&flattening->rounding, vertices[0], vertices[1], vertices[2]);
-    if (object->as.triangle.smooth)
+    if (flattening->moved)
+        triangle.id = ((const Triangle *)flattening->moved)->id;
+    else if (object->as.triangle.smooth)
         triangle.id.y = normals_add(flattening, vector_normalize(normals[0]), vector_normalize(normals[1]),
                                     vector_normalize(normals[2]));
     primitive_add(flattening, KIND_TRIANGLES, &triangle, object->material);
@@ -72,17 +95,19 @@ static void mesh_flatten(Flattening *flattening, const Object *object)
 {
     const Mesh *mesh = &flattening->scene->meshes.items[object->as.mesh.index];
     const Vector3 *vertices = mesh->vertices, *normals = mesh->normals;
-    for (size_t i = 0; i < mesh->triangle_count; i++) {
-        const uint32_t *corners = mesh->triangles[i];
-        const uint32_t material = mesh->materials ? mesh->materials[i] : object->material;
-        Triangle triangle = triangle_make(&flattening->rounding, vertices[corners[0]], vertices[corners[1]],
-                                          vertices[corners[2]]);
+    const uint32_t *corners = mesh->triangles[flattening->part];
+    const uint32_t material = mesh->materials ? mesh->materials[flattening->part] : object->material;
+    Triangle triangle = triangle_make(&flattening->rounding, vertices[corners[0]], vertices[corners[1]],
+                                      vertices[corners[2]]);
+    if (flattening->moved) {
+        triangle.id = ((const Triangle *)flattening->moved)->id;
+    } else {
         if (normals)
             triangle.id.y =
                 normals_add(flattening, normals[corners[0]], normals[corners[1]], normals[corners[2]]);
         triangle.id.z = uvs_add(flattening, mesh, corners, material);
-        primitive_add(flattening, KIND_TRIANGLES, &triangle, material);
     }
+    primitive_add(flattening, KIND_TRIANGLES, &triangle, material);
 }
 
 static bool triangle_bounds(const Scene *scene, const Object *object, Bounds *bounds)

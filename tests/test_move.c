@@ -1,0 +1,248 @@
+// A scene that was compiled for one eye and moved to another has the numbers of one compiled for the other.
+#include "host/base/array.h"
+#include "host/base/parallel.h"
+#include "host/compile/compile.h"
+#include "host/compile/random_shape.h"
+#include "host/compile/shapes.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { OBJECTS = 3 * FLAT_RANGE_MIN }; // of them some kinds are moved by several threads
+
+static const char scene_text[] =
+    "camera: {position: [1, 2, -40], look_at: [0, 0, 0], fov: 50}\n"
+    "lights: [{point: {position: [0, 30, -20]}}, {spot: {position: [9, 9, 9], look_at: [0, 0, 0], angle: "
+    "20}}]\n"
+    "objects:\n"
+    "  - plane: {point: [0, -9, 0], normal: [0, 1, 0], material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], "
+    "size: 2}}}\n"
+    "  - cylinder: {from: [0, 0, 0], to: [0, 1, 0], radius: 0.5}\n"
+    "  - sphere: {center: [0, -6371000, 0], radius: 6370990, material: {transmission: 0.5}}\n"
+    "  - mesh: {file: scenes/meshes/bunny.obj, smooth: true}\n"
+    "  - mesh: {file: tests/textures/quad.obj, material: {image: scenes/images/globe.png}}\n";
+
+static Scene scene_make(void)
+{
+    Scene scene = scene_of_text("move.yaml", scene_text);
+    ShapeForm forms[SHAPE_FORMS_MAX];
+    const size_t form_count = shape_forms(forms);
+    Random random = {19};
+    for (size_t i = 0; i < OBJECTS; i++) {
+        // of some kinds many, so that they are moved by several threads
+        const ShapeForm *form = &forms[i % 2 ? random_bits(&random) % form_count : (i / 2) % 2];
+        array_push(scene.objects, random_shape(form, &random).object);
+    }
+    return scene;
+}
+
+static const CompileSettings single = {.width = 40,
+                                       .height = 30,
+                                       .sample_count = 1,
+                                       .precision = PRECISION_SINGLE,
+                                       .lanes = 8,
+                                       .shift_to_eye = true};
+
+static CompiledScene compiled_make(const Scene *scene, const CompileSettings *settings)
+{
+    CompiledScene compiled;
+    MessageList messages = {0};
+    assert_true(scene_compile(&compiled, scene, settings, &messages));
+    return compiled;
+}
+
+static uint4 entry_of(const CompiledScene *compiled, size_t id)
+{
+    return ((const ObjectEntry *)compiled->arrays[FLAT_OBJECTS].items)[id].kind_index_material;
+}
+
+static void check_array(const CompiledScene *moved, const CompiledScene *expected, size_t kind)
+{
+    const FlatArray *got = &moved->arrays[kind], *wanted = &expected->arrays[kind];
+    assert_int_equal(got->count, wanted->count);
+    assert_memory_equal(got->items, wanted->items, got->count * got->layout.size);
+}
+
+// Everything but the order of primitives, and the BVH.
+static void check_numbers(const CompiledScene *moved, const CompiledScene *expected)
+{
+    assert_int_equal(moved->features, expected->features);
+    for (size_t kind = FLAT_HEADER; kind < FLAT_COUNT; kind++)
+        if (kind < FLAT_FIRST_SHAPE ||
+            (kind >= FLAT_TRIANGLE_NORMALS && kind != FLAT_NODES && kind != FLAT_OBJECTS))
+            check_array(moved, expected, kind);
+    for (size_t id = 0; id < expected->arrays[FLAT_OBJECTS].count; id++) {
+        const uint4 got = entry_of(moved, id), wanted = entry_of(expected, id);
+        assert_int_equal(got.x, wanted.x);
+        assert_int_equal(got.z, wanted.z);
+        const FlatArray *array = &moved->arrays[FLAT_FIRST_SHAPE + got.x];
+        assert_memory_equal(flat_array_at(array, got.y),
+                            flat_array_at(&expected->arrays[FLAT_FIRST_SHAPE + got.x], wanted.y),
+                            array->layout.size);
+    }
+}
+
+typedef struct {
+    const double *planes;
+    const uint32_t *child_index, *child_kind;
+} Node;
+
+static Node node_at(const CompiledScene *compiled, size_t index)
+{
+    const double *planes = flat_array_at(&compiled->arrays[FLAT_NODES], index);
+    const uint32_t *child_index = (const void *)(planes + (size_t)BVH_PLANES * single.lanes);
+    return (Node){planes, child_index, child_index + single.lanes};
+}
+
+// The box of all below a node, after checks that its children's boxes are exact.
+static Bounds check_node(const CompiledScene *compiled, size_t index, const Bounds *empty)
+{
+    const Node node = node_at(compiled, index);
+    const size_t width = single.lanes;
+    Bounds all = bounds_empty();
+    for (size_t i = 0; i < width; i++) {
+        const double *low = node.planes + i, *high = low + BVH_HIGH * width;
+        const Bounds stored = {{low[0], low[width], low[2 * width]}, {high[0], high[width], high[2 * width]}};
+        const size_t kind = node.child_kind[i] & 0xff, count = node.child_kind[i] >> 8;
+        Bounds expected = bounds_empty(), box;
+        if (node.child_kind[i] == BVH_NODE) expected = check_node(compiled, node.child_index[i], empty);
+        for (size_t k = node.child_index[i]; k < node.child_index[i] + count; k++) {
+            assert_true(
+                primitive_bounds(kind, flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], k), &box));
+            expected = bounds_join(expected, box);
+        }
+        all = bounds_join(all, expected);
+        if (bounds_is_empty(&expected)) expected = *empty;
+        assert_memory_equal(&stored, &expected, sizeof stored);
+    }
+    return all;
+}
+
+static void check_bvh(const CompiledScene *compiled)
+{
+    const Node root = node_at(compiled, 0);
+    Bounds empty = bounds_empty();
+    for (size_t i = 0; i < compiled->arrays[FLAT_NODES].count; i++) {
+        const Node node = node_at(compiled, i);
+        for (size_t k = 0; k < single.lanes; k++)
+            if (node.child_kind[k] == 0) {
+                const double *low = node.planes + k, *high = low + BVH_HIGH * (size_t)single.lanes;
+                empty = (Bounds){{low[0], low[single.lanes], low[2 * single.lanes]},
+                                 {high[0], high[single.lanes], high[2 * single.lanes]}};
+            }
+    }
+    assert_true(root.child_kind[0] != 0);
+    const Bounds all = check_node(compiled, 0, &empty);
+    assert_memory_equal(&all, &compiled->bvh_bounds, sizeof all);
+    // beyond all boxes
+    assert_true(empty.min.x > all.max.x && empty.max.x < all.min.x);
+    assert_true(empty.min.y > all.max.y && empty.max.z < all.min.z);
+}
+
+static void moved_scene_has_the_numbers_of_a_compiled_one(void **state)
+{
+    (void)state;
+    static const Vector3 eyes[] = {{1.3, 2.7, -39}, {0, -8.25, 0}, {1e4, 2, -1}, {1, 2, -40}};
+    Scene scene = scene_make();
+    const Camera start = scene.camera;
+    for (int is_double = 0; is_double < 2; is_double++) {
+        CompileSettings settings = single;
+        if (is_double) settings.precision = PRECISION_DOUBLE;
+        scene.camera = start;
+        CompiledScene moved = compiled_make(&scene, &settings);
+        unsigned with_powers = 0;
+        for (size_t i = 0; i < sizeof eyes / sizeof *eyes; i++) {
+            scene.camera.position = eyes[i];
+            settings.width += 2;
+            MessageList messages = {0};
+            assert_true(scene_move(&moved, &scene, &settings, &messages));
+            CompiledScene expected = compiled_make(&scene, &settings);
+            check_numbers(&moved, &expected);
+            check_bvh(&moved);
+            with_powers += moved.features & FEATURE_EYE_POWERS ? 1 : 0;
+            compiled_scene_free(&expected);
+        }
+        assert_true(is_double || (with_powers > 0 && with_powers < sizeof eyes / sizeof *eyes));
+        compiled_scene_free(&moved);
+    }
+    scene_free(&scene);
+}
+
+// Another camera at the same place changes the header alone.
+static void turned_camera_changes_the_header_alone(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("move.yaml", scene_text);
+    CompiledScene compiled = compiled_make(&scene, &single);
+    memset(compiled.changed, 0, sizeof compiled.changed);
+    scene.camera.look_at = (Vector3){3, 3, 3};
+    MessageList messages = {0};
+    assert_true(scene_move(&compiled, &scene, &single, &messages));
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        assert_int_equal(compiled.changed[kind], kind == FLAT_HEADER);
+    CompiledScene expected = compiled_make(&scene, &single);
+    check_array(&compiled, &expected, FLAT_HEADER);
+    compiled_scene_free(&expected);
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
+}
+
+// Where the device's unit changes, or the eye does not fit, and afterwards.
+static void far_eyes(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("move.yaml", scene_text);
+    const Vector3 start = scene.camera.position;
+    CompiledScene compiled = compiled_make(&scene, &single);
+    static const double distances[] = {1e11, 1e39, 0};
+    for (size_t i = 0; i < sizeof distances / sizeof *distances; i++) {
+        scene.camera.position = (Vector3){start.x, start.y, start.z - distances[i]};
+        MessageList messages = {0};
+        const bool moved = scene_move(&compiled, &scene, &single, &messages);
+        assert_int_equal(moved, distances[i] != 1e39);
+        assert_int_equal(message_count(&messages, MESSAGE_ERROR), !moved);
+        message_list_free(&messages);
+        if (!moved) continue;
+        CompiledScene expected = compiled_make(&scene, &single);
+        assert_true(compiled.unit == expected.unit);
+        assert_true((compiled.unit != 1) == (distances[i] == 1e11));
+        check_numbers(&compiled, &expected);
+        compiled_scene_free(&expected);
+    }
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
+}
+
+static void range_count(void *context, size_t begin, size_t end)
+{
+    atomic_uchar *counts = context;
+    for (size_t i = begin; i < end; i++)
+        atomic_fetch_add(&counts[i], 1);
+}
+
+static void loops_over_threads_cover_each_index_once(void **state)
+{
+    (void)state;
+    static atomic_uchar counts[10007];
+    for (size_t count = 0; count <= sizeof counts; count = count * 3 + 1) {
+        memset(counts, 0, sizeof counts);
+        parallel_run(count, 5, range_count, counts);
+        for (size_t i = 0; i < sizeof counts; i++)
+            assert_int_equal(counts[i], i < count);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(moved_scene_has_the_numbers_of_a_compiled_one),
+        cmocka_unit_test(turned_camera_changes_the_header_alone),
+        cmocka_unit_test(far_eyes),
+        cmocka_unit_test(loops_over_threads_cover_each_index_once),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
