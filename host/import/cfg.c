@@ -7,6 +7,9 @@
 #include <string.h>
 
 static const Range range_radians = {0, M_PI_2, true, "greater than 0 and less than pi/2"};
+// One beyond 255 is cut to it, as that program does.
+static const Range range_color = {0, INFINITY, false, "from 0 to 255"};
+static const double COLOR_MAX = 255;
 
 // The values of any block.
 typedef struct {
@@ -29,7 +32,7 @@ static const Key keys[] = {
     {"radius", offsetof(BlockValues, radius), false, &range_positive},
     {"angle", offsetof(BlockValues, angle), false, &range_radians},
     {"intensity", offsetof(BlockValues, intensity), true, &range_not_negative},
-    {"color", offsetof(BlockValues, color), true, &range_byte},
+    {"color", offsetof(BlockValues, color), true, &range_color},
     {"diffuse", offsetof(BlockValues, diffuse), true, &range_not_negative},
     {"specular", offsetof(BlockValues, specular), false, &range_not_negative},
 };
@@ -69,7 +72,7 @@ static void light_finish(CfgReader *reader, const BlockValues *values)
 static void object_finish(CfgReader *reader, const BlockValues *values, Object object)
 {
     Material material = material_default();
-    material.color = vector_scale(values->color, 1.0 / 255);
+    material.color = vector_scale(values->color, 1 / COLOR_MAX);
     material.diffuse = values->diffuse;
     material.specular = values->specular;
     material.shininess = 30;
@@ -130,6 +133,10 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
 {
     Line *line = &reader->line;
     Word word = line_word(line);
+    if (word_is(word, "transfo") && block->finish != camera_finish && block->finish != light_finish) {
+        report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
+        return true;
+    }
     const Key *key = key_find(block, word);
     if (!key) {
         report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name, word_shown(word),
@@ -148,6 +155,10 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     if (read && !strcmp(key->name, "normal") && vector_is_zero(values->normal)) {
         report_error(&reader->report, offset, "'normal' must not be zero");
         return false;
+    }
+    if (read && !strcmp(key->name, "color") && vector_largest(values->color) > COLOR_MAX) {
+        report_warning(&reader->report, offset, "'color' exceeds 255, and is cut to it");
+        values->color = vector_min(values->color, vector_all(COLOR_MAX));
     }
     return read && line_end(line);
 }
