@@ -40,4 +40,9 @@ bounded 200 8192x2048 -o wide.png
 bounded 200 256x65536 -o tall.ppm
 bounded 400 4096x2048 --samples 4 --aov t,normal -o deep.exr
 [ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 -o huge.png
+# PoCL as two devices: bands that wait for one above them are bounded, too, or in the checkpoint
+export POCL_DEVICES='pthread pthread'
+bounded 300 8192x2048 --device pthread,1 -o wide.png
+bounded 300 8192x2048 --device pthread,1 --checkpoint saved -o wide.png
+[ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 --device pthread,1 --checkpoint saved -o huge.png
 finish

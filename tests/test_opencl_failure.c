@@ -368,7 +368,13 @@ static bool pair_work(Compute computes[2], Answer *answer)
         compute_open(&computes[i], device);
         renderers[i] = renderer_open(&computes[i], &scene, &settings, NULL);
     }
-    bool whole = renderers_render(renderers, 2, AOVS_ALL, band_take, pair_dropped, answer);
+    const RenderJob job = {.renderers = renderers,
+                           .count = 2,
+                           .aovs = AOVS_ALL,
+                           .sink = band_take,
+                           .dropped = pair_dropped,
+                           .context = answer};
+    bool whole = render_job_run(&job);
     settings.stop = NULL;
     for (size_t i = 0; i < 2; i++)
         renderer_close(renderers[i]);

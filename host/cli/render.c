@@ -2,6 +2,7 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/cli/checkpoint_key.h"
 #include "host/cli/commands.h"
 #include "host/cli/image_output.h"
 #include "host/cli/options.h"
@@ -22,6 +23,7 @@ enum {
     OPTION_TRANSFER,
     OPTION_BITS,
     OPTION_BOUNCES,
+    OPTION_CHECKPOINT,
     OPTION_QUIET
 };
 
@@ -35,6 +37,7 @@ static const struct option long_options[] = {
     {"transfer", required_argument, NULL, OPTION_TRANSFER},
     {"bits", required_argument, NULL, OPTION_BITS},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
@@ -55,12 +58,14 @@ static const char help_text[] =
         HELP_LAYER) "      --timing[=json]   report the time of every stage and launch\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
+                    "      --checkpoint FILE keep what is rendered in FILE until the image is complete; the\n"
+                    "                        same command goes on where an earlier one ended\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_DEVICES HELP_COMMON HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
-    const char *scene;
+    const char *scene, *checkpoint;
     ImageOutputOptions output;
     uint32_t width, height; // 0: not given
     uint32_t sample_count, bounce_count;
@@ -119,6 +124,9 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         return true;
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
+    case OPTION_CHECKPOINT:
+        options->checkpoint = value;
+        return true;
     case OPTION_QUIET:
         options->quiet = true;
         return true;
@@ -165,6 +173,7 @@ static bool settings_make(RenderSettings *settings, RenderOptions *options, cons
     settings->bounce_count = options->bounce_count;
     settings->shift_to_eye = true;
     settings->stop = progress_interrupted;
+    settings->hashes_scene = options->checkpoint != NULL;
     return true;
 }
 
@@ -231,11 +240,39 @@ static bool renderers_open(Renderer **renderers, OpenDevices *devices, const Sce
     return true;
 }
 
+// False with messages. No checkpoint is requested: true.
+static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *options,
+                             const RenderSettings *settings, Renderer *const *renderers, size_t count,
+                             MessageList *messages)
+{
+    *checkpoint = NULL;
+    if (!options->checkpoint) return true;
+    Text key = {0};
+    checkpoint_key(&key, settings, options->output.aovs, renderers, count);
+    *checkpoint = checkpoint_open(options->checkpoint, text_c(&key), messages);
+    text_free(&key);
+    return *checkpoint != NULL;
+}
+
+// What is left of a render that ended early.
+static void rest_print(const RenderOptions *options)
+{
+    if (progress_interrupted())
+        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
+                options->output.path);
+    if (options->checkpoint)
+        fprintf(stderr, "glint: %s has what is rendered: the same command goes on from there\n",
+                options->checkpoint);
+}
+
 // Renders, writes the files and reports the times.
 static int image_render(RenderOptions *options, const Scene *scene, OpenDevices *devices,
-                        Renderer *const *renderers, const RenderSettings *settings, HostTimes *times)
+                        Renderer *const *renderers, const RenderSettings *settings, HostTimes *times,
+                        MessageList *messages)
 {
-    MessageList messages = {0};
+    Checkpoint *checkpoint;
+    if (!checkpoint_start(&checkpoint, options, settings, renderers, devices->count, messages))
+        return EXIT_USER;
     Progress progress;
     progress_open(&progress, options->quiet);
     ImageOutput *output =
@@ -243,24 +280,29 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     BandContext context = {.output = output,
                            .devices = devices,
                            .progress = &progress,
-                           .messages = &messages,
+                           .messages = messages,
                            .settings = settings,
                            .is_quiet = options->quiet};
+    const RenderJob job = {.renderers = renderers,
+                           .count = devices->count,
+                           .aovs = options->output.aovs,
+                           .sink = band_take,
+                           .dropped = device_drop,
+                           .context = &context,
+                           .checkpoint = checkpoint};
     double start = clock_seconds();
-    bool whole =
-        renderers_render(renderers, devices->count, options->output.aovs, band_take, device_drop, &context);
+    bool whole = render_job_run(&job);
     times->render_seconds = clock_seconds() - start;
     if (whole)
-        whole = image_output_commit(output, &messages, &times->encode_seconds);
+        whole = image_output_commit(output, messages, &times->encode_seconds);
     else
         image_output_abandon(output);
     progress_close(&progress);
-    bool faulty = message_count(&messages, MESSAGE_ERROR) > 0;
-    messages_print(&messages, NULL);
+    if (checkpoint) checkpoint_close(checkpoint, whole, messages);
+    bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
+    messages_print(messages, NULL);
     int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
-    if (status == EXIT_INTERRUPTED && progress_interrupted())
-        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
-                options->output.path);
+    if (!whole) rest_print(options);
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderers, devices->count, settings, times);
     if (whole) fault_output_is_complete(status);
@@ -278,7 +320,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
     Renderer **renderers = memory_allocate_zeroed(devices->count, sizeof *renderers);
     int status = EXIT_USER;
     if (renderers_open(renderers, devices, scene, &settings, &messages))
-        status = image_render(options, scene, devices, renderers, &settings, times);
+        status = image_render(options, scene, devices, renderers, &settings, times, &messages);
     messages_print(&messages, NULL);
     for (size_t i = 0; i < devices->count; i++)
         renderer_close(renderers[i]);

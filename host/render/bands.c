@@ -322,22 +322,25 @@ static void *worker_run(void *argument)
     return NULL;
 }
 
-bool renderers_render(Renderer *const *renderers, size_t count, unsigned aovs, BandSink sink,
-                      WorkerDropped dropped, void *context)
+bool render_job_run(const RenderJob *job)
 {
-    const SchedulerSettings settings = {.row_count = renderers[0]->settings.region_height,
+    const size_t count = job->count;
+    const SchedulerSettings settings = {.row_count = job->renderers[0]->settings.region_height,
                                         .worker_count = count,
-                                        .sink = sink,
-                                        .dropped = dropped,
-                                        .context = context};
+                                        .sink = job->sink,
+                                        .dropped = job->dropped,
+                                        .context = job->context,
+                                        .checkpoint = job->checkpoint};
     Scheduler *scheduler = scheduler_open(&settings);
     RenderWorker *workers = memory_allocate_zeroed(count, sizeof *workers);
     for (size_t i = 0; i < count; i++) {
-        workers[i] = (RenderWorker){
-            .renderer = renderers[i], .aovs = aovs, .delivery = {.scheduler = scheduler, .worker = i}};
+        workers[i] = (RenderWorker){.renderer = job->renderers[i],
+                                    .aovs = job->aovs,
+                                    .delivery = {.scheduler = scheduler, .worker = i}};
         if (i == 0) continue; // the caller's thread
         if (pthread_create(&workers[i].thread, NULL, worker_run, &workers[i]) != 0)
-            fault("cannot start a thread for %s%s", renderers[i]->compute->device->name, fault_limits());
+            fault("cannot start a thread for %s%s", workers[i].renderer->compute->device->name,
+                  fault_limits());
     }
     worker_run(&workers[0]);
     for (size_t i = 1; i < count; i++)
@@ -346,14 +349,16 @@ bool renderers_render(Renderer *const *renderers, size_t count, unsigned aovs, B
     WorkerShare *shares = memory_allocate_zeroed(count, sizeof *shares);
     bool whole = scheduler_close(scheduler, shares);
     for (size_t i = 0; i < count; i++)
-        renderers[i]->report.share = shares[i];
+        job->renderers[i]->report.share = shares[i];
     free(shares);
     return whole;
 }
 
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
 {
-    return renderers_render(&renderer, 1, aovs, sink, NULL, context) && compute_ok(renderer->compute);
+    const RenderJob job = {
+        .renderers = &renderer, .count = 1, .aovs = aovs, .sink = sink, .context = context};
+    return render_job_run(&job) && compute_ok(renderer->compute);
 }
 
 typedef struct {

@@ -29,6 +29,14 @@ size_t film_layer_size(const Film *film, Layer layer)
     return film_pixel_count(film) * film_components(film, layer) * film_value_size(film, layer);
 }
 
+size_t film_size(const Film *film)
+{
+    size_t size = 0;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (film->layers[layer]) size += film_layer_size(film, layer);
+    return size;
+}
+
 Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs)
 {
     Film film = {.width = width, .height = height, .light_count = light_count, .real_size = sizeof(double)};

@@ -50,6 +50,11 @@ typedef struct {
     };
 } Film;
 
+// The rows of a band in its region; row_count 0: none.
+typedef struct {
+    uint32_t first_row, row_count;
+} BandRows;
+
 static inline size_t film_pixel_count(const Film *film)
 {
     return (size_t)film->width * film->height;
@@ -61,6 +66,9 @@ uint32_t film_components(const Film *film, Layer layer);
 size_t film_value_size(const Film *film, Layer layer);
 // Of the whole layer, in bytes, whether it is there or not.
 size_t film_layer_size(const Film *film, Layer layer);
+
+// Of all layers that are there, in bytes.
+size_t film_size(const Film *film);
 
 // A film of zeros in double with the color and the AOVs of the set.
 Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs);

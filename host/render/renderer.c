@@ -86,6 +86,8 @@ static void array_upload(Renderer *renderer, size_t kind)
     }
     void *bytes = buffer_bytes_allocate(size);
     flat_array_write(array, is_double, bytes);
+    if (renderer->settings.hashes_scene && kind != FLAT_NODES)
+        renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
     buffer_release(renderer->arrays[kind]);
     renderer->arrays[kind] = buffer_take(compute, size, bytes);
     renderer->array_sizes[kind] = size;
@@ -255,6 +257,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     renderer->compute = compute;
     renderer->report.device = compute->device;
     renderer->report.build_from_cache = true;
+    renderer->report.scene_hash = HASH_START;
     if (!scene_take(renderer, scene, settings, messages)) {
         renderer_close(renderer);
         return NULL;

@@ -28,6 +28,7 @@ typedef struct {
     bool no_cache;
     double band_seconds; // target duration of a launch; 0: 0.1
     bool (*stop)(void);  // called between launches; true ends the render; NULL: never
+    bool hashes_scene;   // for the report
     uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
 } RenderSettings;
 
@@ -53,11 +54,20 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
 // (compute_ok says so), else settings.stop or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
-// The same by several renderers of one scene and one set of settings, each on a device of its own: see
-// Scheduler. `dropped` gets the renderer's index. False: the last device failed, too, or settings.stop or the
-// sink ended it.
-bool renderers_render(Renderer *const *renderers, size_t count, unsigned aovs, BandSink sink,
-                      WorkerDropped dropped, void *context);
+// One image by several renderers.
+typedef struct {
+    Renderer *const *renderers; // of one scene and one set of settings, each on a device of its own
+    size_t count;
+    unsigned aovs;
+    BandSink sink;          // see SchedulerSettings
+    WorkerDropped dropped;  // gets the renderer's index
+    void *context;          // of both
+    Checkpoint *checkpoint; // or NULL
+} RenderJob;
+
+// As renderer_render. False: the last device failed, too, the checkpoint cannot be written or read, or
+// settings.stop or the sink ended it.
+bool render_job_run(const RenderJob *job);
 
 // Called for each band of a pass. Its color is the sum of `samples` samples, or their mean where they are
 // all; a band of AOVs has no color.
@@ -88,6 +98,7 @@ typedef struct {
     uint32_t lanes;
     bool is_double; // structs in double
     uint64_t kernel_hash;
+    uint64_t scene_hash; // of the arrays but for the BVH, which does not change the image; where requested
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
     uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting

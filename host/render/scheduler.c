@@ -9,6 +9,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { WAITING_BYTES_MAX = 64 << 20 }; // of bands that wait for one above them, about
 
@@ -33,23 +34,11 @@ struct Scheduler {
         size_t count, capacity;
     } free_rows;
     struct {
-        Film *items; // copies
+        Film *items; // copies; without layers where the checkpoint has them
         size_t count, capacity;
     } waiting;
-    size_t row_bytes; // of a waiting band; 0: unknown
+    size_t row_bytes; // of a waiting band in memory; 0: none or unknown
 };
-
-Scheduler *scheduler_open(const SchedulerSettings *settings)
-{
-    Scheduler *scheduler = memory_allocate_zeroed(1, sizeof *scheduler);
-    scheduler->settings = *settings;
-    scheduler->start_seconds = clock_seconds();
-    scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
-    if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
-        fault("out of memory: mutex");
-    array_push(scheduler->free_rows, ((BandRows){0, settings->row_count}));
-    return scheduler;
-}
 
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
 {
@@ -128,6 +117,34 @@ static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t 
     return (BandRows){first->first_row, rows};
 }
 
+// Inserts rows among those that are free.
+static void rows_insert(Scheduler *scheduler, BandRows rows)
+{
+    array_push(scheduler->free_rows, rows);
+    size_t at = scheduler->free_rows.count - 1;
+    for (; at > 0 && scheduler->free_rows.items[at - 1].first_row > rows.first_row; at--)
+        scheduler->free_rows.items[at] = scheduler->free_rows.items[at - 1];
+    scheduler->free_rows.items[at] = rows;
+}
+
+// Takes the rows out of those that are free, if they are.
+static void rows_remove(Scheduler *scheduler, BandRows rows)
+{
+    for (size_t i = 0; i < scheduler->free_rows.count; i++) {
+        BandRows *free_rows = &scheduler->free_rows.items[i];
+        const uint32_t end = free_rows->first_row + free_rows->row_count;
+        if (rows.first_row < free_rows->first_row || rows.first_row + rows.row_count > end) continue;
+        const BandRows below = {rows.first_row + rows.row_count, end - rows.first_row - rows.row_count};
+        free_rows->row_count = rows.first_row - free_rows->first_row;
+        if (free_rows->row_count == 0) {
+            scheduler->free_rows.count--;
+            memmove(free_rows, free_rows + 1, (scheduler->free_rows.count - i) * sizeof *free_rows);
+        }
+        if (below.row_count > 0) rows_insert(scheduler, below);
+        return;
+    }
+}
+
 static bool rows_are_out(const Scheduler *scheduler)
 {
     for (size_t i = 0; i < scheduler->settings.worker_count; i++)
@@ -146,14 +163,7 @@ BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, 
         if (rows.row_count == 0) pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
     }
     if (rows.row_count > 0) {
-        BandRows *first = &scheduler->free_rows.items[0];
-        first->first_row += rows.row_count;
-        first->row_count -= rows.row_count;
-        if (first->row_count == 0) {
-            scheduler->free_rows.count--;
-            for (size_t i = 0; i < scheduler->free_rows.count; i++)
-                first[i] = first[i + 1];
-        }
+        rows_remove(scheduler, rows);
         scheduler->workers[worker].rows = rows;
         scheduler->workers[worker].taken_seconds = clock_seconds();
     }
@@ -189,6 +199,48 @@ static bool waiting_take(Scheduler *scheduler, Film *band)
     return false;
 }
 
+// Passes the bands that wait, as far as none is missing above them, unless another thread does.
+static void waiting_pass(Scheduler *scheduler)
+{
+    Film band;
+    while (!scheduler->has_ended && !scheduler->is_delivering && waiting_take(scheduler, &band)) {
+        Checkpoint *checkpoint = scheduler->settings.checkpoint;
+        if (checkpoint && !checkpoint_read(checkpoint, band.first_row, &band))
+            scheduler->has_ended = true;
+        else
+            band_pass(scheduler, &band);
+        film_free(&band);
+    }
+}
+
+// The checkpoint's bands wait like those that were rendered.
+static void checkpoint_take(Scheduler *scheduler)
+{
+    size_t count;
+    const BandRows *bands = checkpoint_bands(scheduler->settings.checkpoint, &count);
+    for (size_t i = 0; i < count; i++) {
+        rows_remove(scheduler, bands[i]);
+        array_push(scheduler->waiting,
+                   ((Film){.first_row = bands[i].first_row, .height = bands[i].row_count}));
+    }
+    waiting_pass(scheduler);
+}
+
+Scheduler *scheduler_open(const SchedulerSettings *settings)
+{
+    Scheduler *scheduler = memory_allocate_zeroed(1, sizeof *scheduler);
+    scheduler->settings = *settings;
+    scheduler->start_seconds = clock_seconds();
+    scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
+    if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
+        fault("out of memory: mutex");
+    array_push(scheduler->free_rows, ((BandRows){0, settings->row_count}));
+    pthread_mutex_lock(&scheduler->mutex);
+    if (settings->checkpoint) checkpoint_take(scheduler);
+    pthread_mutex_unlock(&scheduler->mutex);
+    return scheduler;
+}
+
 static bool is_next(const Scheduler *scheduler, const Film *band)
 {
     return !scheduler->is_delivering && band->first_row == scheduler->delivered_rows;
@@ -197,13 +249,13 @@ static bool is_next(const Scheduler *scheduler, const Film *band)
 // Keeps a copy of the band until those above it are there.
 static void band_keep(Scheduler *scheduler, const Film *band)
 {
-    size_t bytes = 0;
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (band->layers[layer]) bytes += film_layer_size(band, layer);
-    scheduler->row_bytes = bytes / band->height;
-    pthread_mutex_unlock(&scheduler->mutex);
-    Film copy = film_copy(band);
-    pthread_mutex_lock(&scheduler->mutex);
+    Film copy = {.first_row = band->first_row, .height = band->height};
+    if (!scheduler->settings.checkpoint) {
+        scheduler->row_bytes = film_size(band) / band->height;
+        pthread_mutex_unlock(&scheduler->mutex);
+        copy = film_copy(band);
+        pthread_mutex_lock(&scheduler->mutex);
+    }
     array_push(scheduler->waiting, copy);
 }
 
@@ -218,33 +270,21 @@ static void rows_done(Worker *worker)
 
 bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band)
 {
+    Checkpoint *checkpoint = scheduler->settings.checkpoint;
+    bool is_kept = !checkpoint || checkpoint_append(checkpoint, band);
     pthread_mutex_lock(&scheduler->mutex);
     rows_done(&scheduler->workers[worker]);
-    if (scheduler->has_ended)
-        ;
-    else if (is_next(scheduler, band))
+    if (!is_kept) scheduler->has_ended = true;
+    if (!scheduler->has_ended && is_next(scheduler, band))
         band_pass(scheduler, band);
-    else
+    else if (!scheduler->has_ended)
         band_keep(scheduler, band);
     scheduler->workers[worker].rows = (BandRows){0};
-    Film next;
-    while (!scheduler->has_ended && !scheduler->is_delivering && waiting_take(scheduler, &next)) {
-        band_pass(scheduler, &next);
-        film_free(&next);
-    }
+    waiting_pass(scheduler);
     bool go_on = !scheduler->has_ended;
     pthread_cond_broadcast(&scheduler->changed);
     pthread_mutex_unlock(&scheduler->mutex);
     return go_on;
-}
-
-static void rows_return(Scheduler *scheduler, BandRows rows)
-{
-    array_push(scheduler->free_rows, rows);
-    size_t at = scheduler->free_rows.count - 1;
-    for (; at > 0 && scheduler->free_rows.items[at - 1].first_row > rows.first_row; at--)
-        scheduler->free_rows.items[at] = scheduler->free_rows.items[at - 1];
-    scheduler->free_rows.items[at] = rows;
 }
 
 void scheduler_drop(Scheduler *scheduler, size_t worker)
@@ -252,7 +292,7 @@ void scheduler_drop(Scheduler *scheduler, size_t worker)
     pthread_mutex_lock(&scheduler->mutex);
     Worker *dropped = &scheduler->workers[worker];
     dropped->is_dropped = true;
-    if (dropped->rows.row_count > 0) rows_return(scheduler, dropped->rows);
+    if (dropped->rows.row_count > 0) rows_insert(scheduler, dropped->rows);
     dropped->rows = (BandRows){0};
     bool is_last = true;
     for (size_t i = 0; i < scheduler->settings.worker_count; i++)

@@ -6,14 +6,11 @@
 // together.
 #pragma once
 
+#include "host/render/checkpoint.h"
 #include "host/render/film.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-typedef struct {
-    uint32_t first_row, row_count; // row_count 0: none
-} BandRows;
 
 // Called for each band from the top, whose layers are valid until it returns; returns false to stop.
 typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
@@ -23,9 +20,10 @@ typedef void (*WorkerDropped)(void *context, size_t worker);
 typedef struct {
     uint32_t row_count;
     size_t worker_count;
-    BandSink sink;         // called by the workers' threads, one at a time
-    WorkerDropped dropped; // likewise; NULL: not called
-    void *context;         // of both
+    BandSink sink;          // called by the workers' threads, one at a time
+    WorkerDropped dropped;  // likewise; NULL: not called
+    void *context;          // of both
+    Checkpoint *checkpoint; // has the bands that are done, and gets all others; NULL: none
 } SchedulerSettings;
 
 // What a worker did.
@@ -37,6 +35,7 @@ typedef struct {
 
 typedef struct Scheduler Scheduler;
 
+// Passes the checkpoint's bands to the sink, as far as none is missing above them.
 Scheduler *scheduler_open(const SchedulerSettings *settings);
 // Frees; true: all rows reached the sink. `shares`, of each worker, may be NULL.
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares);

@@ -3,7 +3,8 @@
 _glint_options() {
     case ${1-} in
     render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
-        "--timing --transfer --bits --no-cache --lenient --max-pixels --perturb --quiet -h --help" ;;
+        "--timing --transfer --bits --no-cache --lenient --max-pixels --perturb --checkpoint" \
+        "--quiet -h --help" ;;
     view) echo "--size --samples --bounces --device --precision --lanes --bvh --no-cache --lenient --max-pixels -h --help" ;;
     trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --max-pixels --perturb -h --help" ;;
     check) echo "--json --lenient -h --help" ;;

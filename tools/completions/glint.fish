@@ -42,6 +42,7 @@ complete -c glint -n '__fish_seen_subcommand_from render' -l aov -x -a '(__glint
 complete -c glint -n '__fish_seen_subcommand_from render' -l timing -d 'Report the time of every stage'
 complete -c glint -n '__fish_seen_subcommand_from render' -l transfer -x -a 'srgb none' -d 'Curve to display values'
 complete -c glint -n '__fish_seen_subcommand_from render' -l bits -x -a '8 16' -d 'Bits per channel'
+complete -c glint -n '__fish_seen_subcommand_from render' -l checkpoint -r -F -d 'Go on from this file, and keep what is rendered'
 complete -c glint -n '__fish_seen_subcommand_from render' -l quiet -d 'No progress'
 complete -c glint -n '__fish_seen_subcommand_from diff' -l heatmap -r -F -d 'Image of the differences'
 complete -c glint -n '__fish_seen_subcommand_from bench accuracy' -l precision -x -a 'fast single strict double' -d 'Precisions, separated by commas'

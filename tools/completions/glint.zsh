@@ -24,6 +24,7 @@ _glint_render() {
         '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '--max-pixels[largest image that is read]:number:' \
+        '--checkpoint[go on from this file, and keep what is rendered]:file:_files' \
         '--quiet[no progress]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'

@@ -1,0 +1,51 @@
+#include "host/cli/checkpoint_key.h"
+
+#include "host/base/hash.h"
+#include "host/cli/version.h"
+#include "host/opencl/compose.h"
+#include <string.h>
+
+static unsigned long long kernels_hash(void)
+{
+    uint64_t hash = HASH_START;
+    for (const EmbeddedFile *file = kernel_files; file->name; file++)
+        hash = hash_bytes(hash, file->text, strlen(file->text) + 1);
+    return hash;
+}
+
+// Each make once.
+static void devices_append(Text *key, Renderer *const *renderers, size_t count)
+{
+    Text makes = {0};
+    for (size_t i = 0; i < count; i++) {
+        const RenderReport *report = renderer_report(renderers[i]);
+        Text make = {0};
+        text_appendf(&make, "%s, %s, %u lanes, kernel %016llx", report->device->name, report->device->driver,
+                     report->lanes, (unsigned long long)renderer_kernel_hash(renderers[i]));
+        if (!strstr(text_c(&makes), text_c(&make)))
+            text_appendf(&makes, "%s%s", makes.count > 0 ? " + " : "", text_c(&make));
+        text_free(&make);
+    }
+    text_appendf(key, "devices: %s\n", text_c(&makes));
+    text_free(&makes);
+}
+
+void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,
+                    size_t count)
+{
+    text_appendf(key, "glint: %s\n", glint_version());
+    text_appendf(key, "kernels: %016llx\n", kernels_hash());
+    text_appendf(key, "precision: %s\n", precision_names[settings->precision]);
+    text_appendf(key, "size: %ux%u\n", settings->width, settings->height);
+    text_appendf(key, "region: %u,%u,%u,%u\n", settings->region_x, settings->region_y, settings->region_width,
+                 settings->region_height);
+    text_appendf(key, "samples: %u\n", settings->sample_count);
+    text_appendf(key, "bounces: %u\n", settings->bounce_count);
+    text_appendf(key, "AOVs:");
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (aovs >> layer & 1) text_appendf(key, " %s", layer_names[layer]);
+    text_appendf(key, "\nperturb: %u:%u\n", settings->perturb_seed, settings->perturb_scale);
+    text_appendf(key, "BVH: %s\n", bvh_choice_names[settings->bvh]);
+    if (settings->precision != PRECISION_STRICT) devices_append(key, renderers, count);
+    text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_report(renderers[0])->scene_hash);
+}

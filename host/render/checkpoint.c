@@ -1,0 +1,374 @@
+// The file: a FileHeader, the key, then for each band a RecordHeader and its layers. Numbers are in native
+// byte order: a checkpoint is resumed on the machine, or the kind of machine, that wrote it.
+#include "host/render/checkpoint.h"
+
+#include "host/base/array.h"
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <sodium.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const char file_magic[16] = "glint checkpoint";
+static const uint64_t file_format = 1;
+static const double SYNC_SECONDS = 1; // at least, between two syncs: a power failure loses no more than that
+
+enum { HASH_BYTES = 16, KEY_BYTES_MAX = 1 << 16, CHUNK_BYTES = 1 << 20 };
+
+typedef struct {
+    char magic[16];
+    uint64_t format, key_length;
+    unsigned char hash[HASH_BYTES]; // of the key
+} FileHeader;
+
+typedef struct {
+    uint32_t width, first_row, row_count, light_count, real_size, is_double;
+    uint64_t layers, size;          // the set of layers, and their bytes
+    unsigned char hash[HASH_BYTES]; // of all above and the layers
+} RecordHeader;
+
+struct Checkpoint {
+    char *path;
+    int descriptor;
+    pthread_mutex_t mutex;
+    off_t end; // of the last record
+    double synced_seconds;
+    char *failure; // the first; NULL: none
+    struct {
+        BandRows *items;
+        size_t count, capacity;
+    } bands;
+    struct {
+        off_t *items; // of the same records
+        size_t count, capacity;
+    } offsets;
+};
+
+// False at the end of the file, or where it cannot be read.
+static bool bytes_read(int descriptor, void *bytes, size_t size, off_t offset)
+{
+    for (size_t done = 0; done < size;) {
+        ssize_t count = pread(descriptor, (char *)bytes + done, size - done, offset + (off_t)done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) {
+            if (count == 0) errno = EIO;
+            return false;
+        }
+        done += (size_t)count;
+    }
+    return true;
+}
+
+static bool bytes_write(int descriptor, const void *bytes, size_t size, off_t offset)
+{
+    for (size_t done = 0; done < size;) {
+        ssize_t count = pwrite(descriptor, (const char *)bytes + done, size - done, offset + (off_t)done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) return false;
+        done += (size_t)count;
+    }
+    return true;
+}
+
+static void hash_begin(crypto_generichash_state *hash, const RecordHeader *record)
+{
+    crypto_generichash_init(hash, NULL, 0, HASH_BYTES);
+    crypto_generichash_update(hash, (const unsigned char *)record, offsetof(RecordHeader, hash));
+}
+
+static FileHeader file_header(const char *key)
+{
+    FileHeader header = {.format = file_format, .key_length = strlen(key)};
+    memcpy(header.magic, file_magic, sizeof header.magic);
+    crypto_generichash(header.hash, HASH_BYTES, (const unsigned char *)key, header.key_length, NULL, 0);
+    return header;
+}
+
+// The film of a record, without its layers.
+static Film record_film(const RecordHeader *record)
+{
+    return (Film){.width = record->width,
+                  .height = record->row_count,
+                  .light_count = record->light_count,
+                  .first_row = record->first_row,
+                  .is_double = record->is_double,
+                  .real_size = record->real_size};
+}
+
+static RecordHeader record_of(const Film *band)
+{
+    RecordHeader record = {.width = band->width,
+                           .first_row = band->first_row,
+                           .row_count = band->height,
+                           .light_count = band->light_count,
+                           .real_size = (uint32_t)band->real_size,
+                           .is_double = band->is_double};
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!band->layers[layer]) continue;
+        record.layers |= UINT64_C(1) << layer;
+        record.size += film_layer_size(band, layer);
+    }
+    crypto_generichash_state hash;
+    hash_begin(&hash, &record);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (band->layers[layer])
+            crypto_generichash_update(&hash, band->layers[layer], film_layer_size(band, layer));
+    crypto_generichash_final(&hash, record.hash, HASH_BYTES);
+    return record;
+}
+
+// Whether a whole record is at the offset.
+static bool record_check(const Checkpoint *checkpoint, off_t offset, off_t file_size, RecordHeader *record,
+                         unsigned char *chunk)
+{
+    if (!bytes_read(checkpoint->descriptor, record, sizeof *record, offset)) return false;
+    offset += (off_t)sizeof *record;
+    if (record->row_count == 0 || record->size > (uint64_t)(file_size - offset)) return false;
+    crypto_generichash_state hash;
+    hash_begin(&hash, record);
+    for (uint64_t left = record->size; left > 0;) {
+        size_t size = left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES;
+        if (!bytes_read(checkpoint->descriptor, chunk, size, offset)) return false;
+        crypto_generichash_update(&hash, chunk, size);
+        offset += (off_t)size;
+        left -= size;
+    }
+    unsigned char expected[HASH_BYTES];
+    crypto_generichash_final(&hash, expected, HASH_BYTES);
+    return memcmp(record->hash, expected, HASH_BYTES) == 0;
+}
+
+static void record_note(Checkpoint *checkpoint, const RecordHeader *record)
+{
+    array_push(checkpoint->bands, ((BandRows){record->first_row, record->row_count}));
+    array_push(checkpoint->offsets, checkpoint->end);
+    checkpoint->end += (off_t)(sizeof *record + record->size);
+}
+
+// Finds the records and cuts off what follows the last whole one.
+static bool records_find(Checkpoint *checkpoint)
+{
+    struct stat status;
+    if (fstat(checkpoint->descriptor, &status) != 0) return false;
+    unsigned char *chunk = memory_allocate(CHUNK_BYTES, 1);
+    RecordHeader record;
+    while (record_check(checkpoint, checkpoint->end, status.st_size, &record, chunk))
+        record_note(checkpoint, &record);
+    free(chunk);
+    return ftruncate(checkpoint->descriptor, checkpoint->end) == 0;
+}
+
+// The value in the line of the key whose name is at `line`; empty without one.
+static const char *key_value(const char *key, const char *line, size_t name_length, size_t *length)
+{
+    for (const char *at = key; *at;) {
+        size_t line_length = strcspn(at, "\n");
+        if (line_length >= name_length + 2 && strncmp(at, line, name_length) == 0 && at[name_length] == ':') {
+            *length = line_length - name_length - 2;
+            return at + name_length + 2;
+        }
+        at += line_length + (at[line_length] == '\n');
+    }
+    *length = 0;
+    return "";
+}
+
+// Says which is the first line in which the keys differ.
+static void difference_report(const char *path, const char *key, const char *found, MessageList *messages)
+{
+    for (const char *line = key; *line; line += strcspn(line, "\n") + 1) {
+        size_t name_length = strcspn(line, ":"), length, other_length;
+        const char *value = key_value(key, line, name_length, &length);
+        const char *other = key_value(found, line, name_length, &other_length);
+        if (length == other_length && strncmp(value, other, length) == 0) continue;
+        message_add(
+            messages, MESSAGE_ERROR,
+            "the checkpoint '%s' is of another image (%.*s: %.*s, not %.*s); remove it or name another "
+            "file",
+            path, (int)name_length, line, (int)other_length, other, (int)length, value);
+        return;
+    }
+}
+
+static bool open_failed(const char *path, const char *doing, MessageList *messages)
+{
+    message_add(messages, MESSAGE_ERROR, "cannot %s the checkpoint '%s': %s", doing, path, strerror(errno));
+    return false;
+}
+
+// A new file's header and key. A file that ends within its header is one whose process ended early.
+static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const char *key,
+                         MessageList *messages)
+{
+    bool is_written = ftruncate(checkpoint->descriptor, 0) == 0 &&
+                      bytes_write(checkpoint->descriptor, header, sizeof *header, 0) &&
+                      bytes_write(checkpoint->descriptor, key, header->key_length, sizeof *header) &&
+                      fsync(checkpoint->descriptor) == 0;
+    return is_written || open_failed(checkpoint->path, "write", messages);
+}
+
+// Checks the header of the file, or writes that of a new one.
+static bool header_take(Checkpoint *checkpoint, const char *key, MessageList *messages)
+{
+    const FileHeader expected = file_header(key);
+    FileHeader header = {0};
+    struct stat status;
+    if (fstat(checkpoint->descriptor, &status) != 0) return open_failed(checkpoint->path, "read", messages);
+    size_t size = status.st_size < (off_t)sizeof header ? (size_t)status.st_size : sizeof header;
+    if (S_ISREG(status.st_mode) && !bytes_read(checkpoint->descriptor, &header, size, 0))
+        return open_failed(checkpoint->path, "read", messages);
+    size_t magic_size = size < sizeof header.magic ? size : sizeof header.magic;
+    bool is_checkpoint = S_ISREG(status.st_mode) && memcmp(header.magic, file_magic, magic_size) == 0 &&
+                         (size < sizeof header || (header.format == file_format && header.key_length > 0 &&
+                                                   header.key_length <= KEY_BYTES_MAX));
+    if (!is_checkpoint) {
+        message_add(messages, MESSAGE_ERROR, "'%s' is not a checkpoint of this version of glint",
+                    checkpoint->path);
+        return false;
+    }
+    if (size < sizeof header || (uint64_t)status.st_size < sizeof header + header.key_length)
+        return header_write(checkpoint, &expected, key, messages);
+    char *found = memory_allocate_zeroed(header.key_length + 1, 1);
+    bool is_same = bytes_read(checkpoint->descriptor, found, header.key_length, sizeof header);
+    if (!is_same) open_failed(checkpoint->path, "read", messages);
+    if (is_same && memcmp(&header, &expected, sizeof header) != 0) {
+        difference_report(checkpoint->path, key, found, messages);
+        is_same = false;
+    }
+    free(found);
+    return is_same;
+}
+
+// So that a new file's name outlives a power failure; not every file system can sync a folder.
+static void folder_sync(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? strndup(path, (size_t)(slash + 1 - path)) : memory_copy_text(".");
+    if (!folder) fault("out of memory: file name");
+    int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor >= 0) {
+        fsync(descriptor);
+        close(descriptor);
+    }
+    free(folder);
+}
+
+Checkpoint *checkpoint_open(const char *path, const char *key, MessageList *messages)
+{
+    Checkpoint *checkpoint = memory_allocate_zeroed(1, sizeof *checkpoint);
+    checkpoint->path = memory_copy_text(path);
+    if (pthread_mutex_init(&checkpoint->mutex, NULL) != 0) fault("out of memory: mutex");
+    checkpoint->descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
+    bool is_open = checkpoint->descriptor >= 0 || open_failed(path, "open", messages);
+    if (is_open && flock(checkpoint->descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+        message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is in use by another process", path);
+        is_open = false;
+    }
+    is_open = is_open && header_take(checkpoint, key, messages);
+    checkpoint->end = (off_t)(sizeof(FileHeader) + strlen(key));
+    if (is_open && !records_find(checkpoint)) is_open = open_failed(path, "read", messages);
+    if (is_open) {
+        folder_sync(path);
+        return checkpoint;
+    }
+    checkpoint_close(checkpoint, false, messages);
+    return NULL;
+}
+
+const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count)
+{
+    *count = checkpoint->bands.count;
+    return checkpoint->bands.items;
+}
+
+static bool checkpoint_failed(Checkpoint *checkpoint, const char *doing)
+{
+    if (!checkpoint->failure && asprintf(&checkpoint->failure, "cannot %s the checkpoint '%s': %s", doing,
+                                         checkpoint->path, strerror(errno)) < 0)
+        fault("out of memory: message");
+    return false;
+}
+
+static bool record_write(Checkpoint *checkpoint, const RecordHeader *record, const Film *band)
+{
+    off_t offset = checkpoint->end;
+    if (!bytes_write(checkpoint->descriptor, record, sizeof *record, offset)) return false;
+    offset += (off_t)sizeof *record;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!band->layers[layer]) continue;
+        size_t size = film_layer_size(band, layer);
+        if (!bytes_write(checkpoint->descriptor, band->layers[layer], size, offset)) return false;
+        offset += (off_t)size;
+    }
+    double now = clock_seconds();
+    if (now - checkpoint->synced_seconds < SYNC_SECONDS) return true;
+    checkpoint->synced_seconds = now;
+    return fdatasync(checkpoint->descriptor) == 0;
+}
+
+bool checkpoint_append(Checkpoint *checkpoint, const Film *band)
+{
+    const RecordHeader record = record_of(band);
+    pthread_mutex_lock(&checkpoint->mutex);
+    bool is_written = !checkpoint->failure &&
+                      (record_write(checkpoint, &record, band) || checkpoint_failed(checkpoint, "write"));
+    if (is_written) record_note(checkpoint, &record);
+    pthread_mutex_unlock(&checkpoint->mutex);
+    return is_written;
+}
+
+bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
+{
+    *band = (Film){0};
+    pthread_mutex_lock(&checkpoint->mutex);
+    off_t offset = 0;
+    for (size_t i = 0; i < checkpoint->bands.count; i++)
+        if (checkpoint->bands.items[i].first_row == first_row) offset = checkpoint->offsets.items[i];
+    RecordHeader record;
+    bool is_read = bytes_read(checkpoint->descriptor, &record, sizeof record, offset);
+    if (is_read) *band = record_film(&record);
+    offset += (off_t)sizeof record;
+    for (Layer layer = 0; layer < LAYER_COUNT && is_read; layer++) {
+        if (!(record.layers >> layer & 1)) continue;
+        size_t size = film_layer_size(band, layer);
+        band->layers[layer] = memory_allocate(size, 1);
+        is_read = bytes_read(checkpoint->descriptor, band->layers[layer], size, offset);
+        offset += (off_t)size;
+    }
+    if (!is_read) checkpoint_failed(checkpoint, "read");
+    pthread_mutex_unlock(&checkpoint->mutex);
+    if (!is_read) film_free(band);
+    return is_read;
+}
+
+// Unless another file has the name now, such as the image itself.
+static void file_remove(const Checkpoint *checkpoint)
+{
+    struct stat own, named;
+    if (fstat(checkpoint->descriptor, &own) == 0 && lstat(checkpoint->path, &named) == 0 &&
+        own.st_dev == named.st_dev && own.st_ino == named.st_ino)
+        unlink(checkpoint->path);
+}
+
+void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages)
+{
+    if (checkpoint->failure) message_add(messages, MESSAGE_ERROR, "%s", checkpoint->failure);
+    if (is_complete) file_remove(checkpoint);
+    if (checkpoint->descriptor >= 0) {
+        if (!is_complete) fdatasync(checkpoint->descriptor);
+        close(checkpoint->descriptor);
+    }
+    pthread_mutex_destroy(&checkpoint->mutex);
+    free(checkpoint->bands.items);
+    free(checkpoint->offsets.items);
+    free(checkpoint->failure);
+    free(checkpoint->path);
+    free(checkpoint);
+}

@@ -1,0 +1,300 @@
+// Checkpoints: what was appended is read again, whatever a crash left at the end of the file; a file that is
+// not this image's is refused and stays as it was.
+#include "host/base/memory.h"
+#include "host/base/text.h"
+#include "host/render/scheduler.h"
+#include "tests/child.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+enum { WIDTH = 5, ROWS = 12, BAND_ROWS = 4, BANDS = ROWS / BAND_ROWS, COLOR_VALUES = BAND_ROWS * WIDTH * 3 };
+static const char key[] = "size: 5x12\nscene: 1234\n";
+static char *folder, path[64];
+
+static float color_value(uint32_t row, uint32_t i)
+{
+    return (float)(row * 100 + i);
+}
+
+// A band with a color and an integer layer.
+typedef struct {
+    float color[COLOR_VALUES];
+    uint32_t object[BAND_ROWS * WIDTH];
+} Values;
+
+static Film band_make(Values *values, uint32_t first_row)
+{
+    for (uint32_t i = 0; i < COLOR_VALUES; i++)
+        values->color[i] = color_value(first_row, i);
+    for (uint32_t i = 0; i < BAND_ROWS * WIDTH; i++)
+        values->object[i] = first_row + i;
+    Film band = {.width = WIDTH,
+                 .height = BAND_ROWS,
+                 .light_count = 2,
+                 .first_row = first_row,
+                 .real_size = sizeof(float)};
+    band.layers[LAYER_COLOR] = values->color;
+    band.layers[LAYER_OBJECT] = values->object;
+    return band;
+}
+
+static Checkpoint *open_checked(void)
+{
+    MessageList messages = {0};
+    Checkpoint *checkpoint = checkpoint_open(path, key, &messages);
+    message_list_print(&messages, stderr);
+    assert_non_null(checkpoint);
+    assert_int_equal(messages.count, 0);
+    return checkpoint;
+}
+
+static void close_checked(Checkpoint *checkpoint, bool is_complete)
+{
+    MessageList messages = {0};
+    checkpoint_close(checkpoint, is_complete, &messages);
+    assert_int_equal(messages.count, 0);
+}
+
+static size_t band_count(const Checkpoint *checkpoint)
+{
+    size_t count;
+    checkpoint_bands(checkpoint, &count);
+    return count;
+}
+
+static void append(Checkpoint *checkpoint, uint32_t first_row)
+{
+    Values values;
+    const Film band = band_make(&values, first_row);
+    assert_true(checkpoint_append(checkpoint, &band));
+}
+
+static void read_checked(Checkpoint *checkpoint, uint32_t first_row)
+{
+    Values values;
+    const Film expected = band_make(&values, first_row);
+    Film band;
+    assert_true(checkpoint_read(checkpoint, first_row, &band));
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        assert_int_equal(band.layers[layer] != NULL, expected.layers[layer] != NULL);
+        if (band.layers[layer])
+            assert_memory_equal(band.layers[layer], expected.layers[layer],
+                                film_layer_size(&expected, layer));
+    }
+    assert_int_equal(band.first_row, first_row);
+    assert_int_equal(band.light_count, expected.light_count);
+    film_free(&band);
+}
+
+// A file with all bands, the last first. Returns its bytes.
+static Text file_make(void)
+{
+    unlink(path);
+    Checkpoint *checkpoint = open_checked();
+    for (uint32_t i = BANDS; i-- > 0;)
+        append(checkpoint, i * BAND_ROWS);
+    close_checked(checkpoint, false);
+    Text bytes = {0};
+    MessageList messages = {0};
+    assert_true(text_read_file(&bytes, path, &messages));
+    return bytes;
+}
+
+static void file_write(const char *bytes, size_t size)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
+}
+
+static size_t file_size(void)
+{
+    struct stat status;
+    assert_int_equal(stat(path, &status), 0);
+    return (size_t)status.st_size;
+}
+
+static void test_bands_are_read_again(void **state)
+{
+    (void)state;
+    Text bytes = file_make();
+    Checkpoint *checkpoint = open_checked();
+    assert_int_equal(band_count(checkpoint), BANDS);
+    for (uint32_t i = 0; i < BANDS; i++)
+        read_checked(checkpoint, i * BAND_ROWS);
+    close_checked(checkpoint, true);
+    assert_int_not_equal(access(path, F_OK), 0); // the image is complete
+    text_free(&bytes);
+}
+
+// Cut off at any byte, the file has the bands before it, and goes on from there.
+static void test_torn_writes(void **state)
+{
+    (void)state;
+    Text bytes = file_make();
+    size_t header_size, kept = 0;
+    unlink(path);
+    close_checked(open_checked(), false);
+    header_size = file_size();
+    const size_t record_size = (bytes.count - header_size) / BANDS;
+    assert_int_equal(record_size * BANDS, bytes.count - header_size);
+    for (size_t size = 0; size <= bytes.count; size++) {
+        file_write(bytes.items, size);
+        Checkpoint *checkpoint = open_checked();
+        kept = size < header_size ? 0 : (size - header_size) / record_size;
+        assert_int_equal(band_count(checkpoint), kept);
+        assert_int_equal(file_size(), header_size + kept * record_size);
+        if (kept < BANDS) {
+            const uint32_t first_row = (uint32_t)(BANDS - 1 - kept) * BAND_ROWS;
+            append(checkpoint, first_row);
+            read_checked(checkpoint, first_row);
+        }
+        close_checked(checkpoint, false);
+    }
+    text_free(&bytes);
+}
+
+// A wrong byte ends what is believed.
+static void test_wrong_bytes(void **state)
+{
+    (void)state;
+    Text bytes = file_make();
+    unlink(path);
+    close_checked(open_checked(), false);
+    const size_t header_size = file_size(), record_size = (bytes.count - header_size) / BANDS;
+    for (size_t at = header_size; at < bytes.count; at++) {
+        bytes.items[at] ^= 0x10;
+        file_write(bytes.items, bytes.count);
+        Checkpoint *checkpoint = open_checked();
+        assert_int_equal(band_count(checkpoint), (at - header_size) / record_size);
+        close_checked(checkpoint, false);
+        bytes.items[at] ^= 0x10;
+    }
+    text_free(&bytes);
+}
+
+// Refused with a reason, and left as it is.
+static void refused(const char *other_key, const char *reason)
+{
+    Text before = {0}, after = {0};
+    MessageList messages = {0};
+    text_read_file(&before, path, &messages);
+    assert_null(checkpoint_open(path, other_key, &messages));
+    assert_int_equal(messages.count, 1);
+    if (!strstr(messages.items[0].text, reason)) fail_msg("%s", messages.items[0].text);
+    message_list_free(&messages);
+    text_read_file(&after, path, &messages);
+    assert_int_equal(before.count, after.count);
+    assert_memory_equal(before.items, after.items, before.count);
+    text_free(&before);
+    text_free(&after);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    Text bytes = file_make();
+    refused("size: 6x12\nscene: 1234\n", "is of another image (size: 5x12, not 6x12)");
+    refused("size: 5x12\nscene: 9\n", "is of another image (scene: 1234, not 9)");
+    refused("size: 5x12\nlanes: 4\nscene: 1234\n", "is of another image (lanes: , not 4)");
+    Checkpoint *checkpoint = open_checked();
+    refused(key, "is in use by another process");
+    close_checked(checkpoint, false);
+    file_write("camera: {position: [0, 0, 0]}\n", 30);
+    refused(key, "is not a checkpoint of this version of glint");
+    bytes.items[16]++; // the format
+    file_write(bytes.items, bytes.count);
+    refused(key, "is not a checkpoint of this version of glint");
+    text_free(&bytes);
+
+    MessageList messages = {0};
+    assert_null(checkpoint_open("/dev/null", key, &messages));
+    assert_null(checkpoint_open("/nowhere/file", key, &messages));
+    assert_int_equal(messages.count, 2);
+    message_list_free(&messages);
+}
+
+typedef struct {
+    uint32_t rows, rendered;
+    bool is_right;
+} Sink;
+
+static bool band_sink(void *context, const Film *band, double fraction_done)
+{
+    (void)fraction_done;
+    Sink *sink = context;
+    const float *color = band->layers[LAYER_COLOR];
+    sink->is_right = sink->is_right && band->first_row == sink->rows;
+    for (uint32_t i = 0; i < COLOR_VALUES; i++)
+        sink->is_right = sink->is_right && color[i] == color_value(band->first_row, i);
+    sink->rows += band->height;
+    return true;
+}
+
+// Only missing bands are handed out; all reach the sink in order.
+static void test_a_render_goes_on(void **state)
+{
+    (void)state;
+    for (unsigned done = 0; done < 1 << BANDS; done++) {
+        unlink(path);
+        Checkpoint *checkpoint = open_checked();
+        unsigned done_count = 0;
+        for (uint32_t i = BANDS; i-- > 0;)
+            if (done >> i & 1) {
+                append(checkpoint, i * BAND_ROWS);
+                done_count++;
+            }
+        close_checked(checkpoint, false);
+        checkpoint = open_checked();
+        Sink sink = {.is_right = true};
+        Scheduler *scheduler = scheduler_open(&(SchedulerSettings){.row_count = ROWS,
+                                                                   .worker_count = 1,
+                                                                   .sink = band_sink,
+                                                                   .context = &sink,
+                                                                   .checkpoint = checkpoint});
+        for (BandRows rows; (rows = scheduler_take(scheduler, 0, BAND_ROWS, 1)).row_count > 0;) {
+            Values values;
+            const Film band = band_make(&values, rows.first_row);
+            assert_int_equal(rows.row_count, BAND_ROWS);
+            assert_false(done >> rows.first_row / BAND_ROWS & 1);
+            assert_true(scheduler_give(scheduler, 0, &band));
+        }
+        WorkerShare share;
+        assert_true(scheduler_close(scheduler, &share));
+        assert_true(sink.is_right);
+        assert_int_equal(sink.rows, ROWS);
+        assert_int_equal(share.bands, BANDS - done_count);
+        assert_int_equal(band_count(checkpoint), BANDS);
+        close_checked(checkpoint, true);
+    }
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    folder = scratch_open();
+    snprintf(path, sizeof path, "%s/checkpoint", folder);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scratch_close(folder);
+    return 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands_are_read_again),
+                                       cmocka_unit_test(test_torn_writes), cmocka_unit_test(test_wrong_bytes),
+                                       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_a_render_goes_on)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,133 @@
+#!/usr/bin/env -S python3 -B
+"""A render that ends early goes on where it was, and its image is that of an undisturbed one: after kill -9, a full disk, an
+interrupt and a device's failure, on one device and on two. GLINT_LONG_TESTS=1: 200 kills."""
+import os
+import random
+import resource
+import struct
+import subprocess
+from pathlib import Path
+
+from glint import IS_LONG, PROGRAM, SPHERE, TestCase, find_icd, has_device, main, skip_all, write
+
+# one compute unit: bands are short
+POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
+TWO = POCL | {"POCL_DEVICES": "pthread pthread"}
+ROWS = 256
+RENDER = f"render sphere.yaml --size 64x{ROWS} --samples 100 --precision strict --quiet"
+BYTES_MAX = 120 << 10  # a file of at most that has no whole checkpoint, but the first band
+KILLS = 200 if IS_LONG else 6
+
+
+class Checkpoints(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("sphere.yaml", SPHERE)
+        self.glint(f"{RENDER} -o whole.npy", env=POCL)  # and the kernel is in the cache
+
+    def end_early(self, options="", env=None):
+        """The disk is full."""
+        self.glint(f"{RENDER} {options} -o whole.npy", env=env or POCL)  # the drivers' files are written
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
+        self.refuses(f"{RENDER} {options} -o part.png --checkpoint saved", "cannot write the checkpoint 'saved': File too large",
+                     env=env or POCL, preexec_fn=limit)
+        self.assertFalse(os.path.exists("part.png"))
+
+    def go_on(self, options="", env=None):
+        """The share of the rows that was rendered."""
+        report = self.json(f"{RENDER} {options} -o image.npy --checkpoint saved --timing=json", env=env or POCL)
+        self.assertSameBytes("image.npy", "whole.npy")
+        self.assertFalse(os.path.exists("saved"), "it is removed once the image is complete")
+        return sum(device["share"] for device in report["by_device"])
+
+    def share_saved(self):
+        """Of the rows, in whole records."""
+        data = Path("saved").read_bytes()
+        head = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQ16s")  # of the file and of a record
+        if len(data) < head[0].size:
+            return 0
+        at, rows = head[0].size + head[0].unpack_from(data)[2], 0
+        while at + head[1].size <= len(data):
+            _, _, row_count, _, _, _, _, size, _ = head[1].unpack_from(data, at)
+            at += head[1].size + size
+            rows += row_count if at <= len(data) else 0
+        return rows / ROWS
+
+    def test_undisturbed(self):
+        self.assertEqual(self.go_on(), 1)
+
+    def test_full_disk(self):
+        self.end_early()
+        self.assertTrue(0 < self.go_on() < 1)
+
+    def test_two_devices(self):
+        self.end_early("--device all", TWO)
+        self.assertTrue(0 < self.go_on("--device all", TWO) < 1)
+
+    def test_another_device(self):
+        """At strict any device may go on."""
+        self.end_early("--lanes 1")
+        self.assertTrue(0 < self.go_on("--lanes 4") < 1)
+
+    def test_only_missing_bands_are_rendered(self):
+        self.end_early()
+        saved = self.share_saved()
+        self.assertGreater(saved, 0)
+        self.assertAlmostEqual(self.go_on(), 1 - saved)
+
+    def test_other_images(self):
+        self.end_early()
+        saved = Path("saved").read_bytes()
+        write("other.yaml", SPHERE.replace("radius: 1", "radius: 1.01"))
+        for command, reason in ((RENDER.replace("sphere", "other"), "scene"), (RENDER.replace("256", "128"), "size"),
+                                (RENDER.replace("strict", "single"), "precision"), (RENDER.replace("100", "99"), "samples"),
+                                (f"{RENDER} --region 0,0,64,64", "region"), (f"{RENDER} --bounces 3", "bounces"),
+                                (f"{RENDER} --aov t", "AOVs"), (f"{RENDER} --perturb 1", "perturb")):
+            self.refuses(f"{command} -o other.npy --checkpoint saved", rf"'saved' is of another image \({reason}: ", env=POCL)
+        self.refuses(f"{RENDER} -o other.npy --checkpoint sphere.yaml", "'sphere.yaml' is not a checkpoint", env=POCL)
+        self.assertEqual(Path("saved").read_bytes(), saved)
+        self.assertEqual(Path("sphere.yaml").read_text(encoding="utf-8"), SPHERE)
+        self.assertTrue(0 < self.go_on() < 1)
+
+    def test_other_devices_at_single(self):
+        single = RENDER.replace("strict", "single")
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
+        self.glint(f"{single} -o other.png", env=POCL)
+        self.refuses(f"{single} -o other.png --checkpoint saved", "File too large", env=POCL, preexec_fn=limit)
+        self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"of another image \(devices: ", env=POCL)
+
+    def test_the_image_itself(self):
+        """A checkpoint of the image's own name is replaced by the image, not removed."""
+        self.glint(f"{RENDER} -o same.npy --checkpoint same.npy", env=POCL)
+        self.assertSameBytes("same.npy", "whole.npy")
+
+    def test_kills(self):
+        """kill -9 at any moment; whatever is left, the next run goes on."""
+        command = [PROGRAM, *f"{RENDER.replace('100', '3000')} --device all -o image.npy --checkpoint saved".split()]
+        environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"} | TWO
+        self.glint(f"{RENDER.replace('100', '3000')} -o whole.npy", env=POCL)
+        moments = random.Random(1)
+        kills = renders = 0
+        while kills < KILLS:
+            process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
+            try:
+                status = process.wait(moments.uniform(0, 0.5))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                kills += 1
+                status = process.wait()
+            if status == 0:
+                self.assertSameBytes("image.npy", "whole.npy")
+                os.remove("image.npy")
+                renders += 1
+            else:
+                self.assertEqual(status, -9)
+        saved = self.share_saved() if os.path.exists("saved") else 0
+        self.assertAlmostEqual(self.go_on("--device all --samples 3000", TWO), 1 - saved)
+        print(f"{kills} kills, {renders} images complete between them")
+
+
+if __name__ == "__main__":
+    if not has_device(env=POCL):
+        skip_all("PoCL is not installed")
+    main()
