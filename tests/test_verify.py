@@ -6,10 +6,9 @@ build, many times as slow, runs the host's side of a few."""
 import re
 import unittest
 
-from glint import IS_LONG, IS_SANITIZED, ROOT, TestCase, csv_rows, main, need_device, npy_read, read, run, write
+from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, csv_rows, main, need_device, npy_read, read, run, write
 
 DEVICE = need_device()
-EVERY_SHAPE = ROOT / "tests/scenes/every_shape.yaml"
 TIERS = {"fast": "A", "single": "B", "strict": "C", "double": "D"}
 PRECISIONS = [precision for precision in TIERS if precision != "double" or DEVICE["fp64"]]
 ALL_CASES = re.findall(r"\b[A-Z][1-9]\b", run("verify NONE").stderr)
@@ -45,10 +44,10 @@ class Verify(VerifyTestCase):
     def test_lanes_and_features_of_kernels_do_not_change_bits(self):
         cases, precision = ["S5", "C7"], "single"
         if not IS_SANITIZED:
-            # test_variants has the images of the short test
-            cases, precision = ["S5", "C6", "C7", "T1", "R4"], "strict"
+            # rays alone: test_variants has the images of the short test
+            cases, precision = ["S5", "C7", "R4"], "strict"
         if IS_LONG:
-            cases += ["S2", "P2", "R2", "R6"]
+            cases += ["S2", "C6", "T1", "P2", "R2", "R6"]
         hashes = self.hashes(cases, f"--precision {precision} --lanes 1")
         self.assertEqual(self.hashes(cases, f"--precision {precision} --lanes 8"), hashes)
         lean = ["S5", "C7"] if IS_LONG else ["S5"]
@@ -69,6 +68,10 @@ class Verify(VerifyTestCase):
 
 @unittest.skipIf(IS_SANITIZED, "sanitizers do not see kernels")
 class PerturbedDevice(VerifyTestCase):
+    def scene(self):
+        """Every shape if there is time: its kernels take many seconds to build."""
+        return ROOT / "tests/scenes/every_shape.yaml" if IS_LONG else write("scene.yaml", SPHERE)
+
     def test_cases_pass(self):
         """R7's colors and, at fast, R6 need better roots, powers and quotients than that (docs/verify.md)."""
         # the short test leaves out what renders images or needs many seconds
@@ -82,16 +85,16 @@ class PerturbedDevice(VerifyTestCase):
 
     def test_a_thousand_times_the_errors_fail(self):
         """Not in every case: a plane needs no root and few quotients."""
-        cases = ["S6", "R1", "R3"] if IS_LONG else ["S6"]
+        cases = ["S1", "S6", "R1", "R3"] if IS_LONG else ["S1"]
         report = self.verify(cases, "--precision single --perturb 1:1000", status=3)
         for case in report["cases"]:
             self.assertGreater(case["wrong"], 0, case["name"])
-        text = self.glint("verify S6 --precision single --perturb 1:1000", status=3).stdout
-        self.assertRegex(text, "(?m)^  S6 .*FAIL.* wrong")
+        text = self.glint("verify S1 --precision single --perturb 1:1000", status=3).stdout
+        self.assertRegex(text, "(?m)^  S1 .*FAIL.* wrong")
 
     def test_strict_and_double_keep_their_bits(self):
         """Strict corrects what a device does wrong, and at double no ray meets anything that may be wrong."""
-        cases = ["S1", "S6", "P4", "C5", "C7", "T2", "M4", "R4"]
+        cases = ["S1", "P4", "C5", "C7", "T2", "M4", "R4"] + (["S6"] if IS_LONG else [])
         for precision in PRECISIONS[2:] if IS_LONG else ["strict"]:
             hashes = self.hashes(cases, f"--precision {precision}")
             self.assertEqual(self.hashes(cases, f"--precision {precision} --perturb 7"), hashes)
@@ -100,8 +103,10 @@ class PerturbedDevice(VerifyTestCase):
 
     def test_images(self):
         """Each seed has an image of its own, the same every time and at every number of lanes."""
+        scene = self.scene()
+
         def pixels(arguments):
-            self.glint(f"render {EVERY_SHAPE} --size 64x36 --quiet -o image.npy {arguments}")
+            self.glint(f"render {scene} --size 64x36 --quiet -o image.npy {arguments}")
             return npy_read("image.npy")[2]
 
         if IS_LONG:
@@ -111,8 +116,9 @@ class PerturbedDevice(VerifyTestCase):
         self.assertNotEqual(pixels("--perturb 8"), seed_7)
 
     def test_traced_rays(self):
-        write("rays", "0 1 -9 0 0.01 1\n-5 1 0 1 0 0.02\n1 9 -2 0.01 -1 0\n")
-        plain, perturbed = (csv_rows(self.glint(f"trace {EVERY_SHAPE} --rays rays {option}").stdout)
+        write("rays", "0.3 0.4 -9 0 0.01 1\n-5 1 0 1 0 0.02\n1 9 -2 0.01 -1 0\n")
+        scene = self.scene()
+        plain, perturbed = (csv_rows(self.glint(f"trace {scene} --rays rays {option}").stdout)
                             for option in ("", "--perturb 7"))
         self.assertNotEqual(perturbed, plain)
 
