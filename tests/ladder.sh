@@ -6,7 +6,9 @@ is_sanitized && skip_all "the plain build measures the same kernels"
 build=${BUILD:-build}
 make=${MAKE:-make}
 check "the ladder builds" $make -s BUILD="$build" ladder
+rays=500
+is_long && rays=1500
 for shape in sphere plane disc box cylinder cone triangle torus paraboloid; do
-    check "$shape" "$build/tools/numerics/ladder" --rays 1500 --check --shape $shape
+    check "$shape" "$build/tools/numerics/ladder" --rays $rays --check --shape $shape
 done
 finish
