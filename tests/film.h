@@ -7,9 +7,9 @@
 // GLINT_LONG_TESTS=1: tests take minutes instead of seconds.
 bool tests_are_long(void);
 
-// The lanes to compare, up to a 0: 1 and 4; where tests are long also 8 and 16, which take the compiler
-// longest.
-const uint32_t *tested_lanes(void);
+// The lanes to compare, up to a 0: 1 and the device's own, which most other tests use, or 4 where that is 1;
+// where tests are long 1, 4, 8 and 16.
+const uint32_t *tested_lanes(const Device *device);
 
 // The whole image, one sample per pixel, with the defaults of glint render, but for the features: unless
 // tests are long all are built in, so that all tests of a run share one program per precision.

@@ -419,7 +419,7 @@ static void rays_may_look_behind_their_start(void **state)
             behind += expected[i].object < plane && expected[i].t < 0;
             dimmed += expected[i].light > 0 && expected[i].light < 1;
         }
-        for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+        for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             char what[40];
             snprintf(what, sizeof what, "%s, %u lanes", precision_names[precisions[k]], *lanes);
             trace_lanes(&scene, precisions[k], BVH_ON, *lanes, rays, COUNT, hits);

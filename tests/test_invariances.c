@@ -159,7 +159,7 @@ static void runs_bands_and_bvh_change_nothing(const Case *c)
 
 static void lanes_change_nothing(const Case *c)
 {
-    for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+    for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
         RenderSettings settings = c->settings;
         settings.lanes = *lanes;
         if (settings.precision != PRECISION_SINGLE && settings.lanes > 1) break;

@@ -179,7 +179,7 @@ static void no_pixel_depends_on_the_bvh(void **state)
         for (size_t i = 0; i < scene_count; i++) {
             random_state.state = i + 1;
             Scene scene = scene_attacking(scales[i % 3]);
-            for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+            for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
                 if (*lanes == 1) continue; // has no macro-tiles
                 RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
                 settings.lanes = *lanes;

@@ -29,7 +29,7 @@ static void takes_a_veils_light_once(void **state)
     settings.lanes = 1;
     settings.bvh = BVH_OFF;
     Film expected = film_render(&probe_compute, &scene, &settings, 0);
-    for (const uint32_t *lanes = tested_lanes(); *lanes; lanes++) {
+    for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
         settings.lanes = *lanes;
         for (BvhChoice bvh = BVH_ON; bvh <= BVH_OFF; bvh++) {
             settings.bvh = bvh;
