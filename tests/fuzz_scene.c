@@ -155,7 +155,7 @@ static bool scene_read(const char *format, const char *bytes, size_t length)
     bool read = !strcmp(format, "rt")    ? scene_read_rt(&scene, &source, &options, &messages)
                 : !strcmp(format, "cfg") ? scene_read_cfg(&scene, &source, &messages)
                 : !strcmp(format, "nff") ? scene_read_nff(&scene, &source, &messages)
-                                         : scene_read_yaml(&scene, &source, &messages);
+                                         : scene_read_yaml(&scene, &source, &options, &messages);
     if (read == (message_count(&messages, MESSAGE_ERROR) > 0)) abort(); // errors and the verdict must agree
     scene_free(&scene);
     message_list_free(&messages);

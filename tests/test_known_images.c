@@ -20,7 +20,7 @@ static Scene scene_of(const char *text)
     MessageList messages = {0};
     Source source = {"image.yaml", text, strlen(text)};
     Scene scene;
-    bool read = scene_read_yaml(&scene, &source, &messages);
+    bool read = scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages);
     if (!read) message_list_print(&messages, stderr);
     message_list_free(&messages); // warnings are not the point here
     assert_true(read);

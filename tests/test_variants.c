@@ -155,7 +155,7 @@ static Scene scene_with_warnings(const char *text)
     MessageList messages = {0};
     Source source = {"feature.yaml", text, strlen(text)};
     Scene scene;
-    assert_true(scene_read_yaml(&scene, &source, &messages));
+    assert_true(scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages));
     message_list_free(&messages);
     return scene;
 }

@@ -17,7 +17,7 @@ import threading
 import time
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, TestCase, main, need_device, png_read, run, skip_all, write
+from glint import IS_LONG, PROGRAM, ROOT, TestCase, main, need_device, png_read, run, skip_all, write
 
 SCENE = """\
 camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
@@ -65,6 +65,12 @@ def screen():
 
 def xdotool(*arguments):
     return subprocess.run(["xdotool", *map(str, arguments)], check=True, capture_output=True, text=True).stdout
+
+
+def xdotool_finds(process):
+    """Whether a window of the process is shown."""
+    command = ["xdotool", "search", "--onlyvisible", "--pid", str(process)]
+    return subprocess.run(command, check=False, capture_output=True).returncode == 0
 
 
 def png_rows(path):
@@ -275,6 +281,58 @@ class View(TestCase):
         write("mesh.obj", MESH.replace("1 1 0", "1.5 1 0"))
         window.shows_at_last(self.image_of(re.sub("^camera: .*", camera, SCENE)))
         window.close()
+
+    def test_reload_of_an_image(self):
+        """One that breaks leaves the last scene, which can be moved and saved."""
+        text = SCENE + "  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {image: image.png}}\n"
+        shutil.copy(ROOT / "scenes/images/globe.png", "image.png")
+        write("scene.yaml", text)
+        shutil.copytree(".", "before")
+        window = Window(self)
+        window.saved()
+        write("image.png", "no image")
+        window.line("^scene.yaml:6:.*image.png")
+        window.key("Left")
+        write("before/scene.yaml", re.sub("^camera: .*", window.camera(), text))
+        self.glint(f"render before/scene.yaml --size {WIDTH}x{HEIGHT} --samples {SAMPLES} -o before.png")
+        self.assertSameBytes(window.saved(), "before.png")
+        window.key("x")
+        shutil.copy("before/image.png", "image.png")
+        window.shows_at_last(png_rows("before.png"))
+        window.close()
+
+    def test_mesh_of_a_mistaken_scene(self):
+        """A mesh that only the mistaken scene names is watched."""
+        window = Window(self)
+        window.saved()
+        text = SCENE.replace("mesh.obj", "other.obj")
+        write("scene.yaml", text)
+        window.line("^scene.yaml:5:.*other.obj: No such file")
+        write("other.obj", MESH.replace("1 1 0", "1.5 1 0"))
+        window.shows_at_last(self.image_of(text))
+        window.close()
+
+    def test_slow_scene(self):
+        """The window is there while the scene is read, here from a pipe; it can be closed meanwhile."""
+        for closes in False, True:
+            with self.subTest(closes=closes):
+                Path("slow.yaml").unlink(missing_ok=True)
+                os.mkfifo("slow.yaml")
+                window = Window(self, "slow.yaml")
+                window.title_at_last("preparing")
+                if closes:
+                    window.key("Escape")
+                    end = time.monotonic() + DEADLINE
+                    while xdotool_finds(window.process.pid):
+                        self.assertLess(time.monotonic(), end, "the window is still shown")
+                with open("slow.yaml", "w") as pipe:
+                    self.write_by_rename("slow.yaml", SCENE)  # where it is read again
+                    pipe.write(SCENE)
+                if closes:
+                    self.assertEqual(window.process.wait(DEADLINE), 0)
+                else:
+                    window.shows_at_last(self.image_of(SCENE))
+                    window.close()
 
     @staticmethod
     def write_by_rename(path, text):

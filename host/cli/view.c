@@ -80,39 +80,30 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
 
 #if HAS_WINDOW
 
-typedef struct {
-    const char *scene_path;
-    Transfer transfer;
-} SaveContext;
-
 // As glint render writes it.
 static bool image_save(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
                        Renderer *renderer, const Film *film, MessageList *messages)
 {
-    const SaveContext *save = context;
-    const ImageOutputOptions options = {.path = path, .transfer = save->transfer, .bits = 8};
-    ImageOutput *output = image_output_open(&options, save->scene_path, scene, settings, &renderer, 1);
+    const ViewOptions *view = context;
+    const Transfer transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    const ImageOutputOptions options = {.path = path, .transfer = transfer, .bits = 8};
+    ImageOutput *output = image_output_open(&options, view->scene, scene, settings, &renderer, 1);
     double seconds;
     if (image_output_write(output, film, messages)) return image_output_commit(output, messages, &seconds);
     image_output_abandon(output);
     return false;
 }
 
-// Takes the scene.
-static int scene_view(ViewOptions *options, Scene *scene, const Device *device)
+static int scene_view(ViewOptions *options, const Device *device)
 {
-    image_size_choose(scene, &options->width, &options->height);
-    SaveContext save = {options->scene,
-                        scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB};
     WindowOptions window = {
         .frames = {.device = device,
                    .scene_path = options->scene,
                    .scene_options = {.lenient = options->common.lenient},
-                   .scene = scene,
                    .settings = settings_whole(&options->common, options->width, options->height),
-                   .transfer = save.transfer,
+                   .choose_size = image_size_choose,
                    .save = image_save,
-                   .save_context = &save},
+                   .save_context = options},
         .size = {options->width, options->height},
         .stop = progress_interrupted,
     };
@@ -137,13 +128,10 @@ int command_view(int argument_count, char **arguments)
     ViewOptions options;
     int status = options_read(&options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    Scene scene = {0};
-    if (!scene_open(&scene, options.scene, &options.common)) return EXIT_USER;
     DeviceList devices;
     const Device *device = device_find(&devices, options.common.device);
-    status = device ? scene_view(&options, &scene, device) : EXIT_USER;
+    status = device ? scene_view(&options, device) : EXIT_USER;
     device_list_close(&devices);
-    scene_free(&scene);
     return status;
 }
 

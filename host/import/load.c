@@ -1,8 +1,17 @@
 #include "host/import/load.h"
 
 #include "host/base/text.h"
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+void file_names_free(FileNames *names)
+{
+    for (size_t i = 0; i < names->count; i++)
+        free(names->items[i]);
+    free(names->items);
+    *names = (FileNames){0};
+}
 
 bool scene_finish(Scene *scene, Report *report)
 {
@@ -28,7 +37,7 @@ static bool scene_read(Scene *scene, const Source *source, const SceneOptions *o
     if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
     if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
     if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
-    return scene_read_yaml(scene, source, messages);
+    return scene_read_yaml(scene, source, options, messages);
 }
 
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)

@@ -5,7 +5,16 @@
 #include "host/scene/scene.h"
 
 typedef struct {
+    char **items;
+    size_t count, capacity;
+} FileNames;
+
+void file_names_free(FileNames *names); // and zeroes
+
+typedef struct {
     bool lenient; // skip unknown elements of .rt with a warning
+    // Receives the meshes and images that the file names, as far as it was read; NULL: not wanted.
+    FileNames *files;
 } SceneOptions;
 
 // Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff). On a mistake in the file returns
@@ -13,7 +22,7 @@ typedef struct {
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // The readers, from memory; `source->file` is used in messages only.
-bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages);
+bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);

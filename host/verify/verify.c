@@ -273,7 +273,7 @@ Scene verify_scene(const char *objects)
     Source source = {"verify", text_c(&text), text.count};
     MessageList messages = {0};
     Scene scene = {0};
-    if (!scene_read_yaml(&scene, &source, &messages))
+    if (!scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages))
         fault("a scene of verify cannot be read:\n%s", source.bytes);
     message_list_free(&messages);
     text_free(&text);
@@ -285,7 +285,7 @@ bool verify_is_refused(const char *text)
     Source source = {"verify", text, strlen(text)};
     MessageList messages = {0};
     Scene scene = {0};
-    bool read = scene_read_yaml(&scene, &source, &messages);
+    bool read = scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages);
     bool refused = !read && message_count(&messages, MESSAGE_ERROR) > 0;
     message_list_free(&messages);
     scene_free(&scene);

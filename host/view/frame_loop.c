@@ -21,7 +21,9 @@ struct FrameLoop {
     FrameRequest request;
     unsigned request_number;
     bool quits;
-    bool reloads; // the scene's files have changed
+    bool reloads; // the scene's files have changed, or have not been read
+    SceneState scene_state;
+    ImageSize scene_size;
     char *save_path, *message;
     Frame ready;
     bool has_ready;
@@ -156,7 +158,7 @@ static void frame_fill(FrameLoop *loop, uint32_t samples)
                  vector_length(vector_subtract(camera->look_at, camera->position)));
     else
         view_color(frame->pixels, film, samples < loop->settings.sample_count ? samples : 1,
-                   loop->options.transfer);
+                   loop->scene.color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB);
 }
 
 static void distances_fill(FrameLoop *loop)
@@ -344,17 +346,14 @@ static void image_save(FrameLoop *loop, char *path)
     free(path);
 }
 
-static void files_watch(const FrameLoop *loop)
+// The scene's file, and those that it names, also where it has a mistake: it may lie in one of them.
+static void files_watch(const FrameLoop *loop, const FileNames *named)
 {
-    const Scene *scene = &loop->scene;
-    const char **paths = memory_allocate(1 + scene->textures.count + scene->meshes.count, sizeof *paths);
-    size_t count = 0;
-    paths[count++] = loop->options.scene_path;
-    for (size_t i = 0; i < scene->textures.count; i++)
-        paths[count++] = scene->textures.items[i].path;
-    for (size_t i = 0; i < scene->meshes.count; i++)
-        if (scene->meshes.items[i].path) paths[count++] = scene->meshes.items[i].path;
-    watch_set(loop->watch, paths, count);
+    const char **paths = memory_allocate(1 + named->count, sizeof *paths);
+    paths[0] = loop->options.scene_path;
+    for (size_t i = 0; i < named->count; i++)
+        paths[1 + i] = named->items[i];
+    watch_set(loop->watch, paths, 1 + named->count);
     free(paths);
 }
 
@@ -369,31 +368,70 @@ static void files_changed(void *context)
 }
 
 // A camera that was changed in the file becomes the view's: the window asks for its image.
-static void camera_publish(FrameLoop *loop, const Camera *camera)
+static void scene_publish(FrameLoop *loop)
 {
+    const Camera *camera = &loop->scene.camera;
+    ImageSize size = {0};
+    loop->options.choose_size(&loop->scene, &size.width, &size.height);
     pthread_mutex_lock(&loop->mutex);
-    loop->has_camera |= !cameras_equal(&loop->file_camera, camera);
+    loop->has_camera |= loop->scene_state == SCENE_LOADING || !cameras_equal(&loop->file_camera, camera);
     loop->file_camera = *camera;
+    loop->scene_state = SCENE_LOADED;
+    loop->scene_size = size;
     pthread_mutex_unlock(&loop->mutex);
     loop->options.notify(loop->options.notify_context);
 }
 
-// Reads the scene anew. False, with a message published, where it has a mistake: the last one stays.
+static void refusal_publish(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    if (loop->scene_state == SCENE_LOADING) loop->scene_state = SCENE_REFUSED;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
+// Replaces the renderer by one of the scene, where one is open: False: the scene cannot be rendered, and the
+// last one stays.
+static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *messages)
+{
+    if (!loop->renderer) return true;
+    Scene seen = *scene;
+    seen.camera = loop->current.camera;
+    Renderer *renderer = renderer_open(&loop->compute, &seen, &loop->settings, messages);
+    if (!renderer && compute_ok(&loop->compute)) return false;
+    renderers_close(loop);
+    loop->renderer = renderer;
+    if (!renderer) failure_publish(loop);
+    return true;
+}
+
+// Reads the scene, for the first time or anew. False, with a message published, where it has a mistake: the
+// last one stays.
 static bool scene_reload(FrameLoop *loop)
 {
     const bool was_mistaken = loop->is_mistaken;
     MessageList messages = {0};
+    FileNames files = {0};
+    SceneOptions options = loop->options.scene_options;
+    options.files = &files;
     Scene scene;
-    loop->is_mistaken =
-        !scene_load(&scene, loop->options.scene_path, &loop->options.scene_options, &messages);
+    bool loaded = scene_load(&scene, loop->options.scene_path, &options, &messages);
+    files_watch(loop, &files);
+    file_names_free(&files);
+    if (loaded && !renderer_renew(loop, &scene, &messages)) {
+        scene_free(&scene);
+        loaded = false;
+    }
+    loop->is_mistaken = !loaded;
     if (was_mistaken && messages.count == 0) message_publish(loop, memory_copy_text(""));
     messages_publish(loop, &messages);
-    if (loop->is_mistaken) return false;
-    renderers_close(loop);
+    if (!loaded) {
+        refusal_publish(loop);
+        return false;
+    }
     scene_free(&loop->scene);
     loop->scene = scene;
-    files_watch(loop);
-    camera_publish(loop, &scene.camera);
+    scene_publish(loop);
     return true;
 }
 
@@ -434,7 +472,8 @@ static void *loop_run(void *context)
          (work = work_wait(loop, is_complete && loop->current.view == VIEW_COLOR, &save_path)) != WORK_END;) {
         if (work == WORK_SAVE) image_save(loop, save_path);
         if (work == WORK_RELOAD) is_complete = !scene_reload(loop) && is_complete;
-        if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete)) is_complete = request_render(loop);
+        if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete && loop->current_number > 0))
+            is_complete = request_render(loop);
     }
     renderers_close(loop);
     compute_close(&loop->compute);
@@ -445,9 +484,7 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
 {
     FrameLoop *loop = memory_allocate_zeroed(1, sizeof *loop);
     loop->options = *options;
-    loop->scene = *options->scene;
-    *options->scene = (Scene){0};
-    loop->file_camera = loop->scene.camera;
+    loop->reloads = true;
     loop->settings = options->settings;
     loop->settings.stop = render_stops;
     loop->settings.band_seconds = 0.01;
@@ -456,7 +493,6 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     pthread_mutex_init(&loop->mutex, NULL);
     pthread_cond_init(&loop->changed, NULL);
     loop->watch = watch_open(files_changed, loop);
-    files_watch(loop);
     if (pthread_create(&loop->thread, NULL, loop_run, loop) != 0) fault("cannot start a thread");
     return loop;
 }
@@ -479,6 +515,15 @@ void frame_loop_close(FrameLoop *loop)
     free(loop->save_path);
     free(loop->message);
     free(loop);
+}
+
+SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size)
+{
+    pthread_mutex_lock(&loop->mutex);
+    SceneState state = loop->scene_state;
+    *size = loop->scene_size;
+    pthread_mutex_unlock(&loop->mutex);
+    return state;
 }
 
 unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)

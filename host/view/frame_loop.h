@@ -13,9 +13,9 @@ typedef struct {
     const Device *device;
     const char *scene_path;
     SceneOptions scene_options;
-    Scene *scene;            // as it was first read; taken
     RenderSettings settings; // all but the size
-    Transfer transfer;
+    // The size of the scene's image, where `width` is 0.
+    void (*choose_size)(const Scene *scene, uint32_t *width, uint32_t *height);
     // Called on the loop's thread when there is something to take.
     void (*notify)(void *context);
     void *notify_context;
@@ -41,9 +41,15 @@ void frame_free(Frame *frame); // and zeroes
 
 typedef struct FrameLoop FrameLoop;
 
+// Starts to read the scene.
 FrameLoop *frame_loop_open(const FrameLoopOptions *options);
 // Ends the work and waits for it.
 void frame_loop_close(FrameLoop *loop);
+
+// LOADED once the scene was read; `size` is then its image's. REFUSED: its file has a mistake, which the
+// message says, and no scene was read before.
+typedef enum { SCENE_LOADING, SCENE_LOADED, SCENE_REFUSED } SceneState;
+SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size);
 
 typedef struct {
     Camera camera;
@@ -53,15 +59,14 @@ typedef struct {
     bool is_moving; // a coarse frame first
 } FrameRequest;
 
-// Asks for an image. Returns the request's number, from 1.
+// Asks for an image of the scene that was loaded. Returns the request's number, from 1.
 unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
 // Asks for the image of the last request to be saved when it is complete: its color.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
 // Exchanges `frame` for the newest one. False: there is none that was not taken before.
 bool frame_loop_take(FrameLoop *loop, Frame *frame);
-// Whether the scene's file has another camera than at the last call, at first than the scene that the loop
-// was opened with.
+// Whether the scene's file has another camera than at the last call, or was read for the first time.
 bool frame_loop_take_camera(FrameLoop *loop, Camera *camera);
 // What went wrong, or was saved, since the last call; empty: what was wrong is mended. Caller frees; NULL:
 // nothing.

@@ -41,6 +41,8 @@ typedef struct {
     View view;
     Precision precision;
     bool camera_changed, image_changed;
+    bool is_loaded; // the scene
+    double open_seconds;
     unsigned request;
     Frame frame;
 
@@ -206,7 +208,7 @@ static void camera_print(Window *window)
 
 static void request_send(Window *window)
 {
-    if (!window->camera_changed && !window->image_changed) return;
+    if (!window->is_loaded || (!window->camera_changed && !window->image_changed)) return;
     bool is_moving = window->request > 0;
     const FrameRequest request = {window->camera, window->size, window->view, window->precision, is_moving};
     window->request = frame_loop_request(window->frames, &request);
@@ -357,6 +359,15 @@ static void help_draw(const Window *window)
     text_free(&help);
 }
 
+static void waiting_draw(const Window *window)
+{
+    Text text = {0};
+    text_appendf(&text, "%s: %.0f s", window->is_loaded ? "preparing scene and kernels" : "loading the scene",
+                 clock_seconds() - window->open_seconds);
+    caption_draw(window->caption, CAPTION_BOTTOM, text_c(&text));
+    text_free(&text);
+}
+
 static void draw(Window *window)
 {
     SDL_SetRenderDrawColor(window->target, 0, 0, 0, 255);
@@ -369,7 +380,7 @@ static void draw(Window *window)
     if (window->message)
         caption_draw(window->caption, CAPTION_BOTTOM, window->message);
     else if (!window->texture)
-        caption_draw(window->caption, CAPTION_BOTTOM, "preparing scene and kernels");
+        waiting_draw(window);
     SDL_RenderPresent(window->target);
     title_set(window);
     window->redraws = false;
@@ -384,8 +395,35 @@ static void message_take(Window *window)
     message_show(window, message);
 }
 
+// The window's size in points, at most what the display has room for.
+static ImageSize size_fit(ImageSize size)
+{
+    SDL_Rect room;
+    if (SDL_GetDisplayUsableBounds(0, &room) != 0 || room.w < 1 || room.h < 1) return size;
+    double factor = fmin(1, fmin((double)room.w / size.width, (double)room.h / size.height));
+    return (ImageSize){(uint32_t)fmax(1, size.width * factor), (uint32_t)fmax(1, size.height * factor)};
+}
+
+// The size is the scene's own unless another was asked for.
+static void scene_take(Window *window)
+{
+    ImageSize size;
+    window->is_loaded = frame_loop_scene(window->frames, &size) == SCENE_LOADED;
+    if (!window->is_loaded || window->options->size.width > 0) return;
+    size = size_fit(size);
+    SDL_SetWindowSize(window->window, (int)size.width, (int)size.height);
+    size_read(window);
+}
+
+static bool is_refused(const Window *window)
+{
+    ImageSize size;
+    return frame_loop_scene(window->frames, &size) == SCENE_REFUSED;
+}
+
 static void work_exchange(Window *window)
 {
+    if (!window->is_loaded) scene_take(window);
     if (frame_loop_take_camera(window->frames, &window->file_camera)) {
         window->camera = window->file_camera;
         window->camera_changed = true;
@@ -405,7 +443,8 @@ static WindowEnd events_run(Window *window)
         if (window->options->stop()) return WINDOW_STOPPED;
         if (window->drag == DRAG_LOOK) fly(window);
         work_exchange(window);
-        if (window->redraws) draw(window);
+        if (!window->is_loaded && is_refused(window)) return WINDOW_REFUSED;
+        if (window->redraws || !window->texture) draw(window);
     }
     return WINDOW_CLOSED;
 }
@@ -429,15 +468,6 @@ static void window_close(Window *window)
     SDL_Quit();
 }
 
-// The window's size in points, at most what the display has room for.
-static ImageSize size_fit(ImageSize size)
-{
-    SDL_Rect room;
-    if (SDL_GetDisplayUsableBounds(0, &room) != 0 || room.w < 1 || room.h < 1) return size;
-    double factor = fmin(1, fmin((double)room.w / size.width, (double)room.h / size.height));
-    return (ImageSize){(uint32_t)fmax(1, size.width * factor), (uint32_t)fmax(1, size.height * factor)};
-}
-
 // Without a display SDL takes a driver that shows nothing.
 static bool display_exists(void)
 {
@@ -448,7 +478,8 @@ static bool display_exists(void)
 static bool window_open(Window *window)
 {
     const WindowOptions *options = window->options;
-    ImageSize size = size_fit(options->size);
+    const ImageSize usual = {1280, 720};
+    ImageSize size = size_fit(options->size.width > 0 ? options->size : usual);
     SDL_SetHint(SDL_HINT_RENDER_SCALE_QUALITY, "linear");
     window->window =
         SDL_CreateWindow(scene_name(window), SDL_WINDOWPOS_UNDEFINED, SDL_WINDOWPOS_UNDEFINED,
@@ -457,7 +488,6 @@ static bool window_open(Window *window)
     if (!window->target) return false;
     size_read(window);
     window->caption = caption_open(window->target, (float)window->size.width / (float)size.width);
-    window->camera = window->file_camera = options->frames.scene->camera;
     window->precision = options->frames.settings.precision;
     window->frame_event = SDL_RegisterEvents(1);
     FrameLoopOptions frames = options->frames;
@@ -470,7 +500,8 @@ static bool window_open(Window *window)
 WindowEnd window_run(const WindowOptions *options)
 {
     if (SDL_Init(SDL_INIT_VIDEO) != 0) return window_fault("no window can be opened");
-    Window window = {.options = options, .redraws = true, .pivot_at = {-1, -1}};
+    Window window = {
+        .options = options, .open_seconds = clock_seconds(), .redraws = true, .pivot_at = {-1, -1}};
     WindowEnd end = WINDOW_ABSENT;
     if (!display_exists()) {
         fputs("glint: no window can be opened: there is no display; is DISPLAY or WAYLAND_DISPLAY set?\n",

@@ -5,11 +5,12 @@
 
 typedef struct {
     FrameLoopOptions frames; // but for notify
-    ImageSize size;          // of the window, reduced to fit the display
+    ImageSize size;          // of the window, reduced to fit the display; 0: the scene's own
     bool (*stop)(void);      // true ends it: an interrupt
 } WindowOptions;
 
-typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT } WindowEnd;
+typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT, WINDOW_REFUSED } WindowEnd;
 
-// Opens the window and returns when it is closed. WINDOW_ABSENT: it could not be opened, and why was printed.
+// Opens the window and returns when it is closed. WINDOW_ABSENT: it could not be opened; WINDOW_REFUSED: the
+// scene's file has a mistake; what was printed.
 WindowEnd window_run(const WindowOptions *options);

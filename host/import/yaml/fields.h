@@ -1,6 +1,7 @@
 // Typed access to the mappings of a YAML scene by tables of fields, with a message for every mistake.
 #pragma once
 
+#include "host/import/load.h"
 #include "host/import/number.h"
 #include "host/import/yaml/tree.h"
 #include "host/scene/scene.h"
@@ -17,6 +18,7 @@ typedef struct {
     YamlTree tree;
     Report report;
     Scene *scene;
+    FileNames *files; // SceneOptions
     struct {
         MaterialName *items;
         size_t count, capacity;

@@ -70,11 +70,13 @@ static void document_read(YamlReader *reader)
     if (document.objects) yaml_read_objects(reader, document.objects);
 }
 
-bool scene_read_yaml(Scene *scene, const Source *source, MessageList *messages)
+bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_LINEAR};
-    YamlReader reader = {
-        .report = report_open(source, messages), .scene = scene, .default_material = UINT32_MAX};
+    YamlReader reader = {.report = report_open(source, messages),
+                         .scene = scene,
+                         .files = options->files,
+                         .default_material = UINT32_MAX};
     if (yaml_tree_read(&reader.tree, &reader.report)) document_read(&reader);
     if (scene->textures.count > 0) {
         scene->file = memory_copy_text(source->file);
