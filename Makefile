@@ -151,7 +151,7 @@ linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/ker
           $(if $(has_embree),$(embree_sources))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
-             tests/oracle/*.h) $(embree_sources) $(embree_headers)
+             tests/oracle/*.h) tools/chaos.c $(embree_sources) $(embree_headers)
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)
@@ -201,7 +201,7 @@ install: all
 	install -m 644 scenes/meshes/* $(data)/glint/scenes/meshes
 	install -m 644 scenes/images/* $(data)/glint/scenes/images
 	install -d $(data)/doc/glint/docs
-	install -m 644 README.md LICENSE $(data)/doc/glint
+	install -m 644 README.md SECURITY.md LICENSE $(data)/doc/glint
 	install -m 644 docs/*.md docs/*.png $(data)/doc/glint/docs
 
 uninstall:

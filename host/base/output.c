@@ -31,11 +31,17 @@ static void pending_remove_all(void)
     free(pending.items);
 }
 
-static void pending_add(int folder, const char *name)
+// Called before a temporary has its name, so that nothing can fail once it has.
+static void pending_prepare(void)
 {
     static bool is_registered;
     if (!is_registered && atexit(pending_remove_all) != 0) fault("atexit failed");
     is_registered = true;
+    array_reserve(pending, 1);
+}
+
+static void pending_add(int folder, const char *name)
+{
     array_push(pending, ((Pending){folder, name}));
 }
 
@@ -114,6 +120,7 @@ enum { TEMPORARY_TRIES = 1000 };
 static int named_open(OutputFile *output, mode_t mode)
 {
     stale_temporaries_remove(output);
+    pending_prepare();
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
         int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
@@ -161,6 +168,7 @@ static bool unnamed_link(OutputFile *output)
     if (errno != EEXIST) return false;
     stale_temporaries_remove(output);
     flock(descriptor, LOCK_EX | LOCK_NB);
+    pending_prepare();
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
         if (linkat(AT_FDCWD, link.path, output->folder, name, AT_SYMLINK_FOLLOW) == 0) {

@@ -1,0 +1,13 @@
+#!/bin/bash
+# The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/chaos.md). At length:
+# tools/chaos --long. A sanitized build has allocators and handlers of its own.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+BUILD=${BUILD:-build}
+case $BUILD in *-sanitize)
+    echo "not with sanitizers"
+    exit 77
+    ;;
+esac
+unset OCL_ICD_VENDORS GLINT_DEVICE
+exec tools/chaos --glint "${GLINT:-$BUILD/glint}"

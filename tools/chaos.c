@@ -1,0 +1,466 @@
+// Preloaded into glint by tools/chaos: lets one call in a process fail, or many, and counts them.
+//
+// GLINT_CHAOS says what fails; numbers count from 0:
+//   cl N      OpenCL call N of glint
+//   null N    OpenCL call N of those that create an object: NULL with CL_SUCCESS
+//   alloc N   allocation N of glint's own code
+//   call N    system call N on a file below the folder GLINT_CHAOS_FOLDER, or on stdin and stdout: EIO
+//   eintr N   the same: EINTR
+//   full N    the same from call N on, if it writes or creates: ENOSPC
+//   short     reads and writes there do half of what they are asked for
+//   device    the device has work-groups of 1, 64 MiB of memory, 16 KiB of constant memory, and no images
+//   (else)    nothing
+// GLINT_CHAOS_LOG is a file that receives "failed NAME" when something is made to fail, and the number of
+// calls of each kind when the process ends.
+//
+// System calls are trapped by seccomp, so that those within libc are seen, too. Only on x86-64 Linux with
+// glibc.
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <link.h>
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <ucontext.h>
+#include <unistd.h>
+
+static char kind[16], folder[PATH_MAX], log_path[PATH_MAX];
+static unsigned long failing = ULONG_MAX;
+static atomic_ulong cl_count, null_count, alloc_count, call_count;
+static uintptr_t text_start, text_end; // of the main program
+
+// The filter lets the system call in here pass.
+__attribute__((naked, noinline)) static long pass_through(long number, long a, long b, long c, long d, long e,
+                                                          long f)
+{
+    __asm__("mov %rdi, %rax\n mov %rsi, %rdi\n mov %rdx, %rsi\n mov %rcx, %rdx\n mov %r8, %r10\n"
+            "mov %r9, %r8\n mov 8(%rsp), %r9\n syscall\n ret\n");
+}
+enum { PASS_THROUGH_BYTES = 64 };
+
+static void log_line(const char *format, ...)
+{
+    char line[128];
+    va_list arguments;
+    va_start(arguments, format);
+    int length = vsnprintf(line, sizeof line, format, arguments);
+    va_end(arguments);
+    if (log_path[0] == '\0') return;
+    long file = pass_through(SYS_openat, AT_FDCWD, (long)log_path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC,
+                             0600, 0, 0);
+    if (file < 0) return;
+    pass_through(SYS_write, file, (long)line, length, 0, 0, 0);
+    pass_through(SYS_close, file, 0, 0, 0, 0, 0);
+}
+
+static bool is_kind(const char *name)
+{
+    return strcmp(kind, name) == 0;
+}
+
+// Counts a call; whether it is the one that fails.
+static bool count_fails(const char *of, atomic_ulong *count, const char *name)
+{
+    bool fails = atomic_fetch_add(count, 1) == failing && is_kind(of);
+    if (fails) log_line("failed %s\n", name);
+    return fails;
+}
+
+static void *real(const char *name)
+{
+    void *function = dlsym(RTLD_NEXT, name);
+    if (!function) abort();
+    return function;
+}
+
+// ---- OpenCL: every argument is an integer or a pointer, so one type of function serves for all
+
+typedef long (*ClFunction)(long, long, long, long, long, long, long, long, long, long, long);
+#define PARAMETERS long a, long b, long c, long d, long e, long f, long g, long h, long i, long j, long k
+#define ARGUMENTS  a, b, c, d, e, f, g, h, i, j, k
+
+enum { CL_OUT_OF_RESOURCES = -5, CL_MEM_OBJECT_ALLOCATION_FAILURE = -4, CL_INVALID_WORK_GROUP_SIZE = -54 };
+enum { MEBI = 1 << 20 };
+
+static const struct {
+    long what;
+    uint64_t value; // at most
+} device_limits[] = {
+    {0x1004, 1},         {0x1010, 16 * MEBI}, {0x1016, 0},        // work-group, allocation, images
+    {0x101F, 64 * MEBI}, {0x1020, 16 << 10},  {0x1023, 16 << 10}, // memory, constant and local memory
+};
+
+static void device_limit(long what, long size, void *value)
+{
+    if (what == 0x1005 && value) // CL_DEVICE_MAX_WORK_ITEM_SIZES
+        for (long side = 0; side < size / 8; side++)
+            ((uint64_t *)value)[side] = 1;
+    for (size_t n = 0; n < sizeof device_limits / sizeof *device_limits; n++) {
+        if (device_limits[n].what != what || !value) continue;
+        if (size == 8)
+            *(uint64_t *)value = device_limits[n].value;
+        else
+            *(uint32_t *)value = (uint32_t)device_limits[n].value;
+    }
+}
+
+// status at argument `place`, or -1 of a function that returns it
+static long cl_call(const char *name, long *status, bool is_release, ClFunction function, PARAMETERS)
+{
+    if (status && count_fails("null", &null_count, name)) {
+        *(int *)status = 0;
+        return 0;
+    }
+    bool fails = count_fails("cl", &cl_count, name);
+    if (is_release || !fails) {
+        long result = function(ARGUMENTS);
+        return fails ? CL_OUT_OF_RESOURCES : result;
+    }
+    if (!status) return CL_OUT_OF_RESOURCES;
+    *(int *)status = CL_OUT_OF_RESOURCES;
+    return 0;
+}
+
+#define CL(name, status, is_release)                                                                         \
+    long name(PARAMETERS)                                                                                    \
+    {                                                                                                        \
+        static ClFunction function;                                                                          \
+        if (!function) function = (ClFunction)real(#name);                                                   \
+        return cl_call(#name, (long *)(status), is_release, function, ARGUMENTS);                            \
+    }
+#define STATUS(name)         CL(name, 0, false)
+#define RELEASE(name)        CL(name, 0, true)
+#define CREATE(name, status) CL(name, status, false)
+
+STATUS(clGetPlatformIDs)
+STATUS(clGetPlatformInfo)
+STATUS(clGetDeviceIDs)
+CREATE(clCreateContext, f)
+CREATE(clCreateCommandQueue, d)
+CREATE(clCreateProgramWithSource, e)
+CREATE(clCreateProgramWithBinary, g)
+CREATE(clCreateKernel, c)
+CREATE(clEnqueueMapBuffer, j)
+RELEASE(clReleaseContext)
+RELEASE(clReleaseCommandQueue)
+RELEASE(clReleaseMemObject)
+RELEASE(clReleaseProgram)
+RELEASE(clReleaseKernel)
+RELEASE(clReleaseEvent)
+RELEASE(clEnqueueUnmapMemObject)
+STATUS(clSetMemObjectDestructorCallback)
+STATUS(clBuildProgram)
+STATUS(clGetProgramBuildInfo)
+STATUS(clGetProgramInfo)
+STATUS(clGetKernelInfo)
+STATUS(clSetKernelArg)
+STATUS(clEnqueueReadBuffer)
+STATUS(clEnqueueWriteBuffer)
+STATUS(clFinish)
+STATUS(clWaitForEvents)
+STATUS(clGetEventInfo)
+STATUS(clGetEventProfilingInfo)
+
+// Those below also keep to the limits of a small device.
+static long create_buffer(PARAMETERS)
+{
+    static ClFunction function;
+    if (!function) function = (ClFunction)real("clCreateBuffer");
+    if (!is_kind("device") || c <= 16 * MEBI) return function(ARGUMENTS);
+    *(int *)e = CL_MEM_OBJECT_ALLOCATION_FAILURE;
+    return 0;
+}
+
+long clCreateBuffer(PARAMETERS)
+{
+    return cl_call("clCreateBuffer", (long *)e, false, create_buffer, ARGUMENTS);
+}
+
+static long enqueue_kernel(PARAMETERS)
+{
+    static ClFunction function;
+    if (!function) function = (ClFunction)real("clEnqueueNDRangeKernel");
+    for (long side = 0; is_kind("device") && f && side < (unsigned)c; side++)
+        if (((size_t *)f)[side] > 1) return CL_INVALID_WORK_GROUP_SIZE;
+    return function(ARGUMENTS);
+}
+
+long clEnqueueNDRangeKernel(PARAMETERS)
+{
+    return cl_call("clEnqueueNDRangeKernel", NULL, false, enqueue_kernel, ARGUMENTS);
+}
+
+static long get_device_info(PARAMETERS)
+{
+    static ClFunction function;
+    if (!function) function = (ClFunction)real("clGetDeviceInfo");
+    long result = function(ARGUMENTS);
+    if (is_kind("device") && (int)result == 0) device_limit((unsigned)b, c, (void *)d);
+    return result;
+}
+
+long clGetDeviceInfo(PARAMETERS)
+{
+    return cl_call("clGetDeviceInfo", NULL, false, get_device_info, ARGUMENTS);
+}
+
+static long get_work_group_info(PARAMETERS)
+{
+    static ClFunction function;
+    if (!function) function = (ClFunction)real("clGetKernelWorkGroupInfo");
+    long result = function(ARGUMENTS);
+    if (is_kind("device") && (int)result == 0 && (unsigned)c == 0x11B0 && e) *(size_t *)e = 1;
+    return result;
+}
+
+long clGetKernelWorkGroupInfo(PARAMETERS)
+{
+    return cl_call("clGetKernelWorkGroupInfo", NULL, false, get_work_group_info, ARGUMENTS);
+}
+
+// ---- allocations, of the main program alone
+
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t count, size_t size);
+void *__libc_realloc(void *old, size_t size);
+void *__libc_memalign(size_t alignment, size_t size);
+
+#define IS_GLINT                                                                                             \
+    ((uintptr_t)__builtin_return_address(0) >= text_start &&                                                 \
+     (uintptr_t)__builtin_return_address(0) < text_end)
+#define ALLOCATION_FAILS(name)                                                                               \
+    (IS_GLINT && count_fails("alloc", &alloc_count, name) ? (errno = ENOMEM, true) : false)
+
+void *malloc(size_t size)
+{
+    return ALLOCATION_FAILS("malloc") ? NULL : __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size)
+{
+    return ALLOCATION_FAILS("calloc") ? NULL : __libc_calloc(count, size);
+}
+
+void *realloc(void *old, size_t size)
+{
+    return ALLOCATION_FAILS("realloc") ? NULL : __libc_realloc(old, size);
+}
+
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    return ALLOCATION_FAILS("aligned_alloc") ? NULL : __libc_memalign(alignment, size);
+}
+
+int posix_memalign(void **result, size_t alignment, size_t size)
+{
+    if (ALLOCATION_FAILS("posix_memalign")) return ENOMEM;
+    *result = __libc_memalign(alignment, size);
+    return *result ? 0 : ENOMEM;
+}
+
+#define ALLOCATING(type, name, parameters, arguments)                                                        \
+    type name parameters                                                                                     \
+    {                                                                                                        \
+        return ALLOCATION_FAILS(#name) ? NULL : ((type(*) parameters)real(#name))arguments;                  \
+    }
+
+ALLOCATING(char *, strdup, (const char *text), (text))
+ALLOCATING(char *, strndup, (const char *text, size_t length), (text, length))
+ALLOCATING(char *, realpath, (const char *path, char *result), (path, result))
+ALLOCATING(FILE *, fopen, (const char *path, const char *mode), (path, mode))
+ALLOCATING(FILE *, fdopen, (int descriptor, const char *mode), (descriptor, mode))
+ALLOCATING(FILE *, tmpfile, (void), ())
+
+int vasprintf(char **result, const char *format, va_list arguments)
+{
+    if (ALLOCATION_FAILS("vasprintf")) return -1;
+    return ((int (*)(char **, const char *, va_list))real("vasprintf"))(result, format, arguments);
+}
+
+int asprintf(char **result, const char *format, ...)
+{
+    if (ALLOCATION_FAILS("asprintf")) return -1;
+    va_list arguments;
+    va_start(arguments, format);
+    int length = ((int (*)(char **, const char *, va_list))real("vasprintf"))(result, format, arguments);
+    va_end(arguments);
+    return length;
+}
+
+// ---- system calls
+
+enum { READS = 1, WRITES = 2, CREATES = 4, BY_PATH = 8, FLUSHES = 16 };
+
+static const struct {
+    int number, what;
+    const char *name;
+} trapped[] = {
+    {SYS_read, READS, "read"},
+    {SYS_pread64, READS, "pread"},
+    {SYS_readv, 0, "readv"},
+    {SYS_write, WRITES, "write"},
+    {SYS_pwrite64, WRITES, "pwrite"},
+    {SYS_writev, FLUSHES, "writev"},
+    {SYS_fsync, FLUSHES, "fsync"},
+    {SYS_flock, 0, "flock"},
+    {SYS_fchmod, 0, "fchmod"},
+    {SYS_openat, CREATES | BY_PATH, "open"},
+    {SYS_linkat, 0, "link"},
+    {SYS_renameat, FLUSHES, "rename"},
+    {SYS_renameat2, FLUSHES, "rename"},
+    {SYS_newfstatat, BY_PATH, "stat"},
+    {SYS_readlink, 0, "readlink"},
+    {SYS_getdents64, 0, "readdir"},
+    {SYS_mkdir, 0, "mkdir"},
+};
+enum { TRAPPED_COUNT = sizeof trapped / sizeof *trapped };
+
+// What a descriptor stands for is below the folder, or stdin or stdout.
+static bool descriptor_is_ours(long descriptor)
+{
+    char link[40], path[PATH_MAX];
+    if (descriptor == 0 || descriptor == 1) return true;
+    snprintf(link, sizeof link, "/proc/self/fd/%d", (int)descriptor);
+    long length = pass_through(SYS_readlink, (long)link, (long)path, sizeof path - 1, 0, 0, 0);
+    if (length <= 0) return false;
+    path[length] = '\0';
+    return strncmp(path, folder, strlen(folder)) == 0;
+}
+
+static bool path_is_ours(long descriptor, const char *path)
+{
+    if (path[0] == '/') return strncmp(path, folder, strlen(folder)) == 0;
+    return (int)descriptor == AT_FDCWD || descriptor_is_ours(descriptor);
+}
+
+static long call_make(size_t n, const long *a)
+{
+    const int what = trapped[n].what, number = trapped[n].number;
+    bool by_path = (what & BY_PATH) || number == SYS_mkdir || number == SYS_readlink;
+    const char *path = (const char *)(number == SYS_mkdir || number == SYS_readlink ? a[0] : a[1]);
+    long at = number == SYS_mkdir || number == SYS_readlink ? AT_FDCWD : a[0];
+    bool ours = by_path && path && path[0] != '\0' ? path_is_ours(at, path)
+                : number == SYS_linkat             ? descriptor_is_ours(a[2])
+                                                   : descriptor_is_ours(a[0]);
+    if (!ours) return pass_through(number, a[0], a[1], a[2], a[3], a[4], a[5]);
+    long size = a[2];
+    if (is_kind("short") && (what & (READS | WRITES)) && size > 1) size = (size + 1) / 2;
+    unsigned long index = atomic_fetch_add(&call_count, 1);
+    bool is_it = index == failing;
+    bool grows = (what & (WRITES | FLUSHES)) || number == SYS_mkdir || number == SYS_linkat ||
+                 ((what & CREATES) && (a[2] & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY))));
+    int error = is_kind("call") && is_it                       ? EIO
+                : is_kind("eintr") && is_it                    ? EINTR
+                : is_kind("full") && index >= failing && grows ? ENOSPC
+                                                               : 0;
+    if (!error) return pass_through(number, a[0], a[1], size, a[3], a[4], a[5]);
+    log_line("failed %s\n", trapped[n].name);
+    return -error;
+}
+
+static void on_trap(int signal, siginfo_t *info, void *context)
+{
+    (void)signal;
+    greg_t *registers = ((ucontext_t *)context)->uc_mcontext.gregs;
+    const long arguments[] = {registers[REG_RDI], registers[REG_RSI], registers[REG_RDX],
+                              registers[REG_R10], registers[REG_R8],  registers[REG_R9]};
+    int error = errno;
+    for (size_t n = 0; n < TRAPPED_COUNT; n++)
+        if (trapped[n].number == info->si_syscall) {
+            registers[REG_RAX] = call_make(n, arguments);
+            break;
+        }
+    errno = error;
+}
+
+// LLVM has a handler for this signal, too.
+int sigaction(int signal, const struct sigaction *action, struct sigaction *old)
+{
+    static int (*function)(int, const struct sigaction *, struct sigaction *);
+    if (!function) function = (int (*)(int, const struct sigaction *, struct sigaction *))real("sigaction");
+    if (signal == SIGSYS && (!action || action->sa_sigaction != on_trap)) {
+        if (old) *old = (struct sigaction){0};
+        return 0;
+    }
+    return function(signal, action, old);
+}
+
+static void trap_calls(void)
+{
+    struct sigaction action = {.sa_sigaction = on_trap, .sa_flags = SA_SIGINFO | SA_NODEFER};
+    sigaction(SIGSYS, &action, NULL);
+    const uint64_t start = (uintptr_t)pass_through, end = start + PASS_THROUGH_BYTES;
+    if (start >> 32 != end >> 32) abort();
+    struct sock_filter filter[TRAPPED_COUNT + 16];
+    unsigned short n = 0;
+#define LOAD(field) BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, field))
+    filter[n++] = (struct sock_filter)LOAD(nr);
+    for (size_t i = 0; i < TRAPPED_COUNT; i++) {
+        uint8_t to_check = (uint8_t)(TRAPPED_COUNT - i);
+        filter[n++] =
+            (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, (uint32_t)trapped[i].number, to_check, 0);
+    }
+    filter[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
+    filter[n++] = (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS,
+                                               offsetof(struct seccomp_data, instruction_pointer) + 4);
+    filter[n++] = (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, (uint32_t)(start >> 32), 0, 4);
+    filter[n++] = (struct sock_filter)LOAD(instruction_pointer);
+    filter[n++] = (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, (uint32_t)start, 0, 2);
+    filter[n++] = (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, (uint32_t)end, 1, 0);
+    filter[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
+    filter[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP);
+    const struct sock_fprog program = {.len = n, .filter = filter};
+    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) != 0)
+        log_line("failed seccomp\n");
+}
+
+// ---- start and end
+
+static int find_text(struct dl_phdr_info *info, size_t size, void *unused)
+{
+    (void)size, (void)unused;
+    for (int i = 0; i < info->dlpi_phnum; i++) {
+        const ElfW(Phdr) *header = &info->dlpi_phdr[i];
+        if (header->p_type != PT_LOAD || !(header->p_flags & PF_X)) continue;
+        text_start = info->dlpi_addr + header->p_vaddr;
+        text_end = text_start + header->p_memsz;
+    }
+    return 1; // the first is the main program
+}
+
+__attribute__((constructor)) static void start(void)
+{
+    const char *what = getenv("GLINT_CHAOS"), *where = getenv("GLINT_CHAOS_FOLDER"),
+               *log = getenv("GLINT_CHAOS_LOG");
+    if (where) snprintf(folder, sizeof folder, "%s", where);
+    if (log) snprintf(log_path, sizeof log_path, "%s", log);
+    if (what) sscanf(what, "%15s %lu", kind, &failing);
+    dl_iterate_phdr(find_text, NULL);
+    // programs that a driver starts are left alone: the filter would end them before they are ready for it
+    unsetenv("LD_PRELOAD");
+    if (is_kind("call") || is_kind("eintr") || is_kind("full") || is_kind("short") || is_kind("count"))
+        trap_calls();
+}
+
+__attribute__((destructor)) static void end(void)
+{
+    log_line("cl %lu\n", cl_count);
+    log_line("null %lu\n", null_count);
+    log_line("alloc %lu\n", alloc_count);
+    log_line("call %lu\n", call_count);
+}
