@@ -11,6 +11,7 @@ import math
 import os
 import re
 import shlex
+import signal
 import struct
 import subprocess
 import sys
@@ -164,6 +165,8 @@ def csv_rows(text):
 
 def main():
     """Runs the tests of the file that is executed. A skip is reported as cmocka does, which tools/run_tests shows."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
     result = unittest.main(exit=False).result
     for test, reason in result.skipped:
         print(f"[  SKIPPED ] {test}\n{test}: {reason}")

@@ -197,8 +197,6 @@ class Failures(CliTestCase):
 
     def test_signals(self):
         """A signal ends a long render, and a second one right after it changes nothing."""
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
         self.glint(f"render sphere.yaml {SMALL} -o warm.png")
         command = [PROGRAM, *"render sphere.yaml --size 20000x20000 --samples 64 -o long.png".split()]
         for signals in (signal.SIGINT,), (signal.SIGINT, signal.SIGINT), (signal.SIGTERM,), (signal.SIGHUP,):
