@@ -26,14 +26,13 @@ typedef struct {
 
 typedef struct {
     scalar4 center_radius; // xyz center, w radius
-    // x: the object's id, y: IGNORES_FRONT_FACES | SPHERE_HAS_POWER. With the latter the eye's power,
-    // |center|^2 - radius^2 before either is rounded, defines the sphere instead of the radius: next to a
-    // planet the two round to half a meter, the power to an ulp of the distance. z: its bits as a float, or
-    // z, w: low and high half of its bits as a double.
-    uint4 id;
+    uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES | HAS_POWER
 } Sphere;
 
-enum { SPHERE_HAS_POWER = 16 };
+// In a shape's id.y. The eye's power defines the shape: of a sphere |center|^2 - radius^2 before either is
+// rounded, instead of the radius. Next to a planet the two round to half a meter, the power to an ulp of the
+// distance. id.z: its bits as a float, or id.z, id.w: low and high half of its bits as a double.
+enum { HAS_POWER = 16 };
 
 // In a shape's id.y: front faces are ignored, only rays from inside hit. Never with REVOLUTION_CAPPED.
 enum { IGNORES_FRONT_FACES = 8 };
@@ -49,7 +48,8 @@ typedef struct {
     scalar4 center_radius;
     scalar4 normal; // w: 1 / its length
     scalar4 grid_u, grid_v;
-    uint4 id;
+    scalar4 foot; // with HAS_POWER its plane's point nearest to the eye
+    uint4 id;     // y: HAS_POWER, of the sphere around it
 } Disc;
 
 typedef struct {
@@ -59,11 +59,14 @@ typedef struct {
 
 // Cylinder and cone: the points with |p x axis| = radius |axis| + slope (p . axis), p from the base, for an
 // axis of any length.
+//
+// With HAS_POWER the base is the axis' point nearest to the eye, heights along the axis are those above the
+// eye, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution.h).
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
     scalar4 axis_slope;  // xyz axis, w slope: the tangent of the half-angle, 0 for a cylinder
-    scalar4 range;       // x: p . axis runs from 0 to this where finite; y: |axis|; z: |axis|^2
-    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | IGNORES_FRONT_FACES
+    scalar4 range;       // where finite p . axis runs from w, 0 without a power, to x; y: |axis|; z: |axis|^2
+    uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | IGNORES_FRONT_FACES | HAS_POWER
 } Revolution;
 
 enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2 };
@@ -79,7 +82,9 @@ typedef struct {
 
 typedef struct {
     scalar4 a, b, c; // w: x, y and z of the normal; the largest is 1/2 to 1, or all are 0
-    uint4 id;        // y: 1 + index of its TriangleNormals, 0: flat; z: 1 + index of its TriangleUvs, 0: none
+    // y: 1 + index of its TriangleNormals, 0: flat; z: 1 + index of its TriangleUvs, 0: none. w: the bits of
+    // normal . (a - eye) before a is rounded, as a float; 0: the rounded a will do.
+    uint4 id;
 } Triangle;
 
 // Apart from Triangle: every intersection test reads that, only the closest hit reads these.
@@ -97,7 +102,10 @@ typedef struct {
 typedef struct {
     scalar4 apex_k;   // w: k, 4 |axis| times the focal length
     scalar4 axis_end; // w: p . axis runs from 0 to this where finite
-    uint4 id;         // y: REVOLUTION_FINITE | REVOLUTION_CAPPED
+    // With HAS_POWER the axis' point nearest to the eye, and in w its p . axis, which axis_end.w then lacks;
+    // the power is |m|^2 - k p . axis at the eye (kernels/shapes/paraboloid.h).
+    scalar4 foot_lift;
+    uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | HAS_POWER
 } Paraboloid;
 
 // Every shape: feature, struct, name, name of its array. Adding a shape begins here: docs/adding-a-shape.md.

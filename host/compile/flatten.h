@@ -14,6 +14,9 @@ typedef struct {
     size_t counts[KIND_COUNT], normals_count, uvs_count, primitive_count; // so far
 } Flattening;
 
+// Whether the kernel's precision can hold the eye's power of a primitive, which then defines it (HAS_POWER).
+bool primitive_take_power(Flattening *flattening, double power, uint4 *id);
+
 // Appends a flat struct to its kind's array and gives it the next id, in id.x; or replaces the one that is
 // moved.
 void primitive_add(Flattening *flattening, int kind, const void *primitive, uint32_t material);

@@ -2,6 +2,7 @@
 #include "host/base/parallel.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
+#include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,6 +20,24 @@ void primitive_add(Flattening *flattening, int kind, const void *primitive, uint
     }
     memcpy(target, primitive, array->layout.size);
     *flat_id(array, target) = id;
+}
+
+bool primitive_take_power(Flattening *flattening, double power, uint4 *id)
+{
+    const double value = rounded(&flattening->rounding, power);
+    if (!isfinite(value)) return false;
+    flattening->features |= FEATURE_EYE_POWERS;
+    id->y |= HAS_POWER;
+    if (flattening->rounding.is_double) {
+        uint64_t bits;
+        memcpy(&bits, &value, sizeof bits);
+        id->z = (uint32_t)bits;
+        id->w = (uint32_t)(bits >> 32);
+    } else {
+        const float single = (float)value;
+        memcpy(&id->z, &single, sizeof single);
+    }
+    return true;
 }
 
 static void arrays_make(CompiledScene *compiled, const Scene *scene)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/compile/compiled_scene.h"
+#include "host/scene/quad.h"
 #include <string.h>
 
 typedef struct {
@@ -27,6 +28,16 @@ static inline Vector3 point_from_eye(const Rounding *rounding, Vector3 point)
 {
     return vector_rounded(rounding, vector_subtract(point, rounding->eye));
 }
+
+static inline double roundoff_of(const Rounding *rounding) // half an ulp of 1
+{
+    return (rounding->is_double ? DBL_EPSILON : FLT_EPSILON) / 2;
+}
+
+Quad3 exact_from_eye(const Rounding *rounding, Vector3 point);
+// A point of a plane, rounded, that the rounding moves off the plane by at most some ulp of the plane's
+// distance from the eye: the given one, or where that is too far away the one nearest to the eye.
+Vector3 plane_point_from_eye(const Rounding *rounding, Vector3 point, Vector3 normal);
 
 // The same direction, scaled by a power of two so that its largest component lies in 1/2..1: exact.
 static inline Vector3 axis_scaled(Vector3 axis)

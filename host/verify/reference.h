@@ -7,8 +7,8 @@
 // receives. A new shape is two functions and a row of `shapes` in reference.c.
 #pragma once
 
+#include "host/scene/quad.h"
 #include "host/scene/scene.h"
-#include "host/verify/quad.h"
 
 typedef struct {
     Quad3 origin, direction;

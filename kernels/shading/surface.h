@@ -68,6 +68,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     Vector normal = zero;
     Corners corners = {zero, zero, zero}, normals = corners, uvs = corners;
     real density = (real)(scene->materials[material].reflection_transmission_ior.w);
+    mask next_to_eye = mask_none();
     bool smooth = false;
     for (;;) {
         scalar_integer object = lanes_smallest(objects);
@@ -78,6 +79,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         if (entry.x != KIND_TRIANGLES || entry.z != material) continue;
         hit.lanes = hit.lanes | same;
         Triangle triangle = scene->triangles[entry.y];
+        if (has_eye_height(triangle.id)) next_to_eye = next_to_eye | same;
         corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), corners);
         normal = vector_select(same, triangle_normal(&triangle), normal);
         if (triangle.id.y > 0) {
@@ -92,7 +94,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         }
     }
     TriangleWeights weights = triangle_weights(corners, ray);
-    hit.point = corners_surface_point(corners, normal, weights, ray, t);
+    hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
     if (smooth) triangle_smooth(normals, weights, &hit.point);
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, uvs);

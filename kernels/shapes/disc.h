@@ -2,6 +2,7 @@
 #ifndef DISC_H
 #define DISC_H
 
+#include "shapes/eye_power.h"
 #include "shapes/plane.h"
 
 // t = height / along; across / along leads from the center to the crossing, up to sign: only its square is
@@ -11,21 +12,39 @@ typedef struct {
     Vector across;
 } DiscCrossing;
 
-static inline DiscCrossing disc_crossing(Vector center, Vector normal, const Ray *ray)
+// A point of its plane.
+static inline Vector disc_foot(const Disc *disc)
 {
-    Vector f = vector_subtract(ray->origin, center);
-    return (DiscCrossing){-vector_dot(normal, f), vector_dot(normal, ray->direction),
+    return vector_of(has_eye_power(disc->id) ? disc->foot : disc->center_radius);
+}
+
+static inline DiscCrossing disc_crossing(const Disc *disc, const Ray *ray)
+{
+    Vector normal = vector_of(disc->normal), foot = disc_foot(disc);
+    Vector f = vector_subtract(ray->origin, vector_of(disc->center_radius));
+    return (DiscCrossing){vector_dot(normal, vector_subtract(foot, ray->origin)),
+                          vector_dot(normal, ray->direction),
                           vector_cross(normal, vector_cross(f, ray->direction))};
 }
 
-static inline DiscCrossing disc_crossing_compensated(Vector center, Vector normal, const Ray *ray)
+static inline DiscCrossing disc_crossing_compensated(const Disc *disc, const Ray *ray)
 {
-    PairVector f = pair_vector_difference(ray->origin, center);
+    Vector normal = vector_of(disc->normal);
+    PairVector f = pair_vector_difference(ray->origin, vector_of(disc->center_radius));
     return (DiscCrossing){
-        -pair_vector_dot_vector(f, normal).high,
+        pair_vector_dot_vector(pair_vector_difference(disc_foot(disc), ray->origin), normal).high,
         pair_vector_dot_vector(pair_vector_of(normal), ray->direction).high,
         pair_vector_high(pair_vector_cross(pair_vector_cross(f, ray->direction), normal)),
     };
+}
+
+// Whether the ray's point at t lies within the sphere that the power defines: its power is the eye's plus
+// p . (p - 2 center).
+static inline mask disc_contains(const Disc *disc, const Ray *ray, real t)
+{
+    Vector p = ray_point(ray, t), twice_center = vector_scale(vector_of(disc->center_radius), (real)(2));
+    return power_sum(pair_of(eye_power_of(disc->id)), p, pair_vector_difference(p, twice_center)) <=
+           (real)(0);
 }
 
 // Inside the rim: with v the crossing from the center, (n . d) v = n x E for the moment E = f x d, so that
@@ -33,18 +52,17 @@ static inline DiscCrossing disc_crossing_compensated(Vector center, Vector norma
 // to the plane all three cancel: pairs there at any precision.
 static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 {
-    Vector center = vector_of(disc->center_radius);
-    Vector normal = vector_of(disc->normal);
+    Vector center = vector_of(disc->center_radius), normal = vector_of(disc->normal);
     DiscCrossing crossing;
     if (IS_COMPENSATED) {
-        crossing = disc_crossing_compensated(center, normal, ray);
+        crossing = disc_crossing_compensated(disc, ray);
     } else {
-        crossing = disc_crossing(center, normal, ray);
+        crossing = disc_crossing(disc, ray);
         real steepest_squared = vector_dot(normal, normal) * ray->squared;
         mask grazing =
             RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
         if (lanes_any(grazing)) {
-            DiscCrossing compensated = disc_crossing_compensated(center, normal, ray);
+            DiscCrossing compensated = disc_crossing_compensated(disc, ray);
             crossing.height = lanes_select(grazing, compensated.height, crossing.height);
             crossing.along = lanes_select(grazing, compensated.along, crossing.along);
             crossing.across = vector_select(grazing, compensated.across, crossing.across);
@@ -58,6 +76,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
     real half_chord = radius * real_sqrt(ray->inverse_squared);
     *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
+    if (has_eye_power(disc->id)) return hit & disc_contains(disc, ray, *t) & (*t > ray->tmin);
     real scaled_radius = radius * crossing.along;
     return hit & (vector_dot(crossing.across, crossing.across) <= scaled_radius * scaled_radius) &
            (*t > ray->tmin);
@@ -65,7 +84,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 
 static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, real t)
 {
-    return plane_crossing_point(vector_of(disc->center_radius), disc->normal, ray, t);
+    return plane_crossing_point(disc_foot(disc), disc->normal, ray, t);
 }
 
 #endif

@@ -5,10 +5,15 @@
 // and by Lagrange's identity b^2 - a c = (k/2 d . w)^2 - |w|^2 (k E . q + (w . E)^2) with the moment E = f x
 // d, whose terms do not grow with the distance where b^2 and a c do. All of it is in pairs: c cancels next to
 // the surface, b along it.
+//
+// With the eye's power C, m = (o - F) x w for the axis' point F nearest to the eye, and
+//     c = C + (o x w) . ((o - 2 F) x w) - k o . w.
+// Next to the surface b^2 - a c then decides.
 #ifndef PARABOLOID_H
 #define PARABOLOID_H
 
 #include "shapes/ends.h"
+#include "shapes/eye_power.h"
 #include "shapes/surface_point.h"
 
 typedef struct {
@@ -34,17 +39,31 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     const real half_k = (real)(0.5f * shape->apex_k.w), k = (real)(shape->apex_k.w);
     const Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
     PairVector f = pair_vector_difference(ray->origin, vector_of(shape->apex_k));
-    PairVector d = pair_vector_of(ray->direction);
-    PairVector m = pair_vector_cross(f, axis), q = pair_vector_cross(d, axis);
+    PairVector d = pair_vector_of(ray->direction), o = pair_vector_of(ray->origin);
+    const bool has_power = has_eye_power(shape->id);
+    Vector foot = vector_of(shape->foot_lift);
+    PairVector m = pair_vector_cross(has_power ? pair_vector_difference(ray->origin, foot) : f, axis);
+    PairVector q = pair_vector_cross(d, axis);
     PairVector moment = pair_vector_cross(f, ray->direction);
-    Pair height = pair_vector_dot_vector(f, axis), rise = pair_vector_dot_vector(d, axis);
+    Pair height = pair_vector_dot_vector(has_power ? o : f, axis), rise = pair_vector_dot_vector(d, axis);
     Pair moment_on_axis = pair_vector_dot_vector(moment, axis), bend = pair_scale(rise, half_k);
-    real a = pair_vector_dot(q, q).high;
-    real b = pair_subtract(pair_vector_dot(m, q), bend).high;
-    real c = pair_subtract(pair_vector_dot(m, m), pair_scale(height, k)).high;
+    Pair squared_q = pair_vector_dot(q, q), half_b = pair_subtract(pair_vector_dot(m, q), bend);
+    Pair squared_m = pair_vector_dot(m, m), power = squared_m;
+    if (has_power) {
+        PairVector beyond = pair_vector_difference(ray->origin, vector_scale(foot, (real)(2)));
+        Pair rest = pair_vector_dot(pair_vector_cross(o, axis), pair_vector_cross(beyond, axis));
+        power = pair_add(pair_of(eye_power_of(shape->id)), rest);
+    }
+    power = pair_subtract(power, pair_scale(height, k));
+    real a = squared_q.high, b = half_b.high, c = power.high;
     Pair off =
         pair_add(pair_scale(pair_vector_dot(moment, q), k), pair_multiply(moment_on_axis, moment_on_axis));
     real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(squared_axis, off)).high;
+    if (has_power) {
+        real exact = pair_subtract(pair_multiply(half_b, half_b), pair_multiply(squared_q, power)).high;
+        mask near_side = fabs(c) < (real)(0x1p-3f) * squared_m.high;
+        discriminant = lanes_select(near_side, exact, discriminant);
+    }
 
     ParaboloidCrossings crossings;
     crossings.real_roots = discriminant >= (real)(0);
@@ -95,9 +114,12 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
-        real gap = real_divide((real)(shape->axis_end.w) - vector_dot(p, axis), squared_axis);
+        real end = (real)(shape->axis_end.w), height = vector_dot(p, axis);
+        if (has_eye_power(shape->id)) height -= (real)(shape->foot_lift.w);
+        real gap = real_divide(end - height, squared_axis);
         Vector on_plane = vector_fma(axis, gap, p);
         SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
+        if (!IS_FAST && has_eye_power(shape->id)) surface_point_move_to_ray(&cap, ray, t, size);
         surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;

@@ -5,11 +5,17 @@
 //     a = q . q - h^2,   b = m . q - g h,   c = m . m - g^2,
 // and by Lagrange's identity b^2 - a c = |g q - h m|^2 - |w|^2 (w . E)^2 with the moment E = f x d, a
 // difference of two numbers near a r^2 whatever the distance, where b^2 - a c itself cancels.
+//
+// With the eye's power C, f = o - F for the axis' point F nearest to the eye, so that f . w = o . w, and
+//     c = C + (o x w) . ((o - 2 F) x w) - k (o . w) (2 R + k o . w),
+// in which roundings of F and R count only by the origin's distance from the eye. Next to the side b^2 - a c
+// then decides.
 #ifndef REVOLUTION_H
 #define REVOLUTION_H
 
 #include "shapes/box.h"
 #include "shapes/ends.h"
+#include "shapes/eye_power.h"
 
 typedef struct {
     real a, b, c, discriminant;
@@ -17,6 +23,39 @@ typedef struct {
     real g, h;
     mask compensated; // all of these are rounded about once
 } RevolutionQuadric;
+
+// f . w, rounded about once.
+static inline Pair revolution_height(const Revolution *shape, const Ray *ray)
+{
+    Vector axis = vector_of(shape->axis_slope);
+    if (has_eye_power(shape->id)) return pair_vector_dot_vector(pair_vector_of(ray->origin), axis);
+    return pair_vector_dot_vector(pair_vector_difference(ray->origin, vector_of(shape->base_radius)), axis);
+}
+
+static inline mask revolution_near_side(real c, Vector m)
+{
+    return fabs(c) < (real)(0.5f) * vector_dot(m, m);
+}
+
+// c by the eye's power, and next to the side the discriminant.
+static inline void revolution_quadric_from_eye(RevolutionQuadric *quadric, const Revolution *shape,
+                                               bool sloped, const Ray *ray, Pair a, Pair b)
+{
+    Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
+    PairVector beyond = pair_vector_difference(ray->origin, vector_scale(base, (real)(2)));
+    Pair c = pair_vector_dot(pair_vector_cross(pair_vector_of(ray->origin), axis),
+                             pair_vector_cross(beyond, axis));
+    if (sloped) {
+        real slope = (real)(shape->axis_slope.w), twice_radius = (real)(2) * (real)(shape->base_radius.w);
+        Pair rise = pair_scale(revolution_height(shape, ray), slope);
+        c = pair_subtract(c, pair_multiply(rise, pair_add(pair_of(twice_radius), rise)));
+    }
+    c = pair_add(pair_of(eye_power_of(shape->id)), c);
+    mask near_side = revolution_near_side(c.high, quadric->m);
+    real discriminant = pair_subtract(pair_multiply(b, b), pair_multiply(a, c)).high;
+    quadric->c = c.high;
+    quadric->discriminant = lanes_select(near_side, discriminant, quadric->discriminant);
+}
 
 static inline RevolutionQuadric revolution_quadric_compensated(const Revolution *shape, bool sloped,
                                                                const Ray *ray)
@@ -31,7 +70,7 @@ static inline RevolutionQuadric revolution_quadric_compensated(const Revolution 
     Pair g = pair_of(radius), h = pair_of((real)(0));
     PairVector v;
     if (sloped) {
-        g = pair_add(g, pair_scale(pair_vector_dot_vector(f, axis), slope));
+        g = pair_add(g, pair_scale(revolution_height(shape, ray), slope));
         h = pair_scale(pair_vector_dot_vector(pair_vector_of(d), axis), slope);
         v = (PairVector){pair_difference_of_products(g, q.x, h, m.x),
                          pair_difference_of_products(g, q.y, h, m.y),
@@ -41,9 +80,11 @@ static inline RevolutionQuadric revolution_quadric_compensated(const Revolution 
     }
     Pair moment_on_axis = pair_vector_dot_vector(moment, axis);
     Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
+    Pair a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h));
+    Pair b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h));
     RevolutionQuadric quadric;
-    quadric.a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h)).high;
-    quadric.b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h)).high;
+    quadric.a = a.high;
+    quadric.b = b.high;
     quadric.c = pair_subtract(pair_vector_dot(m, m), pair_multiply(g, g)).high;
     quadric.discriminant =
         pair_subtract(pair_vector_dot(v, v),
@@ -54,6 +95,7 @@ static inline RevolutionQuadric revolution_quadric_compensated(const Revolution 
     quadric.g = g.high;
     quadric.h = h.high;
     quadric.compensated = mask_all();
+    if (has_eye_power(shape->id)) revolution_quadric_from_eye(&quadric, shape, sloped, ray, a, b);
     return quadric;
 }
 
@@ -135,8 +177,7 @@ static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool
 {
     if (IS_COMPENSATED) return revolution_quadric_compensated(shape, sloped, ray);
     RevolutionQuadric quadric = revolution_quadric_plain(shape, sloped, ray);
-    real size = vector_dot(quadric.m, quadric.m);
-    mask near_side = RAY_ACTIVE(ray) & (fabs(quadric.c) < (real)(0x1p-3f) * size);
+    mask near_side = RAY_ACTIVE(ray) & revolution_near_side(quadric.c, quadric.m);
     if (RARELY(lanes_any(near_side))) {
         RevolutionQuadric refined = quadric; // its address would keep `quadric` itself out of registers
         revolution_quadric_refine(&refined, shape, sloped, ray, near_side);
@@ -176,14 +217,15 @@ static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
     Vector axis = vector_of(shape->axis_slope);
     real from, towards;
     if (IS_COMPENSATED) {
-        PairVector f = pair_vector_difference(ray->origin, vector_of(shape->base_radius));
-        from = pair_vector_dot_vector(f, axis).high;
+        from = revolution_height(shape, ray).high;
         towards = pair_vector_dot_vector(pair_vector_of(ray->direction), axis).high;
     } else {
-        from = vector_dot(vector_subtract(ray->origin, vector_of(shape->base_radius)), axis);
+        Vector f = vector_subtract(ray->origin, vector_of(shape->base_radius));
+        from = vector_dot(has_eye_power(shape->id) ? ray->origin : f, axis);
         towards = vector_dot(ray->direction, axis);
     }
-    return slab_crossings((real)(0), (real)(shape->range.x), from, towards, real_inverse_or_zero(towards));
+    return slab_crossings((real)(shape->range.w), (real)(shape->range.x), from, towards,
+                          real_inverse_or_zero(towards));
 }
 
 // Restricts `outer` lanes to the nappe that the ends bound: the one towards which the radius grows.
@@ -261,8 +303,8 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
 static inline mask revolution_reaches(const Revolution *shape, const RevolutionCrossings *crossings,
                                       const Ray *ray, real t)
 {
-    scalar first = shape->base_radius.w;
-    scalar widest = fmax(first, fma(shape->axis_slope.w, shape->range.x, first));
+    scalar base = shape->base_radius.w, slope = shape->axis_slope.w;
+    scalar widest = fmax(fma(slope, shape->range.w, base), fma(slope, shape->range.x, base));
     Vector offset = vector_scale(ray->direction, t);
     real size =
         vector_norm1(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_norm1(offset);
@@ -320,11 +362,11 @@ static inline SurfacePoint revolution_cap_point(const Revolution *shape, Vector 
                                                 real rounding_scale)
 {
     Vector axis = vector_of(shape->axis_slope);
-    real end = (real)(shape->range.x);
-    real target = lanes_select(height * (real)(2) < end, (real)(0), end);
+    real low = (real)(shape->range.w), high = (real)(shape->range.x);
+    mask at_base = height * (real)(2) < low + high;
+    real target = lanes_select(at_base, low, high);
     Vector on_plane = vector_fma(axis, real_divide(target - height, (real)(shape->range.z)), p);
     Vector end_normal = vector_normalize(axis);
-    mask at_base = target == (real)(0);
     end_normal = vector_select(at_base, vector_negate(end_normal), end_normal);
     return surface_point_make(vector_add(on_plane, vector_of(shape->base_radius)), end_normal,
                               rounding_scale);
@@ -338,11 +380,13 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     real height = vector_dot(p, vector_of(shape->axis_slope));
     SurfacePoint point = revolution_side_point(shape, sloped, p, height);
     real rounding_scale = point.rounding_scale;
-    if (IS_COMPENSATED) surface_point_move_to_ray(&point, ray, t, rounding_scale);
+    const bool has_power = !IS_FAST && has_eye_power(shape->id);
+    if (IS_COMPENSATED || has_power) surface_point_move_to_ray(&point, ray, t, rounding_scale);
     if (shape->id.y & REVOLUTION_CAPPED) {
         RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
         RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
         SurfacePoint cap = revolution_cap_point(shape, p, height, rounding_scale);
+        if (has_power) surface_point_move_to_ray(&cap, ray, t, rounding_scale);
         surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;

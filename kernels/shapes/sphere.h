@@ -2,31 +2,12 @@
 #ifndef SPHERE_H
 #define SPHERE_H
 
+#include "shapes/eye_power.h"
 #include "shapes/quadratic.h"
 
 typedef struct {
     real b, c;
 } SphereCoefficients;
-
-// start + a . b, rounded about once.
-static inline real sphere_power_sum(Pair start, Vector a, PairVector b)
-{
-    Pair xx = two_product(a.x, b.x.high), yy = two_product(a.y, b.y.high), zz = two_product(a.z, b.z.high);
-    Pair one = two_sum(xx.high, start.high), two = two_sum(one.high, yy.high),
-         three = two_sum(two.high, zz.high);
-    real of_low = real_fma(a.x, b.x.low, real_fma(a.y, b.y.low, a.z * b.z.low));
-    real low = ((one.low + two.low) + three.low) + ((xx.low + yy.low) + (zz.low + start.low));
-    return three.high + (of_low + low);
-}
-
-static inline real sphere_eye_power(const Sphere *sphere)
-{
-#if IS_DOUBLE
-    return (real)(as_double(upsample(sphere->id.w, sphere->id.z)));
-#else
-    return (real)(as_float(sphere->id.z));
-#endif
-}
 
 // Each rounded about once. `to_center` is -f. c is the origin's power: f . f - r^2, or the eye's plus
 // o . (o - 2 center), in which the center's rounding counts only by the origin's distance from the eye.
@@ -34,10 +15,10 @@ static inline SphereCoefficients sphere_coefficients(const Sphere *sphere, PairV
                                                      const Ray *ray)
 {
     SphereCoefficients coefficients = {.b = -pair_vector_dot_once(to_center, ray->direction)};
-    if (HAS_EYE_POWERS && (sphere->id.y & SPHERE_HAS_POWER)) {
+    if (has_eye_power(sphere->id)) {
         Vector twice_center = vector_scale(vector_of(sphere->center_radius), (real)(2));
-        coefficients.c = sphere_power_sum(pair_of(sphere_eye_power(sphere)), ray->origin,
-                                          pair_vector_difference(ray->origin, twice_center));
+        coefficients.c = power_sum(pair_of(eye_power_of(sphere->id)), ray->origin,
+                                   pair_vector_difference(ray->origin, twice_center));
         return coefficients;
     }
     real radius = (real)(sphere->center_radius.w);
@@ -46,7 +27,7 @@ static inline SphereCoefficients sphere_coefficients(const Sphere *sphere, PairV
     twice_low.x.low *= (real)(2);
     twice_low.y.low *= (real)(2);
     twice_low.z.low *= (real)(2);
-    coefficients.c = sphere_power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
+    coefficients.c = power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
     return coefficients;
 }
 

@@ -66,6 +66,11 @@ static inline Vector triangle_normal(const Triangle *triangle)
 //
 // The compensated precisions start at the second step; double always ends at the third.
 
+static inline bool has_eye_height(uint4 id)
+{
+    return HAS_EYE_POWERS && id.w != 0;
+}
+
 // The plain step. Each product is off by at most 2 u of its factors' lengths, u of itself, and u each for the
 // rounding of `to_plane`, from the ray's start to a vertex, and of the normal; by 4 u where the height nearly
 // vanishes.
@@ -94,13 +99,18 @@ static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_p
     return plane;
 }
 
-// The accurate step. At a low angle both products cancel; compensated, the normal itself is in pairs.
+// The accurate step. At a low angle both products cancel; compensated, the normal itself is in pairs. Next to
+// the eye the height above the plane is the eye's less n . o.
 // `in_plane` is the t of rays in the triangle's plane.
 static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray, real in_plane)
 {
     Vector a = vector_of(triangle->a);
     real along, height;
-    if (IS_COMPENSATED) {
+    if (has_eye_height(triangle->id)) {
+        Vector normal = triangle_normal(triangle);
+        along = vector_dot_compensated(normal, ray->direction);
+        height = (real)(as_float(triangle->id.w)) - vector_dot_compensated(normal, ray->origin);
+    } else if (IS_COMPENSATED) {
         PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
         PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
         PairVector normal = {pair_difference_of_products(ab.y, ac.z, ab.z, ac.y),
@@ -212,16 +222,18 @@ static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
                       vector_fma(corners.b, weights.b, vector_scale(corners.c, weights.c)));
 }
 
-// The hit point, blended from the vertices. The normal may have any length.
+// The hit point, blended from the vertices. The normal may have any length. `next_to_eye`: triangles with an
+// eye's height.
 static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
-                                                 const Ray *ray, real t)
+                                                 mask next_to_eye, const Ray *ray, real t)
 {
     Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners);
     SurfacePoint point =
         surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, max_abs));
-    if (IS_COMPENSATED) {
+    if (IS_COMPENSATED | (HAS_EYE_POWERS & !IS_FAST)) {
         real magnitude =
             real_max(real_max(vector_norm1(corners.a), vector_norm1(corners.b)), vector_norm1(corners.c));
+        if (!IS_COMPENSATED) magnitude = lanes_select(next_to_eye, magnitude, (real)(0));
         surface_point_move_to_ray(&point, ray, t, magnitude);
     }
     return point;
@@ -230,7 +242,9 @@ static inline SurfacePoint corners_surface_point(Corners corners, Vector normal,
 static inline SurfacePoint triangle_surface_point(const Triangle *triangle, const Ray *ray, real t)
 {
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
-    return corners_surface_point(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray, t);
+    mask next_to_eye = has_eye_height(triangle->id) ? mask_all() : mask_none();
+    return corners_surface_point(corners, triangle_normal(triangle), triangle_weights(corners, ray),
+                                 next_to_eye, ray, t);
 }
 
 // Interpolates the shading normal from the vertices'; a triangle whose are all 0 is flat.

@@ -1,18 +1,76 @@
 #include "host/compile/shapes.h"
 
+// How a paraboloid lies around the eye: its axis' nearest point, that point's height above the apex, and how
+// far the eye is from the unbounded side, to first order, and below the end.
+typedef struct {
+    Quad3 foot;
+    Quad lift, outside, below_end;
+} ParaboloidAround;
+
+static ParaboloidAround paraboloid_around(Quad3 apex, Quad3 unit_axis, Quad focal_length, Quad height)
+{
+    ParaboloidAround around = {.lift = -quad3_dot(apex, unit_axis)};
+    around.foot = quad3_add(apex, quad3_scale(unit_axis, around.lift));
+    const Quad squared = quad3_dot(around.foot, around.foot);
+    around.outside = (squared - 4 * focal_length * around.lift) /
+                     (2 * quad_root(squared + 4 * focal_length * focal_length));
+    around.below_end = height - around.lift;
+    return around;
+}
+
+// Whether rounding moves the side, or the end, by more than 2 roundings of its distance from the eye.
+static bool paraboloid_moves(const Rounding *rounding, const Object *object, const Paraboloid *stored,
+                             const ParaboloidAround *exact)
+{
+    const Quad3 axis = quad3(vector3_of(&stored->axis_end));
+    const Quad length = quad3_length(axis), focal_length = rounded(rounding, stored->apex_k.w) / (4 * length);
+    const ParaboloidAround moved =
+        paraboloid_around(quad3(vector3_of(&stored->apex_k)), quad3_scale(axis, 1 / length), focal_length,
+                          rounded(rounding, stored->axis_end.w) / length);
+    const double tolerance = 2 * roundoff_of(rounding), below = (double)exact->below_end;
+    const double beyond = object->as.paraboloid.finite ? fmax(-below, 0) : 0;
+    if (fabs((double)(moved.outside - exact->outside)) > tolerance * hypot((double)exact->outside, beyond))
+        return true;
+    if (!object->as.paraboloid.finite) return false;
+    const double rim = 2 * sqrt(object->as.paraboloid.focal_length * object->as.paraboloid.height),
+                 from_rim = (double)quad3_length(exact->foot) - rim;
+    const double across = object->as.paraboloid.caps ? fmax(from_rim, 0) : from_rim;
+    return fabs((double)(moved.below_end - exact->below_end)) > tolerance * hypot(below, across);
+}
+
+// Where rounding matters, the eye's power defines it.
+static void paraboloid_take_power(Paraboloid *shape, Flattening *flattening, const Object *object)
+{
+    const Rounding *rounding = &flattening->rounding;
+    const Quad focal_length = object->as.paraboloid.focal_length;
+    const bool finite = object->as.paraboloid.finite;
+    const ParaboloidAround exact = paraboloid_around(exact_from_eye(rounding, object->as.paraboloid.apex),
+                                                     quad3_unit(quad3(object->as.paraboloid.axis)),
+                                                     focal_length, object->as.paraboloid.height);
+    if (!paraboloid_moves(rounding, object, shape, &exact)) return;
+    const Quad3 axis = quad3(vector3_of(&shape->axis_end));
+    const Quad squared = quad3_dot(axis, axis), length = quad_root(squared);
+    const Quad power = squared * (quad3_dot(exact.foot, exact.foot) - 4 * focal_length * exact.lift);
+    if (!primitive_take_power(flattening, (double)power, &shape->id)) return;
+    shape->foot_lift =
+        scalar4_of(vector_rounded(rounding, quad3_rounded(exact.foot)), (double)(exact.lift * length));
+    shape->axis_end.w = finite ? (double)(exact.below_end * length) : 0;
+}
+
 static void paraboloid_flatten(Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
     const Vector3 axis = vector_rounded(rounding, axis_scaled(object->as.paraboloid.axis));
     const double length = vector_length(axis);
     const bool finite = object->as.paraboloid.finite;
-    const Paraboloid paraboloid = {
+    Paraboloid paraboloid = {
         .apex_k = scalar4_of(point_from_eye(rounding, object->as.paraboloid.apex),
                              4 * length * rounded(rounding, object->as.paraboloid.focal_length)),
         .axis_end = scalar4_of(axis, finite ? length * rounded(rounding, object->as.paraboloid.height) : 0),
         .id.y = (finite ? REVOLUTION_FINITE : 0u) |
                 (finite && object->as.paraboloid.caps ? REVOLUTION_CAPPED : 0u),
     };
+    paraboloid_take_power(&paraboloid, flattening, object);
     primitive_add(flattening, KIND_PARABOLOIDS, &paraboloid, object->material);
 }
 
@@ -54,7 +112,7 @@ static bool paraboloid_primitive_bounds(const void *primitive, Bounds *bounds)
     const double length = vector_length(axis);
     if (!(shape->id.y & REVOLUTION_FINITE)) return false;
     *bounds = paraboloid_bounds_of(vector3_of(&shape->apex_k), axis, shape->apex_k.w / (4 * length),
-                                   shape->axis_end.w / length);
+                                   (shape->axis_end.w + shape->foot_lift.w) / length);
     return true;
 }
 

@@ -10,7 +10,8 @@ static bool plane_bounds(const Scene *scene, const Object *object, Bounds *bound
 static void plane_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 normal = object->as.plane.normal;
-    Plane plane = {.point = scalar4_of(point_from_eye(&flattening->rounding, object->as.plane.point), 0),
+    const Vector3 point = plane_point_from_eye(&flattening->rounding, object->as.plane.point, normal);
+    Plane plane = {.point = scalar4_of(point, 0),
                    .normal = normal_and_inverse_length(&flattening->rounding, normal)};
     surface_grid(flattening, object->material, normal, &plane.grid_u, &plane.grid_v);
     primitive_add(flattening, KIND_PLANES, &plane, object->material);

@@ -1,45 +1,162 @@
 // Cylinders and cones.
 #include "host/compile/shapes.h"
 
-static Revolution revolution_make(const Rounding *rounding, Vector3 from, Vector3 whole_axis,
-                                  double radius_from, double radius_to, double infinite_slope, bool finite,
-                                  bool caps)
+// A cylinder or cone as the scene has it. If it is infinite, its radius grows by the slope from `from` on.
+typedef struct {
+    Vector3 from, axis;
+    double base_radius, end_radius, infinite_slope;
+    bool finite, caps, only_inside;
+} RevolutionGiven;
+
+static Revolution revolution_rounded(const Rounding *rounding, const RevolutionGiven *given)
 {
-    Vector3 base = point_from_eye(rounding, from);
-    Vector3 axis = whole_axis;
+    Vector3 base = point_from_eye(rounding, given->from);
+    Vector3 axis = given->axis;
     // both ends are rounded as points, so that they stay where the points of other objects are rounded to
-    if (finite) axis = vector_subtract(point_from_eye(rounding, vector_add(from, whole_axis)), base);
+    if (given->finite)
+        axis = vector_subtract(point_from_eye(rounding, vector_add(given->from, given->axis)), base);
     Vector3 scaled = vector_rounded(rounding, axis_scaled(axis));
     double length = vector_length(scaled);
-    double radius = rounded(rounding, radius_from);
-    double slope = finite ? (rounded(rounding, radius_to) - radius) / vector_length(axis) : infinite_slope;
+    double radius = rounded(rounding, given->base_radius);
+    double slope = given->finite ? (rounded(rounding, given->end_radius) - radius) / vector_length(axis)
+                                 : given->infinite_slope;
     return (Revolution){
         .base_radius = scalar4_of(base, radius * length),
         .axis_slope = scalar4_of(scaled, slope),
-        .range = {finite ? vector_dot(axis, scaled) : 0, length, vector_dot(scaled, scaled), 0},
-        .id.y = (finite ? REVOLUTION_FINITE : 0u) | (finite && caps ? REVOLUTION_CAPPED : 0u),
+        .range = {given->finite ? vector_dot(axis, scaled) : 0, length, vector_dot(scaled, scaled), 0},
+        .id.y = (given->finite ? REVOLUTION_FINITE : 0u) |
+                (given->finite && given->caps ? REVOLUTION_CAPPED : 0u) |
+                (given->only_inside ? IGNORES_FRONT_FACES : 0u),
     };
+}
+
+// How a cylinder or cone lies around the eye: its axis' nearest point, the radius there and the slope, how
+// far the eye is outside the unbounded side, and the heights of the ends above the eye.
+typedef struct {
+    Quad3 foot;
+    Quad radius, slope, outside, low, high;
+} RevolutionAround;
+
+static RevolutionAround revolution_around(Quad3 base, Quad3 unit_axis, Quad radius, Quad slope, Quad height)
+{
+    RevolutionAround around = {.low = quad3_dot(base, unit_axis), .slope = slope};
+    around.high = around.low + height;
+    around.foot = quad3_subtract(base, quad3_scale(unit_axis, around.low));
+    around.radius = radius - slope * around.low;
+    around.outside =
+        (quad3_length(around.foot) - quad_absolute(around.radius)) / quad_root(1 + slope * slope);
+    return around;
+}
+
+static RevolutionAround revolution_around_exact(const Rounding *rounding, const RevolutionGiven *given)
+{
+    const Quad height = given->finite ? quad3_length(quad3(given->axis)) : 0;
+    const Quad slope =
+        given->finite ? ((Quad)given->end_radius - given->base_radius) / height : (Quad)given->infinite_slope;
+    return revolution_around(exact_from_eye(rounding, given->from), quad3_unit(quad3(given->axis)),
+                             given->base_radius, slope, height);
+}
+
+// As the kernel receives it.
+static RevolutionAround revolution_around_stored(const Rounding *rounding, const Revolution *stored)
+{
+    const Quad3 axis = quad3(vector3_of(&stored->axis_slope));
+    const Quad length = quad3_length(axis);
+    return revolution_around(quad3(vector3_of(&stored->base_radius)), quad3_scale(axis, 1 / length),
+                             rounded(rounding, stored->base_radius.w) / length,
+                             rounded(rounding, stored->axis_slope.w),
+                             rounded(rounding, stored->range.x) / length);
+}
+
+static double difference(Quad a, Quad b)
+{
+    return fabs((double)(a - b));
+}
+
+// Most cylinders and cones are so far away, for their size, that roundings of their numbers do not matter.
+static bool revolution_is_far(const Rounding *rounding, const RevolutionGiven *given)
+{
+    const Vector3 from = vector_subtract(given->from, rounding->eye), to = vector_add(from, given->axis);
+    const double radius = fmax(given->base_radius, given->end_radius);
+    const double reach = hypot(vector_length(given->axis) / 2, radius); // from its middle
+    const double distance = vector_length(vector_scale(vector_add(from, to), 0.5)) - reach;
+    return given->finite && 2 * distance > fmax(vector_length(from), vector_length(to)) + radius;
+}
+
+// Whether rounding moves the side, or an end, by more than a rounding of its distance from the eye.
+static bool revolution_moves(const Rounding *rounding, const RevolutionGiven *given,
+                             const RevolutionAround *exact, const RevolutionAround *stored)
+{
+    const double tolerance = roundoff_of(rounding);
+    const double beyond = given->finite ? (double)quad_maximum(quad_maximum(exact->low, -exact->high), 0) : 0;
+    if (difference(exact->outside, stored->outside) > tolerance * hypot((double)exact->outside, beyond))
+        return true;
+    if (!given->finite) return false;
+    const double off_axis = (double)quad3_length(exact->foot);
+    const double radii[] = {given->base_radius, given->end_radius},
+                 moved[] = {difference(exact->low, stored->low), difference(exact->high, stored->high)},
+                 heights[] = {(double)exact->low, (double)exact->high};
+    for (int end = 0; end < 2; end++) {
+        const double from_rim = off_axis - radii[end];
+        const double across = given->caps ? fmax(from_rim, 0) : from_rim;
+        if (moved[end] > tolerance * hypot(heights[end], across)) return true;
+    }
+    return false;
+}
+
+// Where rounding matters, everything is relative to the eye.
+static void revolution_take_power(Revolution *shape, Flattening *flattening, const RevolutionGiven *given)
+{
+    const Rounding *rounding = &flattening->rounding;
+    if (revolution_is_far(rounding, given)) return;
+    const RevolutionAround exact = revolution_around_exact(rounding, given),
+                           stored = revolution_around_stored(rounding, shape);
+    if (!revolution_moves(rounding, given, &exact, &stored)) return;
+    const Vector3 axis = vector_rounded(rounding, axis_scaled(given->axis));
+    const Quad3 wide_axis = quad3(axis);
+    const Quad squared = quad3_dot(wide_axis, wide_axis), length = quad_root(squared);
+    const Quad power = squared * (quad3_dot(exact.foot, exact.foot) - exact.radius * exact.radius);
+    if (!primitive_take_power(flattening, (double)power, &shape->id)) return;
+    shape->base_radius =
+        scalar4_of(vector_rounded(rounding, quad3_rounded(exact.foot)), (double)(exact.radius * length));
+    shape->axis_slope = scalar4_of(axis, (double)exact.slope);
+    shape->range = (scalar4){given->finite ? (double)(exact.high * length) : 0, (double)length,
+                             (double)squared, given->finite ? (double)(exact.low * length) : 0};
+}
+
+static void revolution_flatten(Flattening *flattening, int kind, const Object *object,
+                               const RevolutionGiven *given)
+{
+    Revolution shape = revolution_rounded(&flattening->rounding, given);
+    revolution_take_power(&shape, flattening, given);
+    primitive_add(flattening, kind, &shape, object->material);
 }
 
 static void cylinder_flatten(Flattening *flattening, const Object *object)
 {
     const double radius = object->as.cylinder.radius;
-    Cylinder cylinder =
-        revolution_make(&flattening->rounding, object->as.cylinder.from, object->as.cylinder.axis, radius,
-                        radius, 0, object->as.cylinder.finite, object->as.cylinder.caps);
-    if (object->as.cylinder.only_inside) cylinder.id.y |= IGNORES_FRONT_FACES;
-    primitive_add(flattening, KIND_CYLINDERS, &cylinder, object->material);
+    const RevolutionGiven given = {.from = object->as.cylinder.from,
+                                   .axis = object->as.cylinder.axis,
+                                   .base_radius = radius,
+                                   .end_radius = radius,
+                                   .finite = object->as.cylinder.finite,
+                                   .caps = object->as.cylinder.caps,
+                                   .only_inside = object->as.cylinder.only_inside};
+    revolution_flatten(flattening, KIND_CYLINDERS, object, &given);
 }
 
 static void cone_flatten(Flattening *flattening, const Object *object)
 {
     const bool finite = object->as.cone.finite;
-    const double *radius = object->as.cone.radius;
-    Cone cone = revolution_make(&flattening->rounding, object->as.cone.from, object->as.cone.axis,
-                                finite ? radius[0] : 0, radius[1], object->as.cone.slope, finite,
-                                object->as.cone.caps);
-    if (object->as.cone.only_inside) cone.id.y |= IGNORES_FRONT_FACES;
-    primitive_add(flattening, KIND_CONES, &cone, object->material);
+    const RevolutionGiven given = {.from = object->as.cone.from,
+                                   .axis = object->as.cone.axis,
+                                   .base_radius = finite ? object->as.cone.radius[0] : 0,
+                                   .end_radius = finite ? object->as.cone.radius[1] : 0,
+                                   .infinite_slope = object->as.cone.slope,
+                                   .finite = finite,
+                                   .caps = object->as.cone.caps,
+                                   .only_inside = object->as.cone.only_inside};
+    revolution_flatten(flattening, KIND_CONES, object, &given);
 }
 
 // Sides without caps reach as far as the discs that end them.
@@ -73,12 +190,14 @@ static bool revolution_bounds(const void *primitive, Bounds *bounds)
     if (!(shape->id.y & REVOLUTION_FINITE)) return false;
     Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
     double length = shape->range.y, radius = shape->base_radius.w / length;
-    double height = shape->range.x / shape->range.z; // in units of the stored axis
-    double end_radius = radius + shape->axis_slope.w * height * length;
+    const double heights[] = {shape->range.w / shape->range.z, shape->range.x / shape->range.z}; // in axes
     Vector3 half_extents = circle_half_extents(vector_scale(axis, 1 / length));
-    *bounds = bounds_join(bounds_around(base, vector_scale(half_extents, fabs(radius))),
-                          bounds_around(vector_add(base, vector_scale(axis, height)),
-                                        vector_scale(half_extents, fabs(end_radius))));
+    *bounds = bounds_empty();
+    for (int end = 0; end < 2; end++) {
+        const double end_radius = radius + shape->axis_slope.w * heights[end] * length;
+        *bounds = bounds_join(*bounds, bounds_around(vector_add(base, vector_scale(axis, heights[end])),
+                                                     vector_scale(half_extents, fabs(end_radius))));
+    }
     return true;
 }
 

@@ -1,6 +1,4 @@
 #include "host/compile/shapes.h"
-#include <float.h>
-#include <string.h>
 
 static bool sphere_bounds(const Scene *scene, const Object *object, Bounds *bounds)
 {
@@ -42,20 +40,8 @@ static void sphere_take_power(Sphere *sphere, Flattening *flattening, const Obje
     const Rounding *rounding = &flattening->rounding;
     const EyePower eye = eye_power(rounding, object, center);
     const double distance = fabs(eye.power) / (vector_length(center) + object->as.sphere.radius);
-    const double roundoff = (rounding->is_double ? DBL_EPSILON : FLT_EPSILON) / 2;
-    const double power = rounded(rounding, eye.power);
-    if (!(eye.moved > 4 * roundoff * distance) || !isfinite(power)) return;
-    flattening->features |= FEATURE_EYE_POWERS;
-    sphere->id.y |= SPHERE_HAS_POWER;
-    const float single = (float)power;
-    if (!rounding->is_double) {
-        memcpy(&sphere->id.z, &single, sizeof single);
-        return;
-    }
-    uint64_t bits;
-    memcpy(&bits, &power, sizeof bits);
-    sphere->id.z = (uint32_t)bits;
-    sphere->id.w = (uint32_t)(bits >> 32);
+    if (eye.moved > 4 * roundoff_of(rounding) * distance)
+        primitive_take_power(flattening, eye.power, &sphere->id);
 }
 
 static void sphere_flatten(Flattening *flattening, const Object *object)

@@ -4,6 +4,8 @@
 #endif
 #include "host/compile/shapes.h"
 #include "host/compile/texture_mapping.h"
+#include <math.h>
+#include <string.h>
 
 // a b - c d to 1.5 ulp (Kahan's; Jeannerod, Louvet, Muller, Further analysis of Kahan's algorithm for the
 // accurate computation of 2x2 determinants, Mathematics of Computation 82, 2013).
@@ -51,12 +53,64 @@ __attribute__((target("fma"))) static Triangle triangle_of_fma(const Rounding *r
 }
 #endif
 
-static Triangle triangle_make(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
+static Triangle triangle_rounded(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
 {
 #ifdef __x86_64__
     if (__builtin_cpu_supports("fma")) return triangle_of_fma(rounding, a, b, c);
 #endif
     return triangle_of(rounding, a, b, c);
+}
+
+// Whether a triangle is so far away, for its size, that roundings of its numbers do not matter: most are.
+static inline bool triangle_is_far(const Triangle *triangle)
+{
+    const Vector3 a = vector3_of(&triangle->a);
+    const Bounds box = bounds_of_triangle(a, vector3_of(&triangle->b), vector3_of(&triangle->c));
+    const Vector3 outside = vector_max(vector_max(box.min, vector_scale(box.max, -1)), (Vector3){0, 0, 0});
+    return 4 * vector_dot(outside, outside) > vector_dot(a, a);
+}
+
+// Where rounding moves the plane by more than 4 roundings of its distance from the eye, the eye's height
+// defines it, with the normal of the vertices before they are rounded.
+static void triangle_take_height(Triangle *triangle, Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
+{
+    const Rounding *rounding = &flattening->rounding;
+    const Vector3 seen = vector3_of(&triangle->a);
+    const Quad3 to_a = exact_from_eye(rounding, a), ab = quad3_subtract(quad3(b), quad3(a)),
+                ac = quad3_subtract(quad3(c), quad3(a)), across = quad3_cross(ab, ac);
+    int exponent;
+    frexp(vector_largest(quad3_rounded(across)), &exponent);
+    const Quad3 normal = quad3_scale(across, ldexp(1, -exponent));
+    const Quad height = quad3_dot(normal, to_a), length = quad3_length(normal);
+    const Quad3 stored = {triangle->a.w, triangle->b.w, triangle->c.w};
+    const Quad stored_height = quad3_dot(stored, quad3(seen)), stored_length = quad3_length(stored);
+    const double above = fabs((double)(height / length)),
+                 moved = fabs((double)(stored_height / stored_length - height / length));
+    if (!(moved > 4 * roundoff_of(rounding) * above)) return;
+    // the normal takes the height's rounding to float: the plane stays where it is, in double too
+    const float eye_height = height == 0 ? -0.0f : (float)height;
+    if (!isfinite(eye_height) || (eye_height == 0 && height != 0)) return;
+    const Quad scale = height == 0 ? 1 : eye_height / height;
+    const Vector3 scaled = vector_rounded(rounding, quad3_rounded(quad3_scale(normal, scale)));
+    triangle->a.w = scaled.x;
+    triangle->b.w = scaled.y;
+    triangle->c.w = scaled.z;
+    memcpy(&triangle->id.w, &eye_height, sizeof eye_height);
+    flattening->features |= FEATURE_EYE_POWERS;
+}
+
+static Triangle triangle_make(Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
+{
+    Triangle triangle = triangle_rounded(&flattening->rounding, a, b, c);
+    if (!triangle_is_far(&triangle)) triangle_take_height(&triangle, flattening, a, b, c);
+    return triangle;
+}
+
+// The attributes of a triangle that another eye saw stay.
+static void triangle_keep_attributes(Triangle *triangle, const Triangle *moved)
+{
+    triangle->id.y = moved->id.y;
+    triangle->id.z = moved->id.z;
 }
 
 // What a triangle's id.y holds; a triangle with a vertex without a normal is flat.
@@ -82,9 +136,9 @@ static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const uint32_t
 static void triangle_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
-    Triangle triangle = triangle_make(&flattening->rounding, vertices[0], vertices[1], vertices[2]);
+    Triangle triangle = triangle_make(flattening, vertices[0], vertices[1], vertices[2]);
     if (flattening->moved)
-        triangle.id = ((const Triangle *)flattening->moved)->id;
+        triangle_keep_attributes(&triangle, flattening->moved);
     else if (object->as.triangle.smooth)
         triangle.id.y = normals_add(flattening, vector_normalize(normals[0]), vector_normalize(normals[1]),
                                     vector_normalize(normals[2]));
@@ -97,10 +151,10 @@ static void mesh_flatten(Flattening *flattening, const Object *object)
     const Vector3 *vertices = mesh->vertices, *normals = mesh->normals;
     const uint32_t *corners = mesh->triangles[flattening->part];
     const uint32_t material = mesh->materials ? mesh->materials[flattening->part] : object->material;
-    Triangle triangle = triangle_make(&flattening->rounding, vertices[corners[0]], vertices[corners[1]],
-                                      vertices[corners[2]]);
+    Triangle triangle =
+        triangle_make(flattening, vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]);
     if (flattening->moved) {
-        triangle.id = ((const Triangle *)flattening->moved)->id;
+        triangle_keep_attributes(&triangle, flattening->moved);
     } else {
         if (normals)
             triangle.id.y =

@@ -69,8 +69,13 @@ static inline Vector triangle_normal(const Triangle *triangle)
     return vector_cross(ab, ac);
 }
 
+static inline bool has_eye_height(uint4 id)
+{
+    return false;
+}
+
 static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
-                                                 const Ray *ray, real t)
+                                                 mask next_to_eye, const Ray *ray, real t)
 {
     return surface_point_make(ray_point(ray, t), vector_normalize(normal), TEXTBOOK_SIZE);
 }
@@ -78,7 +83,8 @@ static inline SurfacePoint corners_surface_point(Corners corners, Vector normal,
 static inline SurfacePoint triangle_surface_point(const Triangle *triangle, const Ray *ray, real t)
 {
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
-    return corners_surface_point(corners, triangle_normal(triangle), triangle_weights(corners, ray), ray, t);
+    return corners_surface_point(corners, triangle_normal(triangle), triangle_weights(corners, ray),
+                                 mask_none(), ray, t);
 }
 
 static inline void triangle_smooth(Corners normals, TriangleWeights weights, SurfacePoint *point)

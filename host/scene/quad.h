@@ -57,6 +57,12 @@ static inline Quad quad_absolute(Quad a)
     return a < 0 ? -a : a;
 }
 
+// The sum of |a_i b_i|: what roundings of a . b are proportional to.
+static inline Quad quad3_dot_magnitude(Quad3 a, Quad3 b)
+{
+    return quad_absolute(a.x * b.x) + quad_absolute(a.y * b.y) + quad_absolute(a.z * b.z);
+}
+
 static inline Quad quad_minimum(Quad a, Quad b)
 {
     return a < b ? a : b;

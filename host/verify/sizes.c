@@ -1,0 +1,193 @@
+// Shapes far larger, or smaller, than their distance from the eye: what rounding moves of them.
+#include "host/verify/checks.h"
+#include <math.h>
+
+// The eye is about this far above the origin, where every shape has a point of its surface.
+static const Vector3 eye = {0.3, 1.75, 0.2};
+
+typedef struct {
+    const char *text; // of the object
+    // Sets its numbers for a size. All are exact in double, but not in float.
+    void (*resize)(Object *object, double size);
+    // Of a flat shape the directions along it are open, of others those around the tangents.
+    bool is_flat;
+} SizedShape;
+
+static void sphere_resize(Object *object, double size)
+{
+    object->as.sphere.center = (Vector3){0.1, -size, 0.1};
+    object->as.sphere.radius = size;
+}
+
+static void plane_resize(Object *object, double size)
+{
+    object->as.plane.point = (Vector3){2 * size, -size, 0};
+}
+
+static void disc_resize(Object *object, double size)
+{
+    object->as.disc.center = (Vector3){2 * size, -size, 0};
+    object->as.disc.radius = 3 * size;
+}
+
+static void rim_resize(Object *object, double size)
+{
+    object->as.disc.center = (Vector3){-size, 0, 0.1};
+    object->as.disc.radius = size;
+}
+
+static void box_resize(Object *object, double size)
+{
+    object->as.box.min = (Vector3){-size, -2 * size, -size};
+    object->as.box.max = (Vector3){2 * size, 0, size};
+}
+
+static void cylinder_resize(Object *object, double size)
+{
+    object->as.cylinder.from = (Vector3){0.1, -size, 0.1};
+    object->as.cylinder.radius = size;
+}
+
+// Seen from above one of its ends.
+static void end_resize(Object *object, double size)
+{
+    object->as.cylinder.from = (Vector3){size / 2, 0, size / 4};
+    object->as.cylinder.axis = (Vector3){0, -size, 0};
+    object->as.cylinder.radius = size;
+}
+
+// The eye is above the side's middle.
+static void tilted_cylinder_resize(Object *object, double size)
+{
+    object->as.cylinder.from = (Vector3){-3 * size, -size, -4 * size};
+    object->as.cylinder.axis = (Vector3){6 * size, 0, 8 * size};
+    object->as.cylinder.radius = size;
+}
+
+static void cone_resize(Object *object, double size)
+{
+    object->as.cone.from = (Vector3){0.1, -size, 0.1};
+    object->as.cone.axis = (Vector3){3 * size, 0, 4 * size};
+    object->as.cone.radius[0] = size;
+    object->as.cone.radius[1] = size / 4;
+}
+
+static void infinite_cone_resize(Object *object, double size)
+{
+    object->as.cone.from = (Vector3){-2 * size, -size, 0.1};
+    object->as.cone.slope = 0.5;
+}
+
+static void paraboloid_resize(Object *object, double size)
+{
+    object->as.paraboloid.apex = (Vector3){0.1, -2 * size, -size};
+    object->as.paraboloid.focal_length = size;
+    object->as.paraboloid.height = 4 * size;
+}
+
+static void triangle_resize(Object *object, double size)
+{
+    object->as.triangle.vertices[0] = (Vector3){2 * size, -size, 0};
+    object->as.triangle.vertices[1] = (Vector3){-3 * size, 0, size};
+    object->as.triangle.vertices[2] = (Vector3){size, size, -size};
+}
+
+// What the pixel's ray hits, against the object as the scene has it, whose numbers need not be those of the
+// precision at work: hit or miss, how far the hit is off the surface, and that light from above reaches the
+// ground.
+static void check_pixel(VerifyRun *run, const Object *object, double band, bool is_ground, const Film *image,
+                        size_t pixel)
+{
+    const Quad3 direction = quad3(verify_vector(&image->ray[3 * pixel]));
+    const ReferenceRay ray = {quad3(eye), direction, 0, DBL_MAX};
+    const ReferenceHit exact = reference_hit_object(object, &ray);
+    const bool found = verify_pixel_found(image, pixel);
+    if (run->tier == TIER_A || exact.margin <= 16 * verify_roundoff(run) * band) return;
+    run->result->wrong += found != exact.found;
+    if (!found || !exact.found) return;
+    const double distance = image->t[pixel] * (double)quad3_length(direction);
+    const ReferenceSurface surface = reference_surface(object, reference_point(&ray, image->t[pixel]));
+    const double off = (double)reference_surface_distance(&surface);
+    verify_note_error(run, off / verify_ulp(run, distance), 4);
+    const bool is_lit = is_ground && exact.normal.y > (Quad)0.25 && distance < 8 * eye.y;
+    run->result->wrong += is_lit && !(image->color[3 * pixel] > 0);
+}
+
+static void check_sizes(VerifyRun *run, const SizedShape *shape)
+{
+    Scene scene = verify_scene(shape->text);
+    Object *object = &scene.objects.items[0];
+    const int largest = QUAD_BITS - (verify_is_double(run) ? DBL_MANT_DIG : FLT_MANT_DIG) - 8;
+    for (int exponent = -20; exponent <= (largest < 60 ? largest : 60); exponent += 4) {
+        const double size = ldexp(0x8ccccccd, exponent - 31); // 1.1 in 32 bits
+        const bool is_ground = exponent > 3;
+        shape->resize(object, size);
+        const ReferenceSurface whole = reference_surface(object, quad3(eye));
+        const Vector3 ahead = vector_add(eye, (Vector3){0.1, -1, 1});
+        scene.camera = verify_camera(eye, is_ground ? ahead : whole.center,
+                                     is_ground ? 100 : atan(size / eye.y) * (150 / M_PI));
+        const double band = eye.y + (shape->is_flat ? size : sqrt(2 * eye.y * size));
+        Film image = verify_render(run, &scene, false, 64, 64);
+        for (size_t pixel = 0; pixel < film_pixel_count(&image); pixel++)
+            check_pixel(run, object, band, is_ground, &image, pixel);
+        film_free(&image);
+    }
+    scene_free(&scene);
+}
+
+#define LIGHT_ABOVE "lights:\n  - directional: {direction: [0, -1, 0]}\nobjects:\n  - "
+
+static void check_all_sizes(VerifyRun *run, const SizedShape *shapes, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        check_sizes(run, &shapes[i]);
+}
+
+void verify_sphere_sizes(VerifyRun *run)
+{
+    static const SizedShape shapes[] = {
+        {LIGHT_ABOVE "sphere: {center: [0, 0, 0], radius: 1}\n", sphere_resize, false},
+    };
+    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
+}
+
+void verify_flat_sizes(VerifyRun *run)
+{
+    static const SizedShape shapes[] = {
+        {LIGHT_ABOVE "plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n", plane_resize, true},
+        {LIGHT_ABOVE "disc: {center: [0, 0, 0], normal: [1, 2, 3], radius: 1}\n", disc_resize, true},
+        {LIGHT_ABOVE "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}\n", rim_resize, false},
+        {LIGHT_ABOVE "box: {min: [-1, -1, -1], max: [1, 1, 1]}\n", box_resize, true},
+    };
+    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
+}
+
+void verify_revolution_sizes(VerifyRun *run)
+{
+    static const SizedShape shapes[] = {
+        {LIGHT_ABOVE "cylinder: {point: [0, 0, 0], axis: [3, 0, 4], radius: 1}\n", cylinder_resize, false},
+        {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [3, 0, 4], radius: 1}\n", tilted_cylinder_resize,
+         false},
+        {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", end_resize, true},
+        {LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [3, 0, 4], radius: [1, 2]}\n", cone_resize, false},
+        {LIGHT_ABOVE "cone: {apex: [0, 0, 0], axis: [1, 0, 0], angle: 1}\n", infinite_cone_resize, false},
+    };
+    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
+}
+
+void verify_paraboloid_sizes(VerifyRun *run)
+{
+    static const SizedShape shapes[] = {
+        {LIGHT_ABOVE "paraboloid: {apex: [0, 0, 0], axis: [0, 0, 1], focal_length: 1, height: 1}\n",
+         paraboloid_resize, false},
+    };
+    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
+}
+
+void verify_triangle_sizes(VerifyRun *run)
+{
+    static const SizedShape shapes[] = {
+        {LIGHT_ABOVE "triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}\n", triangle_resize, true},
+    };
+    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
+}

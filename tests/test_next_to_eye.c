@@ -1,0 +1,145 @@
+// What rounding would move next to the eye is defined relative to it, and nothing else is: kernels of other
+// scenes pay nothing.
+#include "host/compile/compile.h"
+#include "host/compile/shapes.h"
+#include "tests/scene_reading.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static CompiledScene compile(const Scene *scene, Precision precision)
+{
+    const CompileSettings settings = {.width = 64,
+                                      .height = 64,
+                                      .sample_count = 1,
+                                      .precision = precision,
+                                      .shift_to_eye = true,
+                                      .bvh = BVH_OFF,
+                                      .lanes = 1};
+    CompiledScene compiled;
+    MessageList messages = {0};
+    assert_true(scene_compile(&compiled, scene, &settings, &messages));
+    message_list_free(&messages);
+    return compiled;
+}
+
+static CompiledScene compile_text(const char *objects, Precision precision)
+{
+    Text text = {0};
+    text_appendf(&text, "camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\nobjects:\n%s", objects);
+    Scene scene = scene_of_text("next.yaml", text_c(&text));
+    CompiledScene compiled = compile(&scene, precision);
+    scene_free(&scene);
+    text_free(&text);
+    return compiled;
+}
+
+static const void *first(const CompiledScene *compiled, int kind)
+{
+    return flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], 0);
+}
+
+static double power_of(uint4 id, bool is_double)
+{
+    assert_true(id.y & HAS_POWER);
+    uint64_t bits = (uint64_t)id.w << 32 | id.z;
+    double wide;
+    float narrow;
+    memcpy(&wide, &bits, sizeof wide);
+    memcpy(&narrow, &id.z, sizeof narrow);
+    return is_double ? wide : (double)narrow;
+}
+
+static void ordinary_scenes_have_no_powers(void **state)
+{
+    (void)state;
+    static const char *const files[] = {"tests/scenes/every_shape.yaml", "scenes/cylinders-cones.yaml",
+                                        "scenes/triangles.yaml"};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        Scene scene = scene_of_file(files[i]);
+        CompiledScene compiled = compile(&scene, PRECISION_SINGLE);
+        assert_false(compiled.features & FEATURE_EYE_POWERS);
+        compiled_scene_free(&compiled);
+        scene_free(&scene);
+    }
+}
+
+// The eye is 1.75 above the top of a cylinder with the radius of a planet, far from both ends.
+static void a_cylinder_is_seen_from_its_nearest_point(void **state)
+{
+    (void)state;
+    const double radius = 6371001, height = 1.75;
+    for (int precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
+        CompiledScene compiled =
+            compile_text("  - cylinder: {from: [0, -6371001, -1234567.8], to: [0, -6371001, 7654321.1], "
+                         "radius: 6371001}\n",
+                         (Precision)precision);
+        const Cylinder *cylinder = first(&compiled, KIND_CYLINDERS);
+        const bool is_double = precision == PRECISION_DOUBLE;
+        const double squared = cylinder->range.z, length = cylinder->range.y;
+        const double expected = squared * height * (2 * radius + height);
+        const double error = fabs(power_of(cylinder->id, is_double) / expected - 1);
+        assert_true(error < (is_double ? 0x1p-50 : 0x1p-23));
+        assert_number(cylinder->base_radius.z, 0);
+        assert_number(cylinder->range.w / length, -1234567.8);
+        assert_number(cylinder->range.x / length, 7654321.1);
+        Bounds bounds;
+        assert_true(primitive_bounds(KIND_CYLINDERS, cylinder, &bounds));
+        assert_true(fabs(bounds.min.z + 1234567.8) < 1 && fabs(bounds.max.z - 7654321.1) < 1);
+        compiled_scene_free(&compiled);
+    }
+}
+
+static void a_plane_goes_through_its_nearest_point(void **state)
+{
+    (void)state;
+    CompiledScene compiled =
+        compile_text("  - plane: {point: [2e7, -1e7, 0], normal: [1, 2, 3]}\n", PRECISION_SINGLE);
+    const Plane *plane = first(&compiled, KIND_PLANES);
+    const double height = -3.5 / 14; // of the plane over the eye, in normals
+    assert_true(fabs(plane->point.x - height) < 1e-7);
+    assert_true(fabs(plane->point.y - 2 * height) < 1e-7);
+    assert_true(fabs(plane->point.z - 3 * height) < 1e-7);
+    compiled_scene_free(&compiled);
+}
+
+// The stored height and normal are those of the triangle before its vertices are rounded, also in double,
+// where the height is a float.
+static void a_triangle_has_the_eyes_height(void **state)
+{
+    (void)state;
+    for (int precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
+        const bool is_double = precision == PRECISION_DOUBLE;
+        const char *text = is_double
+                               ? "  - triangle: {vertices: [[3e16, -15e15, 0], [-45e15, 0, 15e15], "
+                                 "[15e15, 15e15, -15e15]]}\n"
+                               : "  - triangle: {vertices: [[22345677, -11172838.5, 0], "
+                                 "[-33518515.5, 0, 11172838.5], [11172838.5, 11172838.5, -11172838.5]]}\n";
+        CompiledScene compiled = compile_text(text, (Precision)precision);
+        const Triangle *triangle = first(&compiled, KIND_TRIANGLES);
+        assert_true(compiled.features & FEATURE_EYE_POWERS);
+        float height;
+        memcpy(&height, &triangle->id.w, sizeof height);
+        const Vector3 normal = {triangle->a.w, triangle->b.w, triangle->c.w};
+        // the plane through the origin has the normal (1, 2, 3)
+        const double expected = fabs(2 * 1.75 / sqrt(14));
+        const double error = fabs(fabs((double)height) / vector_length(normal) / expected - 1);
+        assert_true(error < (is_double ? 0x1p-51 : 0x1p-23));
+        compiled_scene_free(&compiled);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ordinary_scenes_have_no_powers),
+        cmocka_unit_test(a_cylinder_is_seen_from_its_nearest_point),
+        cmocka_unit_test(a_plane_goes_through_its_nearest_point),
+        cmocka_unit_test(a_triangle_has_the_eyes_height),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
