@@ -291,7 +291,9 @@ static void test_judgement(void **state)
         scene.variants[i].errors.object.away = given[i].leaks;
     }
     scene.variants[4].status = ACCURACY_REFERENCE;
-    accuracy_judge(&scene);
+    const AccuracyBudgets budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3};
+    accuracy_judge(&scene, &budgets);
+    assert_int_equal(scene.recommendation_count, 3);
     const unsigned shading = 1u << ACCURACY_SHADING;
     assert_int_equal(scene.variants[0].disqualified, DISQUALIFIED_OBJECT);
     assert_int_equal(scene.variants[0].pareto, 0);
@@ -309,13 +311,13 @@ static void test_judgement(void **state)
 
     // a reference that is faster than all leaves nothing to pick but itself
     rows[4].times.frame.items[0] = 0.5;
-    accuracy_judge(&scene);
+    accuracy_judge(&scene, &budgets);
     assert_int_equal(scene.recommendations[0].variant, 4);
     assert_int_equal(scene.variants[1].pareto | scene.variants[2].pareto, 0);
 
     // no reference among them, and none exact enough
     scene.variants[4].status = ACCURACY_UNAVAILABLE;
-    accuracy_judge(&scene);
+    accuracy_judge(&scene, &budgets);
     assert_true(scene.recommendations[2].variant == SIZE_MAX);
     for (size_t i = 0; i < VARIANTS; i++)
         bench_times_free(&rows[i].times);

@@ -246,6 +246,15 @@ class Accuracy(TestCase):
         self.assertRegex(table, "double .* the reference")
         self.assertRegex(table, "(?m)^  .* error of at most 1e-06: double, .* ms, the reference")
 
+    def test_budgets(self):
+        """Each of the list, in its order: none is kept by all that err, and the largest by the fastest."""
+        scene = self.json(f"accuracy {SPHERES} {SMALL} --precision fast,single --budget 1e-30,1e30,0.5 --json")["scenes"][0]
+        self.assertEqual([pick["budget"] for pick in scene["picks"]], [1e-30, 1e30, 0.5])
+        self.assertIsNone(scene["picks"][0]["variant"])
+        self.assertEqual(expected_judgement(scene)["picks"], [{"variant": pick["variant"]} for pick in scene["picks"]])
+        for wrong in ["", "0", "-1", "1e-3,", "nan", "1;2", ",".join(["1"] * 17)]:
+            self.refuses(f"accuracy {SPHERES} {SMALL} --budget={wrong}", "--budget")
+
     def test_scene_beyond_single(self):
         write("planet.yaml", PLANET)
         scene = self.json(f"accuracy planet.yaml {SMALL} --precision single --json")["scenes"][0]

@@ -11,15 +11,17 @@
 #include "host/image/image.h"
 #include <errno.h>
 #include <getopt.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
-enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_SAVE, OPTION_JSON, OPTION_HTML };
+enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_BUDGET, OPTION_SAVE, OPTION_JSON, OPTION_HTML };
 
 static const struct option long_options[] = {
     {"reference", required_argument, NULL, OPTION_REFERENCE},
+    {"budget", required_argument, NULL, OPTION_BUDGET},
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"save", required_argument, NULL, OPTION_SAVE},
@@ -36,6 +38,8 @@ static const char help_text[] =
     "Measure speed and error of scenes in every requested configuration.\n\n"
     "      --reference FILE  linear colors to compare with, .exr or .npy (default: the device's own image "
     "at double)\n"
+    "      --budget LIST     errors to allow: report the fastest configuration within each (default: "
+    "1e-2,1e-4,1e-6)\n"
     "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
     "      --save FOLDER     write all compared arrays there, as .npy\n"
     "      --html FILE       self-contained HTML report\n"
@@ -45,6 +49,7 @@ static const char help_text[] =
 typedef struct {
     VariantOptions variants;
     const char *reference_path, *folder, *page_path;
+    AccuracyBudgets budgets;
     bool as_json;
 } AccuracyOptions;
 
@@ -58,6 +63,26 @@ typedef struct {
     MessageList messages;
 } Accuracy;
 
+// Positive numbers, separated by commas.
+static bool budgets_read(const char *value, AccuracyBudgets *budgets)
+{
+    *budgets = (AccuracyBudgets){.count = 0};
+    for (const char *at = value;; at++) {
+        char *end;
+        const double limit = strtod(at, &end);
+        if (end == at || !(limit > 0 && isfinite(limit)) || (*end != ',' && *end != '\0')) break;
+        if (budgets->count == BUDGETS_MAX) {
+            fprintf(stderr, "glint: --budget: at most %d numbers\n", BUDGETS_MAX);
+            return false;
+        }
+        budgets->limits[budgets->count++] = limit;
+        if (*end == '\0') return true;
+        at = end;
+    }
+    fprintf(stderr, "glint: --budget: expected positive numbers, separated by commas, not \"%s\"\n", value);
+    return false;
+}
+
 static bool option_take(AccuracyOptions *options, int option, const char *value)
 {
     bool valid = true;
@@ -66,6 +91,8 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
     case OPTION_REFERENCE:
         options->reference_path = value;
         return true;
+    case OPTION_BUDGET:
+        return budgets_read(value, &options->budgets);
     case OPTION_SAVE:
         options->folder = value;
         return true;
@@ -82,7 +109,8 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
 
 static int options_read(AccuracyOptions *options, int argument_count, char **arguments)
 {
-    *options = (AccuracyOptions){.variants = variant_options_default};
+    *options = (AccuracyOptions){.variants = variant_options_default,
+                                 .budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3}};
     options->variants.precisions = (1u << PRECISION_COUNT) - 1;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
         if (option == 'h') return option_help(help_text);
@@ -215,7 +243,7 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
     for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++)
         status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);
     film_free(&accuracy->reference);
-    if (status == EXIT_DONE) accuracy_judge(scene);
+    if (status == EXIT_DONE) accuracy_judge(scene, &accuracy->options.budgets);
     return status;
 }
 

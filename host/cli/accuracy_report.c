@@ -68,7 +68,7 @@ static double frame_ms(const AccuracyVariant *variant)
 static void pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
 {
     const AccuracyRecommendation *picked = &scene->recommendations[pick];
-    text_appendf(text, "for an error of at most %g: ", accuracy_budgets[pick]);
+    text_appendf(text, "for an error of at most %g: ", picked->budget);
     if (picked->variant == SIZE_MAX) {
         text_appendf(text, "none of these");
         return;
@@ -189,7 +189,7 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
         for (size_t k = 0; k < scene->variant_count; k++)
             variant_print(&scene->variants[k], stream);
         kernels_print(scene, stream);
-        for (size_t k = 0; k < BUDGET_COUNT; k++) {
+        for (size_t k = 0; k < scene->recommendation_count; k++) {
             Text sentence = {0};
             pick_sentence(&sentence, scene, k);
             fprintf(stream, "  %s\n", text_c(&sentence));
@@ -395,7 +395,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
 {
     const AccuracyRecommendation *pick = &scene->recommendations[index];
     json_begin_object(json, NULL);
-    json_number(json, "budget", accuracy_budgets[index]);
+    json_number(json, "budget", pick->budget);
     json_text(json, "measure", accuracy_kind_names[pick->measure]);
     if (pick->variant == SIZE_MAX) {
         json_null(json, "variant");
@@ -431,7 +431,7 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
         variant_json(json, report, index, &scene->variants[i]);
     json_end(json);
     json_begin_array(json, "picks");
-    for (size_t i = 0; i < BUDGET_COUNT; i++)
+    for (size_t i = 0; i < scene->recommendation_count; i++)
         pick_json(json, scene, i);
     json_end(json);
     json_end(json);

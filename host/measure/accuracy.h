@@ -109,13 +109,17 @@ typedef struct {
 } AccuracyVariant;
 
 // An error that a user allows, and the fastest that keeps within it.
-enum { BUDGET_COUNT = 3 };
-extern const double accuracy_budgets[BUDGET_COUNT];
-
 typedef struct {
+    double budget;
     AccuracyKind measure; // shading, or image where there are colors only
     size_t variant;       // SIZE_MAX: none
 } AccuracyRecommendation;
+
+enum { BUDGETS_MAX = 16 };
+typedef struct {
+    double limits[BUDGETS_MAX];
+    size_t count;
+} AccuracyBudgets;
 
 typedef struct {
     const char *path;
@@ -132,7 +136,8 @@ typedef struct {
     AccuracyEdges edges;
     AccuracyVariant *variants;
     size_t variant_count;
-    AccuracyRecommendation recommendations[BUDGET_COUNT];
+    AccuracyRecommendation recommendations[BUDGETS_MAX];
+    size_t recommendation_count;
 } AccuracyScene;
 
 void accuracy_scene_free(AccuracyScene *scene); // with its images; and zeroes
@@ -141,5 +146,5 @@ void accuracy_scene_free(AccuracyScene *scene); // with its images; and zeroes
 Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);
 // From its errors, what disqualifies a variant.
 unsigned accuracy_faults(const AccuracyErrors *errors);
-// From errors and times: sets each variant's disqualified and pareto, and the recommendations.
-void accuracy_judge(AccuracyScene *scene);
+// From errors and times: sets each variant's disqualified and pareto, and a recommendation for each budget.
+void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets);

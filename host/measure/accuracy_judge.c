@@ -7,8 +7,6 @@ const char *const accuracy_kind_names[ACCURACY_KIND_COUNT] = {"object", "shadow"
 
 const char *const accuracy_status_names[ACCURACY_STATUS_COUNT] = {"measured", "reference", "unavailable"};
 
-const double accuracy_budgets[BUDGET_COUNT] = {1e-2, 1e-4, 1e-6};
-
 void accuracy_scene_free(AccuracyScene *scene)
 {
     for (size_t i = 0; i < scene->variant_count; i++)
@@ -98,7 +96,7 @@ static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant 
 static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, double budget,
                                                   AccuracyKind measure)
 {
-    AccuracyRecommendation pick = {measure, SIZE_MAX};
+    AccuracyRecommendation pick = {budget, measure, SIZE_MAX};
     for (size_t i = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *variant = &scene->variants[i];
         if (!competes(variant)) continue;
@@ -112,7 +110,7 @@ static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, do
     return pick;
 }
 
-void accuracy_judge(AccuracyScene *scene)
+void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets)
 {
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];
@@ -125,6 +123,7 @@ void accuracy_judge(AccuracyScene *scene)
             if (is_pareto_optimal(scene, variant, (AccuracyKind)kind)) variant->pareto |= 1u << kind;
     }
     AccuracyKind measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
-    for (size_t i = 0; i < BUDGET_COUNT; i++)
-        scene->recommendations[i] = recommendation_find(scene, accuracy_budgets[i], measure);
+    scene->recommendation_count = budgets->count;
+    for (size_t i = 0; i < budgets->count; i++)
+        scene->recommendations[i] = recommendation_find(scene, budgets->limits[i], measure);
 }

@@ -12,7 +12,7 @@ _glint_options() {
     diff) echo "--heatmap --max-pixels --json -h --help" ;;
     bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --against --worker" \
         "--tolerance --samples --bounces --device --lenient --max-pixels -h --help" ;;
-    accuracy) echo "--reference --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
+    accuracy) echo "--reference --budget --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
         "--perturb --device --lenient --max-pixels -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --lean --json -h --help" ;;
     cache) echo "--clear -h --help" ;;

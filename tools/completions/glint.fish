@@ -55,6 +55,7 @@ complete -c glint -n '__fish_seen_subcommand_from bench' -l tolerance -x -d 'Rat
 complete -c glint -n '__fish_seen_subcommand_from bench' -l against -r -F -d 'Compare with another build'
 complete -c glint -n '__fish_seen_subcommand_from bench' -l worker -d 'Answer the option --against of another glint'
 complete -c glint -n '__fish_seen_subcommand_from accuracy' -l reference -r -F -d 'Linear colors to compare with'
+complete -c glint -n '__fish_seen_subcommand_from accuracy' -l budget -x -d 'Errors to allow, separated by commas'
 complete -c glint -n '__fish_seen_subcommand_from bench accuracy' -l samples -x -d 'Numbers of samples, separated by commas'
 complete -c glint -n '__fish_seen_subcommand_from accuracy' -l save -r -F -d 'Folder for all that is compared'
 complete -c glint -n '__fish_seen_subcommand_from accuracy' -l html -r -F -d 'Self-contained HTML report'

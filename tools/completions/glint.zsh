@@ -128,6 +128,7 @@ _glint_bench() {
 
 _glint_accuracy() {
     _arguments \
+        '--budget[errors to allow]:list:' \
         '--reference[linear colors to compare with]:image:_files -g "*.(exr|npy)"' \
         '--precision[arithmetic]:list:_sequence compadd - fast single strict double' \
         '--lanes[rays per work-item]:list:_sequence compadd - 1 4 8 16' \

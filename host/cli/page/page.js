@@ -16,7 +16,10 @@ function drawDevice({ device, glint, perturb }) {
   return Object.entries(entries).flatMap(([term, words]) => [html("dt", {}, term), html("dd", {}, words)]);
 }
 
-const budgetText = (budget) => powerOfTen(Math.round(Math.log10(budget)));
+function budgetText(budget) {
+  const exponent = Math.round(Math.log10(budget));
+  return Math.abs(budget / 10 ** exponent - 1) < 1e-9 ? powerOfTen(exponent) : formatNumber(budget);
+}
 
 function drawOverview() {
   const row = (scene, index) => html("tr", {},
