@@ -1,4 +1,5 @@
 // The camera's movements, its YAML, and the pace of coarse frames: without a window or a device.
+#include "host/view/camera_file.h"
 #include "host/view/camera_moves.h"
 #include "host/view/camera_yaml.h"
 #include "host/view/preview.h"
@@ -148,6 +149,43 @@ static void yaml_gives_the_same_camera(void **state)
     text_free(&text);
 }
 
+#define REST "objects: [] # none\n"
+
+// NULL: refused, with one message.
+static void check_replaced(const char *text, const char *expected)
+{
+    const Camera camera = {.position = {1, 2.5, 3}, .look_at = {0, 0, 1e-3}, .up = {0, 0, 1}};
+    const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
+    Text replaced;
+    MessageList messages = {0};
+    assert_int_equal(camera_replace(&replaced, &source, &camera, &messages), expected != NULL);
+    assert_int_equal(messages.count, expected == NULL);
+    message_list_free(&messages);
+    if (!expected) return;
+    assert_string_equal(text_c(&replaced), expected);
+    text_free(&replaced);
+}
+
+static void camera_is_written_into_the_file(void **state)
+{
+    (void)state;
+    check_replaced(
+        "# a scene\ncamera: {position: [9, 9, 9], fov: 30, look_at: [0,0,0] , up: [0, 1, 0]} # eye\n" REST,
+        "# a scene\ncamera: {position: [1, 2.5, 3], fov: 30, look_at: [0, 0, 0.001] , "
+        "up: [0, 0, 1]} # eye\n" REST);
+    check_replaced(
+        "camera:\n  position: # the eye\n    - 1\n    - 9 # high\n    - 3\n\n  # below\n  look_at: [0, 0, 1]"
+        " # there\n" REST,
+        "camera:\n  up: [0, 0, 1]\n  position: # the eye\n    [1, 2.5, 3]\n\n  # below\n  look_at: "
+        "[0, 0, 0.001] # there\n" REST);
+    check_replaced("camera: {look_at: [0, 0, 0.001], position: [1, 2.50, 3.0]}\n" REST,
+                   "camera: {up: [0, 0, 1], look_at: [0, 0, 0.001], position: [1, 2.50, 3.0]}\n" REST);
+    check_replaced("{objects: [&a [9, 9, 9]], camera: {position: *a, look_at: [0, 0, 0]}}\n", NULL);
+    check_replaced("{a: [1], objects: []}\n", NULL);
+    check_replaced("camera: {position: [1, 2, 3]}\n", NULL);
+    check_replaced("camera: {position: [1, 2, 3]\n", NULL);
+}
+
 // A scene that takes this long to move and per pixel: every frame after the first few is in time, the
 // resolution settles, and is the best there is.
 static void check_pace(double move_seconds, double seconds_of_pixel, uint32_t expected)
@@ -185,6 +223,7 @@ int main(void)
         cmocka_unit_test(useless_up_is_replaced),
         cmocka_unit_test(camera_turns_and_flies),
         cmocka_unit_test(yaml_gives_the_same_camera),
+        cmocka_unit_test(camera_is_written_into_the_file),
         cmocka_unit_test(coarse_frames_are_in_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

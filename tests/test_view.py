@@ -35,6 +35,21 @@ f 1 2 3
 f 1 3 4
 f 4 2 1
 """
+# Launches fail as long as there is a file of this name.
+FAILING_LAUNCHES = """\
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stddef.h>
+#include <unistd.h>
+int clEnqueueNDRangeKernel(void *queue, void *kernel, unsigned dimensions, const size_t *offset, const size_t *items,
+                           const size_t *group, unsigned count, const void *events, void *event)
+{
+    int (*launch)(void *, void *, unsigned, const size_t *, const size_t *, const size_t *, unsigned, const void *,
+                  void *) = dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel");
+    if (access("fails", F_OK) == 0) return -5;
+    return launch(queue, kernel, dimensions, offset, items, group, count, events, event);
+}
+"""
 WIDTH, HEIGHT = 160, 120
 SAMPLES = 3
 DEADLINE = 60  # seconds until a test gives up what it waits for
@@ -93,13 +108,14 @@ def png_rows(path):
 class Window:
     """A running glint view; its lines of output are read as they come."""
 
-    def __init__(self, test, scene="scene.yaml", options=""):
+    def __init__(self, test, scene="scene.yaml", options="", preload=""):
         self.test, self.lines = test, queue.Queue()
         command = [PROGRAM, "view", scene, "--size", f"{WIDTH}x{HEIGHT}", "--samples", str(SAMPLES), *options.split()]
         # the libraries that SDL loads and unloads leak
-        sanitizer = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0"
+        sanitizer = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0:verify_asan_link_order=0"
         environment = os.environ | {
-            "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", "ASAN_OPTIONS": sanitizer}
+            "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", "ASAN_OPTIONS": sanitizer,
+            "LD_PRELOAD": preload}
         self.process = subprocess.Popen(
             command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.reader = threading.Thread(target=self.read, daemon=True)
@@ -310,6 +326,47 @@ class View(TestCase):
         window.line("^scene.yaml:5:.*other.obj: No such file")
         write("other.obj", MESH.replace("1 1 0", "1.5 1 0"))
         window.shows_at_last(self.image_of(text))
+        window.close()
+
+    def test_written_camera(self):
+        """It is the file's, whose other bytes stay; the file is not read again for it."""
+        comment = "# kept\n"
+        write("scene.yaml", comment + SCENE)
+        window = Window(self, options="--write-camera")
+        window.saved()
+        window.key("Left")
+        camera = window.camera()
+        window.line("^camera written to scene.yaml")
+        text = Path("scene.yaml").read_text()
+        self.assertEqual(text.replace(text.splitlines()[1], SCENE.splitlines()[0]), comment + SCENE)
+        self.assertEqual(numbers(text, "position"), numbers(camera, "position"))
+        window.key("Left", "Left")
+        moved = window.camera()
+        self.assertNotEqual(moved, camera)
+        window.line("^camera written")
+        window.key("Right", "r")  # to what was written last
+        self.assertEqual(window.camera(), moved)
+        window.line("^camera written")
+        write("scene.yaml", SCENE)  # what others write is read
+        window.key("x")
+        window.shows_at_last(self.image_of(SCENE))
+        window.close()
+        write("scene.cfg", "")
+        self.refuses("view scene.cfg --write-camera", "not in YAML")
+
+    def test_failing_device(self):
+        """Its message is shown, and the window stays; the next movement tries again."""
+        write("launch.c", FAILING_LAUNCHES)
+        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-fPIC", "launch.c", "-o", "launch.so", "-ldl"], check=True)
+        window = Window(self, preload=f"{os.getcwd()}/launch.so")
+        window.saved()
+        write("fails", "")
+        for key in "Left", "Up":
+            window.key(key)
+            window.line("^clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
+        os.remove("fails")
+        window.key("Right")
+        window.check()
         window.close()
 
     def test_slow_scene(self):

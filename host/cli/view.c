@@ -9,8 +9,9 @@
 #include <getopt.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
-enum { OPTION_SIZE = OPTION_OWN, OPTION_SAMPLES, OPTION_BOUNCES };
+enum { OPTION_SIZE = OPTION_OWN, OPTION_SAMPLES, OPTION_BOUNCES, OPTION_WRITE_CAMERA };
 
 enum { SAMPLES_DEFAULT = 16 };
 
@@ -18,6 +19,7 @@ static const struct option long_options[] = {
     {"size", required_argument, NULL, OPTION_SIZE},
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"write-camera", no_argument, NULL, OPTION_WRITE_CAMERA},
     COMMON_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
@@ -26,14 +28,16 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint view SCENE [OPTIONS]\n\n"
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
-    "      --samples N       per pixel, once the camera rests (default: 16)\n" //
-    HELP_BOUNCES HELP_DEVICE HELP_COMMON HELP_HELP;
+    "      --samples N       per pixel, once the camera rests (default: 16)\n"                      //
+    HELP_BOUNCES "      --write-camera    C writes the camera into the scene file, which is YAML\n" //
+    HELP_DEVICE HELP_COMMON HELP_HELP;
 
 typedef struct {
     CommonOptions common;
     const char *scene;
     uint32_t width, height; // 0: not given
     uint32_t sample_count, bounce_count;
+    bool writes_camera;
 } ViewOptions;
 
 static bool option_take(ViewOptions *options, int option, const char *value)
@@ -47,6 +51,8 @@ static bool option_take(ViewOptions *options, int option, const char *value)
         return option_count("samples", value, 1, SAMPLES_MAX, &options->sample_count);
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
+    case OPTION_WRITE_CAMERA:
+        return options->writes_camera = true;
     default:
         return false;
     }
@@ -75,6 +81,12 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
     }
     if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
+    const char *ending = strrchr(options->scene, '.');
+    if (options->writes_camera &&
+        !(ending && (!strcasecmp(ending, ".yaml") || !strcasecmp(ending, ".yml")))) {
+        fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", options->scene);
+        return EXIT_USER;
+    }
     return OPTIONS_READ;
 }
 
@@ -105,6 +117,7 @@ static int scene_view(ViewOptions *options, const Device *device)
                    .save = image_save,
                    .save_context = options},
         .size = {options->width, options->height},
+        .writes_camera = options->writes_camera,
         .stop = progress_interrupted,
     };
     window.frames.settings.sample_count = options->sample_count;

@@ -13,15 +13,22 @@ static void number_write(Text *text, double value)
     text_appendf(text, "%s", word);
 }
 
-static void vector_write(Text *text, const char *name, Vector3 v)
+void vector_write_yaml(Text *text, Vector3 v)
 {
-    text_appendf(text, "%s: [", name);
+    text_appendf(text, "[");
     number_write(text, v.x);
     text_appendf(text, ", ");
     number_write(text, v.y);
     text_appendf(text, ", ");
     number_write(text, v.z);
-    text_appendf(text, "], ");
+    text_appendf(text, "]");
+}
+
+static void vector_write(Text *text, const char *name, Vector3 v)
+{
+    text_appendf(text, "%s: ", name);
+    vector_write_yaml(text, v);
+    text_appendf(text, ", ");
 }
 
 // As the reader has it.

@@ -4,6 +4,9 @@
 #include "host/base/text.h"
 #include "host/scene/scene.h"
 
+// A list of three numbers, of the fewest digits that read back as the same.
+void vector_write_yaml(Text *text, Vector3 v);
+
 // One line, `camera: {…}`, from which the reader gets the same camera bit for bit; but for an angle of view
 // that no number of degrees gives, which other formats may have: the nearest. `aspect`: width over height of
 // the image.

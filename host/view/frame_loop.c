@@ -4,6 +4,8 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
+#include "host/base/output.h"
+#include "host/view/camera_file.h"
 #include "host/view/preview.h"
 #include "host/view/watch.h"
 #include <pthread.h>
@@ -29,6 +31,7 @@ struct FrameLoop {
     bool has_ready;
     Camera file_camera;
     bool has_camera;
+    Text written; // into the scene's file, and not yet noticed
 
     // the thread's own
     Scene scene;      // with the request's camera
@@ -405,6 +408,23 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     return true;
 }
 
+// Whether the scene's file is what was written into it here.
+static bool is_own_write(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    Text written = loop->written;
+    loop->written = (Text){0};
+    pthread_mutex_unlock(&loop->mutex);
+    Text text = {0};
+    MessageList messages = {0};
+    bool same = written.count > 0 && text_read_file(&text, loop->options.scene_path, &messages) &&
+                text.count == written.count && memcmp(text.items, written.items, text.count) == 0;
+    message_list_free(&messages);
+    text_free(&text);
+    text_free(&written);
+    return same;
+}
+
 // Reads the scene, for the first time or anew. False, with a message published, where it has a mistake: the
 // last one stays.
 static bool scene_reload(FrameLoop *loop)
@@ -471,7 +491,7 @@ static void *loop_run(void *context)
     for (Work work;
          (work = work_wait(loop, is_complete && loop->current.view == VIEW_COLOR, &save_path)) != WORK_END;) {
         if (work == WORK_SAVE) image_save(loop, save_path);
-        if (work == WORK_RELOAD) is_complete = !scene_reload(loop) && is_complete;
+        if (work == WORK_RELOAD && !is_own_write(loop)) is_complete = !scene_reload(loop) && is_complete;
         if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete && loop->current_number > 0))
             is_complete = request_render(loop);
     }
@@ -514,6 +534,7 @@ void frame_loop_close(FrameLoop *loop)
     frame_free(&loop->ready);
     free(loop->save_path);
     free(loop->message);
+    text_free(&loop->written);
     free(loop);
 }
 
@@ -544,6 +565,33 @@ void frame_loop_save(FrameLoop *loop, const char *path)
     loop->save_path = memory_copy_text(path);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
+}
+
+bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages)
+{
+    const char *path = loop->options.scene_path;
+    Text old = {0}, text = {0};
+    if (!text_read_file(&old, path, messages)) return false;
+    const Source source = {.file = path, .bytes = text_c(&old), .length = old.count};
+    OutputFile output;
+    bool done = camera_replace(&text, &source, camera, messages);
+    text_free(&old);
+    if (!done || !output_open(&output, path, messages)) {
+        text_free(&text);
+        return false;
+    }
+    done = output_write(&output, text.items, text.count, messages) && output_finish(&output, messages);
+    pthread_mutex_lock(&loop->mutex);
+    if (done) {
+        text_free(&loop->written);
+        loop->written = text;
+        loop->file_camera = *camera;
+    }
+    pthread_mutex_unlock(&loop->mutex);
+    if (done) return output_commit(&output, messages);
+    text_free(&text);
+    output_abandon(&output);
+    return false;
 }
 
 bool frame_loop_take(FrameLoop *loop, Frame *frame)

@@ -64,6 +64,10 @@ unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
 // Asks for the image of the last request to be saved when it is complete: its color.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
+// Writes the camera into the scene's file, which then is not read again for that. False with messages if it
+// cannot.
+bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages);
+
 // Exchanges `frame` for the newest one. False: there is none that was not taken before.
 bool frame_loop_take(FrameLoop *loop, Frame *frame);
 // Whether the scene's file has another camera than at the last call, or was read for the first time.

@@ -13,7 +13,7 @@
     KEY("1 2 3 4", "precision fast, single, strict, double")                                                 \
     KEY("T", "show or hide times, device and samples")                                                       \
     KEY("R", "reset the camera")                                                                             \
-    KEY("C", "print the camera as YAML")                                                                     \
+    KEY("C", "print the camera as YAML; --write-camera: into the scene, too")                                \
     KEY("S", "save the image, once complete, as PNG; Shift S: EXR")                                          \
     KEY("F", "full screen")                                                                                  \
     KEY("H", "show or hide this list")                                                                       \

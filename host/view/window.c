@@ -197,6 +197,25 @@ static void arrow_turn(Window *window, double yaw, double pitch)
     window->camera_changed = true;
 }
 
+static void camera_write(Window *window)
+{
+    if (!window->is_loaded) return;
+    MessageList messages = {0};
+    char *text = NULL;
+    size_t size;
+    FILE *stream = open_memstream(&text, &size);
+    if (!stream) return;
+    if (frame_loop_write_camera(window->frames, &window->camera, &messages)) {
+        window->file_camera = window->camera;
+        fprintf(stream, "camera written to %s\n", window->options->frames.scene_path);
+    }
+    message_list_print(&messages, stream);
+    message_list_free(&messages);
+    fclose(stream);
+    fputs(text, stderr);
+    message_show(window, text);
+}
+
 static void camera_print(Window *window)
 {
     Text yaml = {0};
@@ -204,6 +223,7 @@ static void camera_print(Window *window)
     fputs(text_c(&yaml), stdout);
     fflush(stdout);
     message_show(window, yaml.items);
+    if (window->options->writes_camera) camera_write(window);
 }
 
 static void request_send(Window *window)

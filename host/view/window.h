@@ -6,6 +6,7 @@
 typedef struct {
     FrameLoopOptions frames; // but for notify
     ImageSize size;          // of the window, reduced to fit the display; 0: the scene's own
+    bool writes_camera;      // into the scene's file, not only to standard output
     bool (*stop)(void);      // true ends it: an interrupt
 } WindowOptions;
 

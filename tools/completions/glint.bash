@@ -5,7 +5,7 @@ _glint_options() {
     render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
         "--timing --transfer --bits --no-cache --lenient --max-pixels --perturb --checkpoint" \
         "--quiet -h --help" ;;
-    view) echo "--size --samples --bounces --device --precision --lanes --bvh --no-cache --lenient --max-pixels -h --help" ;;
+    view) echo "--size --samples --bounces --write-camera --device --precision --lanes --bvh --no-cache --lenient --max-pixels -h --help" ;;
     trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --max-pixels --perturb -h --help" ;;
     check) echo "--json --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;

@@ -37,6 +37,7 @@ complete -c glint -n '__fish_seen_subcommand_from trace' -l rays -r -F -d 'File 
 complete -c glint -n '__fish_seen_subcommand_from render view bench accuracy' -l size -x -d 'Width and height, as WxH'
 complete -c glint -n '__fish_seen_subcommand_from render view' -l samples -x -d 'Rays for each pixel'
 complete -c glint -n '__fish_seen_subcommand_from render' -l region -x -d 'Pixels to render, as X,Y,W,H'
+complete -c glint -n '__fish_seen_subcommand_from view' -l write-camera -d 'C writes the camera into the scene file'
 complete -c glint -n '__fish_seen_subcommand_from render view bench accuracy' -l bounces -x -d 'Reflections and refractions at most'
 complete -c glint -n '__fish_seen_subcommand_from render' -l aov -x -a '(__glint_aovs)' -d 'More files beside the image'
 complete -c glint -n '__fish_seen_subcommand_from render' -l timing -d 'Report the time of every stage'

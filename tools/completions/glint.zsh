@@ -34,6 +34,7 @@ _glint_view() {
     _arguments \
         '--size[width and height in pixels]:WxH:' \
         '--samples[rays for each pixel at rest]:number:' \
+        '--write-camera[C writes the camera into the scene file]' \
         '--device[device to render on]:device:(cpu gpu)' \
         '--precision[arithmetic]:precision:(fast single strict double)' \
         '--lanes[rays per work-item]:lanes:(1 4 8 16)' \

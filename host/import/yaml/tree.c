@@ -23,7 +23,8 @@ typedef struct {
     Report *report;
     OpenNode open[DEPTH_MAX];
     size_t depth;
-    size_t end; // of the last event: the position of an empty value
+    size_t end;       // of the last event: the position of an empty value
+    size_t value_end; // of the last value: a block of them ends there, before comments
     struct {
         Anchor *items;
         size_t count, capacity;
@@ -89,6 +90,14 @@ static bool collection_open(TreeBuilder *builder, YamlNode node)
     return true;
 }
 
+static void collection_close(TreeBuilder *builder)
+{
+    YamlNode *node = &builder->tree->nodes.items[builder->open[--builder->depth].node];
+    const char first = builder->report->source->bytes[node->offset];
+    if (first == '[' || first == '{') builder->value_end = builder->end;
+    node->end = builder->value_end;
+}
+
 // Later anchors of a name hide earlier ones (YAML 1.2.2, section 7.1).
 static const Anchor *anchor_find(const TreeBuilder *builder, const char *name, size_t length)
 {
@@ -138,6 +147,7 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
     const struct fy_mark *start = fy_event_start_mark(event), *end = fy_event_end_mark(event);
     YamlNode node = {.offset = start ? start->input_pos : builder->end};
     if (end) builder->end = end->input_pos;
+    node.end = builder->end;
     bool is_node =
         event->type == FYET_SCALAR || event->type == FYET_SEQUENCE_START || event->type == FYET_MAPPING_START;
     if (is_node && fy_event_get_tag_token(event)) {
@@ -156,8 +166,10 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
         }
         return true;
     case FYET_SCALAR:
+        builder->value_end = node.end;
         return scalar_append(builder, event->scalar.value, node);
     case FYET_ALIAS: {
+        builder->value_end = node.end;
         size_t length;
         const char *name = fy_token_get_text(event->alias.anchor, &length);
         return alias_append(builder, name, length, node.offset - strlen("*"));
@@ -170,7 +182,7 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
         return collection_open(builder, node);
     case FYET_SEQUENCE_END:
     case FYET_MAPPING_END:
-        builder->depth--;
+        collection_close(builder);
         return true;
     default:
         return true;

@@ -10,7 +10,7 @@ typedef enum { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING } YamlKind;
 
 typedef struct {
     YamlKind kind;
-    size_t offset;        // of the first byte, in the source
+    size_t offset, end;   // of the first byte, in the source, and behind the last
     size_t text;          // scalar: start of its text in the tree's texts
     uint32_t first, next; // first child, next sibling; 0: none
     uint32_t child_count; // mapping: keys and values

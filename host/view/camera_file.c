@@ -1,0 +1,123 @@
+#include "host/view/camera_file.h"
+
+#include "host/import/yaml/yaml.h"
+#include "host/view/camera_yaml.h"
+#include <string.h>
+
+typedef struct {
+    YamlReader reader;
+    Scene scene; // its camera alone
+    const YamlNode *camera;
+} CameraFile;
+
+static void camera_file_free(CameraFile *file)
+{
+    yaml_tree_free(&file->reader.tree);
+    scene_free(&file->scene);
+}
+
+static bool camera_file_read(CameraFile *file, const Source *source, MessageList *messages)
+{
+    *file = (CameraFile){.reader.report = report_open(source, messages)};
+    YamlReader *reader = &file->reader;
+    reader->scene = &file->scene;
+    if (yaml_tree_read(&reader->tree, &reader->report)) {
+        const YamlNode *root = reader->tree.nodes.items;
+        file->camera = root->kind == YAML_MAPPING ? field_node(reader, root, "camera") : root;
+        if (file->camera == root)
+            report_error(&reader->report, root->offset, "the scene has no camera");
+        else
+            yaml_read_camera(reader, file->camera);
+    }
+    if (report_close(&reader->report)) return true;
+    camera_file_free(file);
+    return false;
+}
+
+// A copy of the source with some values replaced; `next`: of the source, up to there it is copied.
+typedef struct {
+    const Source *source;
+    size_t next;
+    Text *text;
+} Copy;
+
+static void copy_until(Copy *copy, size_t offset)
+{
+    text_append(copy->text, copy->source->bytes + copy->next, offset - copy->next);
+    copy->next = offset;
+}
+
+// Spaces in front of a place where a key starts; other bytes, such as those of `camera: {`, count as spaces.
+static size_t indentation(const Source *source, size_t offset)
+{
+    size_t start = offset;
+    while (start > 0 && source->bytes[start - 1] != '\n')
+        start--;
+    return offset - start;
+}
+
+static void up_insert(Copy *copy, const CameraFile *file, const YamlNode *key, Vector3 up)
+{
+    copy_until(copy, key->offset);
+    text_appendf(copy->text, "up: ");
+    vector_write_yaml(copy->text, up);
+    if (copy->source->bytes[file->camera->offset] == '{')
+        text_appendf(copy->text, ", ");
+    else
+        text_appendf(copy->text, "\n%*s", (int)indentation(copy->source, key->offset), "");
+}
+
+// Whether the value of a key has changed and must be written.
+static bool vector_changed(const char *key, const Camera *old, const Camera *camera, Vector3 *value)
+{
+    const struct {
+        const char *name;
+        Vector3 old, new;
+    } members[] = {{"position", old->position, camera->position},
+                   {"look_at", old->look_at, camera->look_at},
+                   {"up", old->up, camera->up}};
+    for (size_t i = 0; i < sizeof members / sizeof *members; i++)
+        if (strcmp(key, members[i].name) == 0) {
+            *value = members[i].new;
+            return !vectors_equal(members[i].old, members[i].new);
+        }
+    return false;
+}
+
+static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera)
+{
+    YamlReader *reader = &file->reader;
+    const Camera *old = &file->scene.camera;
+    const bool has_up = field_node(reader, file->camera, "up") != file->camera;
+    bool lacks_up = !has_up && !vectors_equal(old->up, camera->up);
+    for (const YamlNode *key = yaml_first(&reader->tree, file->camera), *value; key;
+         key = yaml_next(&reader->tree, value)) {
+        value = yaml_next(&reader->tree, key);
+        if (key->offset < copy->next || value->offset < key->offset) {
+            report_error(&reader->report, key->offset, "the camera cannot be written: it has an alias");
+            return false;
+        }
+        if (lacks_up) up_insert(copy, file, key, camera->up);
+        lacks_up = false;
+        Vector3 changed;
+        if (!vector_changed(yaml_text(&reader->tree, key), old, camera, &changed)) continue;
+        copy_until(copy, value->offset);
+        vector_write_yaml(copy->text, changed);
+        copy->next = value->end;
+    }
+    copy_until(copy, copy->source->length);
+    return true;
+}
+
+bool camera_replace(Text *text, const Source *source, const Camera *camera, MessageList *messages)
+{
+    *text = (Text){0};
+    CameraFile file;
+    if (!camera_file_read(&file, source, messages)) return false;
+    Copy copy = {.source = source, .text = text};
+    bool replaced = values_replace(&copy, &file, camera);
+    report_close(&file.reader.report);
+    camera_file_free(&file);
+    if (!replaced) text_free(text);
+    return replaced;
+}
