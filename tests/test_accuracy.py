@@ -233,6 +233,19 @@ class Accuracy(TestCase):
         self.assertEqual(single["image"], self.report["scenes"][0]["variants"][0]["errors"]["image"])
         self.assertEqual((double["image"]["rmse"], double["image"]["psnr"]), (0, None))
 
+    def test_larger_reference(self):
+        """Three times as wide and high: its squares' means are compared."""
+        small = np.load(f"{self.reference}.color.npy")
+        random = np.random.default_rng(5)
+        parts = random.uniform(-1, 1, (64, 3, 96, 3, 3))
+        parts -= parts.mean(axis=(1, 3), keepdims=True)
+        np.save("large.npy", (small[:, None, :, None] + parts).reshape(192, 288, 3))
+        scene = self.json(f"accuracy {GLASS} {SMALL} --precision single,double --json --reference large.npy")["scenes"][0]
+        single, double = (variant["errors"]["image"] for variant in scene["variants"])
+        expected = self.report["scenes"][0]["variants"][0]["errors"]["image"]
+        self.assertTrue(math.isclose(single["rmse"], expected["rmse"], rel_tol=1e-9))
+        self.assertLess(double["rmse"], 1e-14)
+
     def test_samples(self):
         """Fewer samples are an error like any other."""
         scene = self.json(f"accuracy {SPHERES} {SMALL} --precision double --samples 1,8 --json")["scenes"][0]
@@ -283,6 +296,7 @@ class Accuracy(TestCase):
             (f"{GLASS} --samples 1,0", "--samples"),
             (f"{GLASS} --reference none.npy", "none.npy"),
             (f"{GLASS} --size 64x48 --reference {self.reference}.color.npy", "96x64"),
+            (f"{GLASS} --size 96x32 --reference {self.reference}.color.npy", "no multiple"),
             (f"{GLASS} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
             (f"{GLASS} --reference {ROOT}/docs/demo.png", r"demo\.png"),
             (f"{GLASS} {SPHERES} --reference {self.reference}.color.npy", "one scene"),

@@ -36,8 +36,9 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint accuracy SCENE... [OPTIONS]\n\n"
     "Measure speed and error of scenes in every requested configuration.\n\n"
-    "      --reference FILE  linear colors to compare with, .exr or .npy (default: the device's own image "
-    "at double)\n"
+    "      --reference FILE  linear colors to compare with, .exr or .npy, of the images' size or a multiple, "
+    "then averaged\n"
+    "                        (default: the device's own image at double)\n"
     "      --budget LIST     errors to allow: report the fastest configuration within each (default: "
     "1e-2,1e-4,1e-6)\n"
     "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
@@ -124,7 +125,24 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
     return OPTIONS_READ;
 }
 
-// Reads --reference. On failure adds a message and returns false.
+// The image's colors, with each square of factor x factor pixels averaged into one.
+static double *colors_shrunk(const Image *image, uint32_t factor)
+{
+    const size_t width = image->width / factor, height = image->height / factor;
+    double *colors = memory_allocate_zeroed(width * height, 3 * sizeof *colors);
+    for (size_t y = 0; y < height * factor; y++)
+        for (size_t x = 0; x < width * factor; x++)
+            for (size_t channel = 0; channel < 3; channel++)
+                colors[3 * (y / factor * width + x / factor) + channel] +=
+                    image_value(image, 3 * (y * image->width + x) + channel);
+    const double share = 1 / ((double)factor * factor);
+    for (size_t i = 0; i < 3 * width * height; i++)
+        colors[i] *= share;
+    return colors;
+}
+
+// Reads --reference, which may be a whole number of times as wide and as high as the images. On failure adds
+// a message and returns false.
 static bool reference_read(Accuracy *accuracy)
 {
     const char *path = accuracy->options.reference_path;
@@ -135,20 +153,19 @@ static bool reference_read(Accuracy *accuracy)
                         : image.data || image.channels != 3 ? "no colors"
                                                             : NULL;
     if (fault) message_add(&accuracy->messages, MESSAGE_ERROR, "the reference '%s' holds %s", path, fault);
-    bool fits = image.width == settings->width && image.height == settings->height;
+    const uint32_t factor = image.width / settings->width;
+    const bool fits = factor > 0 && image.width % settings->width == 0 &&
+                      image.height / factor == settings->height && image.height % factor == 0;
     if (!fault && !fits)
         message_add(&accuracy->messages, MESSAGE_ERROR,
-                    "the reference '%s' has %ux%u pixels, the images have %ux%u", path, image.width,
-                    image.height, settings->width, settings->height);
-    size_t value_count = (size_t)image.width * image.height * image.channels;
-    double *colors = memory_allocate(value_count, sizeof *colors);
-    for (size_t i = 0; i < value_count; i++)
-        colors[i] = image_value(&image, i);
-    accuracy->reference = (Film){.width = image.width,
-                                 .height = image.height,
-                                 .is_double = true,
-                                 .real_size = sizeof *colors,
-                                 .color = colors};
+                    "the reference '%s' has %ux%u pixels, which is no multiple of the images' %ux%u", path,
+                    image.width, image.height, settings->width, settings->height);
+    if (!fault && fits)
+        accuracy->reference = (Film){.width = settings->width,
+                                     .height = settings->height,
+                                     .is_double = true,
+                                     .real_size = sizeof(double),
+                                     .color = colors_shrunk(&image, factor)};
     image_free(&image);
     return !fault && fits;
 }
