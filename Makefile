@@ -42,7 +42,7 @@ version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_C
 kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h)),$(or \
            $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
 sources := $(filter-out $(if $(has_window),,host/view/window.c host/view/caption.c), \
-           $(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c)))
+           $(filter-out host/mpi/%,$(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))))
 pages   := $(sort $(wildcard host/cli/page/*))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
@@ -57,6 +57,16 @@ all: $(BUILD)/glint
 
 $(BUILD)/glint: $(objects)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+
+# glint render on the devices of an MPI job; needs libopenmpi-dev.
+mpi_flags := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags ompi-c 2>/dev/null))
+
+mpi: $(BUILD)/glint-mpi
+
+$(BUILD)/host/mpi/main.o: OURS += $(mpi_flags)
+
+$(BUILD)/glint-mpi: $(BUILD)/host/mpi/main.o $(library)
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell pkg-config --libs ompi-c) -o $@
 
 $(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)
@@ -148,7 +158,7 @@ CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c \
-          $(if $(has_embree),$(embree_sources))
+          $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),host/mpi/main.c)
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
              tests/oracle/*.h) tools/chaos.c $(embree_sources) $(embree_headers)
@@ -212,7 +222,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all tests test ladder features kernel_text bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all mpi tests test ladder features kernel_text bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(BUILD)/host/mpi/main.d $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)

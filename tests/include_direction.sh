@@ -1,7 +1,7 @@
 #!/bin/sh
-# Includes run one way: main, cli, {measure, verify, view}, render, compile, {import, then scene; opencl; image}, base. A room
+# Includes run one way: main and mpi, cli, {measure, verify, view}, render, compile, {import, then scene; opencl; image}, base. A room
 # includes itself and the rooms below it; only compile and render include the kernels' shared headers, each its own;
-# only opencl and render include OpenCL's, only view those of the window.
+# only opencl and render include OpenCL's, only view those of the window, only mpi MPI's.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -11,7 +11,7 @@ forbidden_includes() {
         awk -F: '
             BEGIN { level["base"] = 0; level["scene"] = level["opencl"] = level["image"] = 1; level["import"] = 2
                     level["compile"] = 3; level["render"] = 4; level["measure"] = level["verify"] = level["view"] = 5
-                    level["cli"] = 6; level["main.c"] = 7
+                    level["cli"] = 6; level["mpi"] = level["main.c"] = 7
                     shared["compile kernels/types.h"] = shared["compile kernels/features.h"] = 1
                     shared["render kernels/aovs.h"] = 1
                     split("shapes traversal shading numerics", folders, " ")
@@ -26,6 +26,7 @@ forbidden_includes() {
                 } else if (!(room in level)) wrong("no room is called " room)
                 else if ($3 ~ /</) {
                     if (target[1] == "CL" && room != "opencl" && room != "render") wrong(room " includes OpenCL")
+                    if (file == "mpi.h" && room != "mpi") wrong(room " includes MPI")
                     if (file ~ /^(SDL|fontconfig)/ && room != "view") wrong(room " includes the window\047s libraries")
                 } else if (target[1] == "kernels") {
                     if (!((room " " file) in shared)) wrong(room " includes " file)

@@ -21,7 +21,8 @@ page from the commands' output.
   and say why.
 """
 NOTES = {
-    "glint render --timing=json": "",
+    "glint render --timing=json": "`glint-mpi render` adds `by_rank[]`, with each further rank's `host`, `name`, `driver`, `lanes`, "
+                                  "`share`, `bands`, `busy_ms` and `idle_ms`.",
     "glint check": "",
     "glint devices": "",
     "glint diff": "Not printed if the images cannot be compared (exit status 1).",

@@ -13,25 +13,34 @@ static unsigned long long kernels_hash(void)
     return hash;
 }
 
+static void make_append(Text *makes, const char *name, const char *driver, uint32_t lanes)
+{
+    Text make = {0};
+    text_appendf(&make, "%s, %s, %u lanes", name, driver, lanes);
+    if (!strstr(text_c(makes), text_c(&make)))
+        text_appendf(makes, "%s%s", makes->count > 0 ? " + " : "", text_c(&make));
+    text_free(&make);
+}
+
 // Each make once.
-static void devices_append(Text *key, Renderer *const *renderers, size_t count)
+static void devices_append(Text *key, Renderer *const *renderers, size_t count, const Ranks *ranks)
 {
     Text makes = {0};
     for (size_t i = 0; i < count; i++) {
-        const RenderReport *report = renderer_report(renderers[i]);
-        Text make = {0};
-        text_appendf(&make, "%s, %s, %u lanes, kernel %016llx", report->device->name, report->device->driver,
-                     report->lanes, (unsigned long long)renderer_kernel_hash(renderers[i]));
-        if (!strstr(text_c(&makes), text_c(&make)))
-            text_appendf(&makes, "%s%s", makes.count > 0 ? " + " : "", text_c(&make));
-        text_free(&make);
+        const Device *device = renderer_report(renderers[i])->device;
+        Text driver = {0};
+        text_appendf(&driver, "%s, %s", device->platform_name, device->driver);
+        make_append(&makes, device->name, text_c(&driver), renderer_report(renderers[i])->lanes);
+        text_free(&driver);
     }
+    for (size_t i = 0; ranks && i < ranks->count; i++)
+        make_append(&makes, ranks->items[i].device, ranks->items[i].driver, ranks->items[i].lanes);
     text_appendf(key, "devices: %s\n", text_c(&makes));
     text_free(&makes);
 }
 
 void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,
-                    size_t count)
+                    size_t count, const Ranks *ranks)
 {
     text_appendf(key, "glint: %s\n", glint_version());
     text_appendf(key, "kernels: %016llx\n", kernels_hash());
@@ -46,6 +55,6 @@ void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Re
         if (aovs >> layer & 1) text_appendf(key, " %s", layer_names[layer]);
     text_appendf(key, "\nperturb: %u:%u\n", settings->perturb_seed, settings->perturb_scale);
     text_appendf(key, "BVH: %s\n", bvh_choice_names[settings->bvh]);
-    if (settings->precision != PRECISION_STRICT) devices_append(key, renderers, count);
+    if (settings->precision != PRECISION_STRICT) devices_append(key, renderers, count, ranks);
     text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_report(renderers[0])->scene_hash);
 }

@@ -24,6 +24,7 @@ struct ImageOutput {
     const RenderSettings *settings;
     Renderer *const *renderers;
     size_t renderer_count;
+    const Ranks *ranks; // or NULL
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted; // a band's values in another type
@@ -59,7 +60,7 @@ bool image_output_path_known(const char *path)
 
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
                                const RenderSettings *settings, Renderer *const *renderers,
-                               size_t renderer_count)
+                               size_t renderer_count, const Ranks *ranks)
 {
     ImageOutput *output = memory_allocate_zeroed(1, sizeof *output);
     *output = (ImageOutput){.options = options,
@@ -67,7 +68,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
                             .scene = scene,
                             .settings = settings,
                             .renderers = renderers,
-                            .renderer_count = renderer_count};
+                            .renderer_count = renderer_count,
+                            .ranks = ranks};
     return output;
 }
 
@@ -95,6 +97,8 @@ static bool is_mixed(const ImageOutput *output)
         differs =
             differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
     }
+    for (size_t i = 0; output->ranks && i < output->ranks->count; i++)
+        differs = differs || strcmp(output->ranks->items[i].device, first->name) != 0;
     return differs && output->settings->precision != PRECISION_STRICT;
 }
 
@@ -132,6 +136,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
          settings->region_height);
     NOTE("Transfer", "%s", output->options->transfer == TRANSFER_SRGB ? "srgb" : "none");
     NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
+    if (output->ranks) NOTE("Ranks", "%zu", output->ranks->count + 1);
     if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
 #undef NOTE
 #undef NOTE_EACH

@@ -1,6 +1,7 @@
 // The files of one image: the image itself, and a .npy beside it for each AOV asked for.
 #pragma once
 
+#include "host/cli/ranks.h"
 #include "host/image/image.h"
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
@@ -23,9 +24,10 @@ bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scen
                                    const char *scene_path);
 
 // Files are opened with the first band. Their notes name the devices of all renderers.
+// `ranks`, which render as well, may be NULL.
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
                                const RenderSettings *settings, Renderer *const *renderers,
-                               size_t renderer_count);
+                               size_t renderer_count, const Ranks *ranks);
 // Encodes a copy of the band while the caller goes on, unless options.synchronous; the messages belong to the
 // output until it is committed or abandoned. False: this band could not be written, or an earlier one.
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages);

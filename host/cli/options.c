@@ -287,21 +287,50 @@ int device_close(OpenDevice *open, int status)
     return status;
 }
 
+static void computes_open(OpenDevices *open, const Device *const *devices, size_t count)
+{
+    open->count = count;
+    open->items = memory_allocate_zeroed(count, sizeof *open->items);
+    for (size_t i = 0; i < count; i++)
+        compute_open(&open->items[i].compute, devices[i]);
+}
+
 bool devices_open(OpenDevices *open, const char *selector)
 {
     *open = (OpenDevices){0};
     device_list_open(&open->devices);
     MessageList messages = {0};
     const Device **devices;
-    open->count = devices_choose(&open->devices, device_selector(selector), &devices, &messages);
+    size_t count = devices_choose(&open->devices, device_selector(selector), &devices, &messages);
     messages_print(&messages, NULL);
-    open->items = memory_allocate_zeroed(open->count, sizeof *open->items);
-    for (size_t i = 0; i < open->count; i++)
-        compute_open(&open->items[i].compute, devices[i]);
+    computes_open(open, devices, count);
     free(devices);
-    if (open->count > 0) return true;
-    devices_close(open, EXIT_USER);
-    return false;
+    if (count == 0) devices_abandon(open);
+    return count > 0;
+}
+
+bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages)
+{
+    *open = (OpenDevices){0};
+    device_list_open(&open->devices);
+    const char *listed = device_selector(selector);
+    const Device **devices;
+    const Device *first = listed ? NULL : device_choose(&open->devices, NULL, messages);
+    size_t count = devices_choose(&open->devices, listed ? listed : "all", &devices, messages), kept = 0;
+    for (size_t i = 0; i < count; i++)
+        if (!first || devices[i]->type == first->type) devices[kept++] = devices[i];
+    if (kept > 0) computes_open(open, &devices[number % kept], 1);
+    free(devices);
+    if (kept == 0) devices_abandon(open);
+    return kept > 0;
+}
+
+void devices_abandon(OpenDevices *open)
+{
+    for (size_t i = 0; i < open->count; i++)
+        compute_close(&open->items[i].compute);
+    free(open->items);
+    device_list_close(&open->devices);
 }
 
 void devices_drop(OpenDevices *open, size_t index)

@@ -145,6 +145,11 @@ typedef struct {
 
 // As device_open, for all devices of a list or of "all".
 bool devices_open(OpenDevices *open, const char *selector);
+// One of the devices that `selector` lists, or without one of those of the default's type: the number modulo
+// their count, for the processes of one machine. False with a message; nothing to close then.
+bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages);
+// Closes all without a word about failures.
+void devices_abandon(OpenDevices *open);
 // Warns that the device failed and that the others do its work.
 void devices_drop(OpenDevices *open, size_t index);
 // Closes a device that was dropped; those after it move up.

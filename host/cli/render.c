@@ -7,6 +7,7 @@
 #include "host/cli/image_output.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
+#include "host/cli/ranks.h"
 #include "host/cli/timing.h"
 #include <errno.h>
 #include <getopt.h>
@@ -219,7 +220,8 @@ static bool band_take(void *context, const Film *band, double fraction_done)
 
 static void device_drop(void *context, size_t index)
 {
-    devices_drop(((BandContext *)context)->devices, index);
+    OpenDevices *devices = ((BandContext *)context)->devices;
+    if (index < devices->count) devices_drop(devices, index); // else a rank, which said why
 }
 
 // Opens a renderer on each device; those that fail are removed, if others are left. False: with messages, the
@@ -243,12 +245,12 @@ static bool renderers_open(Renderer **renderers, OpenDevices *devices, const Sce
 // False with messages. No checkpoint is requested: true.
 static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *options,
                              const RenderSettings *settings, Renderer *const *renderers, size_t count,
-                             MessageList *messages)
+                             const Ranks *ranks, MessageList *messages)
 {
     *checkpoint = NULL;
     if (!options->checkpoint) return true;
     Text key = {0};
-    checkpoint_key(&key, settings, options->output.aovs, renderers, count);
+    checkpoint_key(&key, settings, options->output.aovs, renderers, count, ranks);
     *checkpoint = checkpoint_open(options->checkpoint, text_c(&key), messages);
     text_free(&key);
     return *checkpoint != NULL;
@@ -267,29 +269,34 @@ static void rest_print(const RenderOptions *options)
 
 // Renders, writes the files and reports the times.
 static int image_render(RenderOptions *options, const Scene *scene, OpenDevices *devices,
-                        Renderer *const *renderers, const RenderSettings *settings, HostTimes *times,
-                        MessageList *messages)
+                        Renderer *const *renderers, Ranks *ranks, const RenderSettings *settings,
+                        HostTimes *times, MessageList *messages)
 {
     Checkpoint *checkpoint;
-    if (!checkpoint_start(&checkpoint, options, settings, renderers, devices->count, messages))
+    if (!checkpoint_start(&checkpoint, options, settings, renderers, devices->count, ranks, messages))
         return EXIT_USER;
     Progress progress;
     progress_open(&progress, options->quiet);
-    ImageOutput *output =
-        image_output_open(&options->output, options->scene, scene, settings, renderers, devices->count);
+    ImageOutput *output = image_output_open(&options->output, options->scene, scene, settings, renderers,
+                                            devices->count, ranks);
     BandContext context = {.output = output,
                            .devices = devices,
                            .progress = &progress,
                            .messages = messages,
                            .settings = settings,
                            .is_quiet = options->quiet};
+    const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,
+                                  .serve = ranks ? ranks->serve : NULL,
+                                  .shares = ranks ? ranks->shares : NULL,
+                                  .context = ranks};
     const RenderJob job = {.renderers = renderers,
                            .count = devices->count,
                            .aovs = options->output.aovs,
                            .sink = band_take,
                            .dropped = device_drop,
                            .context = &context,
-                           .checkpoint = checkpoint};
+                           .checkpoint = checkpoint,
+                           .remote = ranks ? &remote : NULL};
     double start = clock_seconds();
     bool whole = render_job_run(&job);
     times->render_seconds = clock_seconds() - start;
@@ -301,15 +308,19 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
     messages_print(messages, NULL);
-    int status = whole ? EXIT_DONE : faulty ? EXIT_USER : EXIT_INTERRUPTED;
+    int status = whole                    ? EXIT_DONE
+                 : faulty                 ? EXIT_USER
+                 : progress_interrupted() ? EXIT_INTERRUPTED
+                                          : EXIT_MACHINE;
     if (!whole) rest_print(options);
     if (whole && options->timing != TIMING_NONE)
-        timing_print(options->timing, renderers, devices->count, settings, times);
+        timing_print(options->timing, renderers, devices->count, ranks, settings, times);
     if (whole) fault_output_is_complete(status);
     return status;
 }
 
-static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices *devices, HostTimes *times)
+static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices *devices, Ranks *ranks,
+                        HostTimes *times)
 {
     RenderSettings settings;
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
@@ -319,8 +330,10 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
     MessageList messages = {0};
     Renderer **renderers = memory_allocate_zeroed(devices->count, sizeof *renderers);
     int status = EXIT_USER;
-    if (renderers_open(renderers, devices, scene, &settings, &messages))
-        status = image_render(options, scene, devices, renderers, &settings, times, &messages);
+    if (renderers_open(renderers, devices, scene, &settings, &messages) &&
+        (!ranks ||
+         ranks->begin(ranks, scene, &settings, options->output.aovs, options->common.device, &messages)))
+        status = image_render(options, scene, devices, renderers, ranks, &settings, times, &messages);
     messages_print(&messages, NULL);
     for (size_t i = 0; i < devices->count; i++)
         renderer_close(renderers[i]);
@@ -328,7 +341,22 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
     return status;
 }
 
+// The devices that this process renders on: of several ranks each has one.
+static bool render_devices_open(OpenDevices *devices, const char *selector, const Ranks *ranks)
+{
+    if (!ranks) return devices_open(devices, selector);
+    MessageList messages = {0};
+    bool is_open = devices_open_one(devices, selector, 0, &messages);
+    messages_print(&messages, NULL);
+    return is_open;
+}
+
 int command_render(int argument_count, char **arguments)
+{
+    return command_render_on(NULL, argument_count, arguments);
+}
+
+int command_render_on(Ranks *ranks, int argument_count, char **arguments)
 {
     RenderOptions options;
     int status = options_read(&options, argument_count, arguments);
@@ -343,8 +371,8 @@ int command_render(int argument_count, char **arguments)
     if (image_output_path_known(options.output.path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
-        if (devices_open(&devices, options.common.device)) {
-            status = scene_render(&options, &scene, &devices, &times);
+        if (render_devices_open(&devices, options.common.device, ranks)) {
+            status = scene_render(&options, &scene, &devices, ranks, &times);
             status = devices_close(&devices, status);
         }
     }

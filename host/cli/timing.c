@@ -73,9 +73,8 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
 }
 
 // Of the rows and of the time, where several devices render.
-static void share_print(const RenderReport *report, const RenderSettings *settings)
+static void share_print(const WorkerShare *share, const RenderSettings *settings)
 {
-    const WorkerShare *share = &report->share;
     fprintf(stderr, "  %.1f %% of the rows in %u %s; busy %.3f ms, idle %.3f ms\n",
             100.0 * share->rows / settings->region_height, share->bands, share->bands == 1 ? "band" : "bands",
             1e3 * share->busy_seconds, 1e3 * share->idle_seconds);
@@ -91,8 +90,8 @@ static void device_print(const RenderReport *report)
     launches_print("read-back", report->reads.items, report->reads.count);
 }
 
-static void text_print(Renderer *const *renderers, size_t count, const RenderSettings *settings,
-                       const HostTimes *host)
+static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,
+                       const RenderSettings *settings, const HostTimes *host)
 {
     fprintf(stderr, "%ux%u, %u %s per pixel, precision %s\n", settings->region_width, settings->region_height,
             settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
@@ -102,8 +101,14 @@ static void text_print(Renderer *const *renderers, size_t count, const RenderSet
         const RenderReport *report = renderer_report(renderers[i]);
         fprintf(stderr, "%s, %u %s (kernel %016llx)\n", report->device->name, report->lanes,
                 report->lanes == 1 ? "lane" : "lanes", (unsigned long long)report->kernel_hash);
-        if (count > 1) share_print(report, settings);
+        if (count > 1 || ranks) share_print(&report->share, settings);
         device_print(report);
+    }
+    for (size_t i = 0; ranks && i < ranks->count; i++) {
+        const Rank *rank = &ranks->items[i];
+        fprintf(stderr, "rank %zu on %s: %s, %u %s\n", i + 1, rank->host, rank->device, rank->lanes,
+                rank->lanes == 1 ? "lane" : "lanes");
+        share_print(&ranks->shares[i], settings);
     }
     line_print("render", host->render_seconds, "");
     line_print("encode", host->encode_seconds, "");
@@ -127,6 +132,29 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
     json_end(json);
 }
 
+static void share_json(Json *json, const WorkerShare *share, const RenderSettings *settings)
+{
+    json_number(json, "share", (double)share->rows / settings->region_height);
+    json_integer(json, "bands", share->bands);
+    json_number(json, "busy_ms", 1e3 * share->busy_seconds);
+    json_number(json, "idle_ms", 1e3 * share->idle_seconds);
+}
+
+static void ranks_json(Json *json, const Ranks *ranks, const RenderSettings *settings)
+{
+    json_begin_array(json, "by_rank");
+    for (size_t i = 0; i < ranks->count; i++) {
+        json_begin_object(json, NULL);
+        json_text(json, "host", ranks->items[i].host);
+        json_text(json, "name", ranks->items[i].device);
+        json_text(json, "driver", ranks->items[i].driver);
+        json_integer(json, "lanes", ranks->items[i].lanes);
+        share_json(json, &ranks->shares[i], settings);
+        json_end(json);
+    }
+    json_end(json);
+}
+
 static void render_device_json(Json *json, const RenderReport *report, const RenderSettings *settings)
 {
     json_begin_object(json, NULL);
@@ -143,17 +171,14 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_number(json, "build_ms", 1e3 * report->build_seconds);
     json_boolean(json, "build_from_cache", report->build_from_cache);
     json_number(json, "upload_ms", 1e3 * report->upload_seconds);
-    json_number(json, "share", (double)report->share.rows / settings->region_height);
-    json_integer(json, "bands", report->share.bands);
-    json_number(json, "busy_ms", 1e3 * report->share.busy_seconds);
-    json_number(json, "idle_ms", 1e3 * report->share.idle_seconds);
+    share_json(json, &report->share, settings);
     launches_json(json, "launches", report->launches.items, report->launches.count);
     launches_json(json, "read_backs", report->reads.items, report->reads.count);
     json_end(json);
 }
 
-static void json_report(Renderer *const *renderers, size_t count, const RenderSettings *settings,
-                        const HostTimes *host)
+static void json_report(Renderer *const *renderers, size_t count, const Ranks *ranks,
+                        const RenderSettings *settings, const HostTimes *host)
 {
     Json *json = json_open();
     json_integer(json, "schema", 3);
@@ -166,16 +191,17 @@ static void json_report(Renderer *const *renderers, size_t count, const RenderSe
     for (size_t i = 0; i < count; i++)
         render_device_json(json, renderer_report(renderers[i]), settings);
     json_end(json);
+    if (ranks) ranks_json(json, ranks, settings);
     json_number(json, "render_ms", 1e3 * host->render_seconds);
     json_number(json, "encode_ms", 1e3 * host->encode_seconds);
     json_print(json, stdout);
 }
 
-void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const RenderSettings *settings,
-                  const HostTimes *host)
+void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,
+                  const RenderSettings *settings, const HostTimes *host)
 {
     if (style == TIMING_JSON)
-        json_report(renderers, count, settings, host);
+        json_report(renderers, count, ranks, settings, host);
     else
-        text_print(renderers, count, settings, host);
+        text_print(renderers, count, ranks, settings, host);
 }

@@ -1,7 +1,7 @@
 // The time of every stage and launch of a render, as text or JSON.
 #pragma once
 
-#include "host/render/renderer.h"
+#include "host/cli/ranks.h"
 
 typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON } TimingStyle;
 
@@ -12,6 +12,7 @@ typedef struct {
     double render_seconds; // from the first band to the last, builds included
 } HostTimes;
 
-// Of all renderers of the image. Text goes to stderr, JSON to stdout.
-void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const RenderSettings *settings,
-                  const HostTimes *host);
+// Of all renderers of the image; `ranks`, which rendered as well, may be NULL. Text goes to stderr, JSON to
+// stdout.
+void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,
+                  const RenderSettings *settings, const HostTimes *host);

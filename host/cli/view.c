@@ -99,7 +99,7 @@ static bool image_save(void *context, const char *path, const Scene *scene, cons
     const ViewOptions *view = context;
     const Transfer transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
     const ImageOutputOptions options = {.path = path, .transfer = transfer, .bits = 8};
-    ImageOutput *output = image_output_open(&options, view->scene, scene, settings, &renderer, 1);
+    ImageOutput *output = image_output_open(&options, view->scene, scene, settings, &renderer, 1, NULL);
     double seconds;
     if (image_output_write(output, film, messages)) return image_output_commit(output, messages, &seconds);
     image_output_abandon(output);

@@ -5,9 +5,7 @@
 #include "host/base/memory.h"
 #include "host/render/pace.h"
 #include "host/render/renderer_state.h"
-#include "host/render/scheduler.h"
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 
 static const double PASS_SECONDS = 0.1; // of renderer_accumulate, about
@@ -168,11 +166,9 @@ static void *lengths_restored(const Renderer *renderer, void *lengths, size_t co
     return restored;
 }
 
-// Where a band goes: to the scheduler that the worker took its rows from, or to a PassSink with its number of
-// samples.
+// Where a band goes: to the queue that has its rows, or to a PassSink with its number of samples.
 typedef struct {
-    Scheduler *scheduler;
-    size_t worker;
+    const BandQueue *queue;
     PassSink pass_sink;
     uint32_t samples;
     void *context;
@@ -180,8 +176,8 @@ typedef struct {
 
 static bool deliver(const Delivery *delivery, const Film *band)
 {
-    return delivery->scheduler ? scheduler_give(delivery->scheduler, delivery->worker, band)
-                               : delivery->pass_sink(delivery->context, band, delivery->samples);
+    return delivery->queue ? delivery->queue->give(delivery->queue->context, band)
+                           : delivery->pass_sink(delivery->context, band, delivery->samples);
 }
 
 static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigned layers, BandRows rows,
@@ -247,7 +243,7 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
 static bool is_stopped(const Renderer *renderer, const Delivery *delivery)
 {
     return (renderer->settings.stop && renderer->settings.stop()) ||
-           (delivery->scheduler && scheduler_has_ended(delivery->scheduler));
+           (delivery->queue && delivery->queue->has_ended(delivery->queue->context));
 }
 
 // Samples first..end-1 of a band, in launches of the pace. False: failed or stopped.
@@ -280,12 +276,11 @@ static Pace pace_start(const RenderSettings *settings)
     return (Pace){.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
 }
 
-// Renders the rows that the scheduler hands out. A failed device is dropped.
-static void renderer_work(Renderer *renderer, unsigned aovs, const Delivery *delivery)
+bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
 {
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
-    Scheduler *scheduler = delivery->scheduler;
+    const Delivery delivery = {.queue = queue};
     const uint32_t step = settings->band_rows > 0 ? settings->band_rows : rows_step(renderer);
     BandBuffers buffers = {0};
     buffers_open(&buffers, renderer, aovs, rows_max(renderer, aovs));
@@ -294,71 +289,15 @@ static void renderer_work(Renderer *renderer, unsigned aovs, const Delivery *del
     bool go_on = compute_ok(compute);
     while (go_on) {
         uint32_t wanted = band_rows(renderer, &pace, settings->sample_count, buffers.rows);
-        BandRows rows = scheduler_take(scheduler, delivery->worker, wanted, step);
+        BandRows rows = queue->take(queue->context, wanted, step);
         if (rows.row_count == 0) break;
-        go_on = band_sample(renderer, &buffers, rows, &pace, 0, settings->sample_count, delivery);
+        go_on = band_sample(renderer, &buffers, rows, &pace, 0, settings->sample_count, &delivery);
         if (!go_on) break;
         band_fill_aovs(renderer, &buffers, aovs, rows);
-        go_on = band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, delivery);
+        go_on = band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
     }
     buffers_close(&buffers);
-    if (!compute_ok(compute))
-        scheduler_drop(scheduler, delivery->worker);
-    else if (!go_on)
-        scheduler_end(scheduler);
-}
-
-typedef struct {
-    Renderer *renderer;
-    unsigned aovs;
-    Delivery delivery;
-    pthread_t thread;
-} RenderWorker;
-
-static void *worker_run(void *argument)
-{
-    const RenderWorker *worker = argument;
-    renderer_work(worker->renderer, worker->aovs, &worker->delivery);
-    return NULL;
-}
-
-bool render_job_run(const RenderJob *job)
-{
-    const size_t count = job->count;
-    const SchedulerSettings settings = {.row_count = job->renderers[0]->settings.region_height,
-                                        .worker_count = count,
-                                        .sink = job->sink,
-                                        .dropped = job->dropped,
-                                        .context = job->context,
-                                        .checkpoint = job->checkpoint};
-    Scheduler *scheduler = scheduler_open(&settings);
-    RenderWorker *workers = memory_allocate_zeroed(count, sizeof *workers);
-    for (size_t i = 0; i < count; i++) {
-        workers[i] = (RenderWorker){.renderer = job->renderers[i],
-                                    .aovs = job->aovs,
-                                    .delivery = {.scheduler = scheduler, .worker = i}};
-        if (i == 0) continue; // the caller's thread
-        if (pthread_create(&workers[i].thread, NULL, worker_run, &workers[i]) != 0)
-            fault("cannot start a thread for %s%s", workers[i].renderer->compute->device->name,
-                  fault_limits());
-    }
-    worker_run(&workers[0]);
-    for (size_t i = 1; i < count; i++)
-        pthread_join(workers[i].thread, NULL);
-    free(workers);
-    WorkerShare *shares = memory_allocate_zeroed(count, sizeof *shares);
-    bool whole = scheduler_close(scheduler, shares);
-    for (size_t i = 0; i < count; i++)
-        job->renderers[i]->report.share = shares[i];
-    free(shares);
-    return whole;
-}
-
-bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
-{
-    const RenderJob job = {
-        .renderers = &renderer, .count = 1, .aovs = aovs, .sink = sink, .context = context};
-    return render_job_run(&job) && compute_ok(renderer->compute);
+    return go_on && compute_ok(compute);
 }
 
 typedef struct {

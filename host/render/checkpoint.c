@@ -29,8 +29,8 @@ typedef struct {
 } FileHeader;
 
 typedef struct {
-    uint32_t width, first_row, row_count, light_count, real_size, is_double;
-    uint64_t layers, size;          // the set of layers, and their bytes
+    FilmHeader film;
+    uint64_t size;                  // of the layers
     unsigned char hash[HASH_BYTES]; // of all above and the layers
 } RecordHeader;
 
@@ -91,30 +91,9 @@ static FileHeader file_header(const char *key)
     return header;
 }
 
-// The film of a record, without its layers.
-static Film record_film(const RecordHeader *record)
-{
-    return (Film){.width = record->width,
-                  .height = record->row_count,
-                  .light_count = record->light_count,
-                  .first_row = record->first_row,
-                  .is_double = record->is_double,
-                  .real_size = record->real_size};
-}
-
 static RecordHeader record_of(const Film *band)
 {
-    RecordHeader record = {.width = band->width,
-                           .first_row = band->first_row,
-                           .row_count = band->height,
-                           .light_count = band->light_count,
-                           .real_size = (uint32_t)band->real_size,
-                           .is_double = band->is_double};
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
-        if (!band->layers[layer]) continue;
-        record.layers |= UINT64_C(1) << layer;
-        record.size += film_layer_size(band, layer);
-    }
+    RecordHeader record = {.film = film_header(band), .size = film_size(band)};
     crypto_generichash_state hash;
     hash_begin(&hash, &record);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
@@ -130,7 +109,7 @@ static bool record_check(const Checkpoint *checkpoint, off_t offset, off_t file_
 {
     if (!bytes_read(checkpoint->descriptor, record, sizeof *record, offset)) return false;
     offset += (off_t)sizeof *record;
-    if (record->row_count == 0 || record->size > (uint64_t)(file_size - offset)) return false;
+    if (record->film.row_count == 0 || record->size > (uint64_t)(file_size - offset)) return false;
     crypto_generichash_state hash;
     hash_begin(&hash, record);
     for (uint64_t left = record->size; left > 0;) {
@@ -147,7 +126,7 @@ static bool record_check(const Checkpoint *checkpoint, off_t offset, off_t file_
 
 static void record_note(Checkpoint *checkpoint, const RecordHeader *record)
 {
-    array_push(checkpoint->bands, ((BandRows){record->first_row, record->row_count}));
+    array_push(checkpoint->bands, ((BandRows){record->film.first_row, record->film.row_count}));
     array_push(checkpoint->offsets, checkpoint->end);
     checkpoint->end += (off_t)(sizeof *record + record->size);
 }
@@ -333,12 +312,11 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
         if (checkpoint->bands.items[i].first_row == first_row) offset = checkpoint->offsets.items[i];
     RecordHeader record;
     bool is_read = bytes_read(checkpoint->descriptor, &record, sizeof record, offset);
-    if (is_read) *band = record_film(&record);
+    if (is_read) *band = film_of_header(&record.film);
     offset += (off_t)sizeof record;
     for (Layer layer = 0; layer < LAYER_COUNT && is_read; layer++) {
-        if (!(record.layers >> layer & 1)) continue;
+        if (!band->layers[layer]) continue;
         size_t size = film_layer_size(band, layer);
-        band->layers[layer] = memory_allocate(size, 1);
         is_read = bytes_read(checkpoint->descriptor, band->layers[layer], size, offset);
         offset += (off_t)size;
     }

@@ -37,6 +37,33 @@ size_t film_size(const Film *film)
     return size;
 }
 
+FilmHeader film_header(const Film *film)
+{
+    FilmHeader header = {.width = film->width,
+                         .first_row = film->first_row,
+                         .row_count = film->height,
+                         .light_count = film->light_count,
+                         .real_size = (uint32_t)film->real_size,
+                         .is_double = film->is_double};
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (film->layers[layer]) header.layers |= UINT64_C(1) << layer;
+    return header;
+}
+
+Film film_of_header(const FilmHeader *header)
+{
+    Film film = {.width = header->width,
+                 .height = header->row_count,
+                 .light_count = header->light_count,
+                 .first_row = header->first_row,
+                 .is_double = header->is_double,
+                 .real_size = header->real_size};
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (header->layers >> layer & 1)
+            film.layers[layer] = memory_allocate(film_layer_size(&film, layer), 1);
+    return film;
+}
+
 Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs)
 {
     Film film = {.width = width, .height = height, .light_count = light_count, .real_size = sizeof(double)};

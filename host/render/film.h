@@ -55,6 +55,12 @@ typedef struct {
     uint32_t first_row, row_count;
 } BandRows;
 
+// A film as files and messages describe it; the bytes of its layers follow in their order.
+typedef struct {
+    uint32_t width, first_row, row_count, light_count, real_size, is_double;
+    uint64_t layers; // the set of those that are there
+} FilmHeader;
+
 static inline size_t film_pixel_count(const Film *film)
 {
     return (size_t)film->width * film->height;
@@ -69,6 +75,10 @@ size_t film_layer_size(const Film *film, Layer layer);
 
 // Of all layers that are there, in bytes.
 size_t film_size(const Film *film);
+
+FilmHeader film_header(const Film *film);
+// The film that a header describes, with layers whose values are undefined.
+Film film_of_header(const FilmHeader *header);
 
 // A film of zeros in double with the color and the AOVs of the set.
 Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs);

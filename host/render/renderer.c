@@ -123,46 +123,58 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
         kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
 }
 
-// For the first time, or for another camera. False with a message.
-static bool compile(Renderer *renderer, const Scene *scene, const CompileSettings *settings,
-                    MessageList *messages)
+static CompileSettings compile_settings(const RenderSettings *settings, uint32_t lanes)
 {
-    CompiledScene *compiled = &renderer->compiled;
-    if (renderer->settings.moves) return scene_move(compiled, scene, settings, messages);
-    CompiledScene fresh;
-    if (!scene_compile(&fresh, scene, settings, messages)) return false;
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const bool has_room = device_has_room(&fresh, renderer->compute->device, is_double, messages);
-    compiled_scene_free(has_room ? compiled : &fresh);
-    if (has_room) *compiled = fresh;
-    return has_room;
-}
-
-// Compiles and uploads the scene. False, with nothing changed, as renderer_open.
-static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
-                       MessageList *messages)
-{
-    const Device *device = renderer->compute->device;
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const CompileSettings compile_settings = {
+    return (CompileSettings){
         .width = settings->width,
         .height = settings->height,
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
         .precision = settings->precision,
-        .lanes = settings->lanes ? settings->lanes : device_lanes(device, is_double),
+        .lanes = lanes,
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
-        .textures = renderer->compiled.textures,
     };
-    if (!compile(renderer, scene, &compile_settings, messages)) return false;
+}
+
+bool renderer_compile(CompiledScene *compiled, const Scene *scene, const RenderSettings *settings,
+                      MessageList *messages)
+{
+    const CompileSettings compile = compile_settings(settings, settings->lanes);
+    return scene_compile(compiled, scene, &compile, messages);
+}
+
+// Takes a compiled scene if the device has room for it; else frees it. False with a message.
+static bool compiled_take(Renderer *renderer, CompiledScene *fresh, bool is_double, MessageList *messages)
+{
+    CompiledScene *compiled = &renderer->compiled;
+    const bool has_room = device_has_room(fresh, renderer->compute->device, is_double, messages);
+    compiled_scene_free(has_room ? compiled : fresh);
+    if (has_room) *compiled = *fresh;
+    return has_room;
+}
+
+// For the first time, or for another camera. False with a message.
+static bool compile(Renderer *renderer, const Scene *scene, const CompileSettings *settings,
+                    MessageList *messages)
+{
+    if (renderer->settings.moves) return scene_move(&renderer->compiled, scene, settings, messages);
+    CompiledScene fresh;
+    return scene_compile(&fresh, scene, settings, messages) &&
+           compiled_take(renderer, &fresh, settings->precision == PRECISION_DOUBLE, messages);
+}
+
+// Uploads the compiled scene. False: the device failed.
+static bool compiled_upload(Renderer *renderer, const RenderSettings *settings, uint32_t lanes,
+                            size_t light_count)
+{
     const CompiledScene *compiled = &renderer->compiled;
     renderer->settings = *settings;
-    renderer->light_count = scene->lights.count;
+    renderer->light_count = light_count;
     renderer->report.features = compiled->features;
-    renderer->report.lanes = compile_settings.lanes;
-    renderer->report.is_double = is_double;
+    renderer->report.lanes = lanes;
+    renderer->report.is_double = settings->precision == PRECISION_DOUBLE;
     renderer->report.flatten_seconds = compiled->flatten_seconds;
     renderer->report.bvh_seconds = compiled->bvh_seconds;
     double start = clock_seconds();
@@ -170,6 +182,19 @@ static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSetti
     offsets_upload(renderer);
     renderer->report.upload_seconds = clock_seconds() - start;
     return compute_ok(renderer->compute);
+}
+
+// Compiles and uploads the scene. False, with nothing changed, as renderer_open.
+static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
+                       MessageList *messages)
+{
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
+    const uint32_t lanes =
+        settings->lanes ? settings->lanes : device_lanes(renderer->compute->device, is_double);
+    CompileSettings compiling = compile_settings(settings, lanes);
+    compiling.textures = renderer->compiled.textures;
+    return compile(renderer, scene, &compiling, messages) &&
+           compiled_upload(renderer, settings, lanes, scene->lights.count);
 }
 
 // At least `count`: few sizes, so that few kernels are built. Most scenes are served by `usual`, which is
@@ -249,21 +274,46 @@ static void variant_set(Renderer *renderer)
             scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
 }
 
-Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
-                        MessageList *messages)
+static Renderer *renderer_make(Compute *compute)
 {
-    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
     renderer->report.device = compute->device;
     renderer->report.build_from_cache = true;
     renderer->report.scene_hash = HASH_START;
-    if (!scene_take(renderer, scene, settings, messages)) {
+    return renderer;
+}
+
+// The renderer where its scene is on the device, else NULL.
+static Renderer *renderer_finish(Renderer *renderer, bool is_ready)
+{
+    if (!is_ready) {
         renderer_close(renderer);
         return NULL;
     }
     variant_set(renderer);
     return renderer;
+}
+
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                        MessageList *messages)
+{
+    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
+    Renderer *renderer = renderer_make(compute);
+    return renderer_finish(renderer, scene_take(renderer, scene, settings, messages));
+}
+
+Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
+                                 const RenderSettings *settings, MessageList *messages)
+{
+    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) {
+        compiled_scene_free(compiled);
+        return NULL;
+    }
+    Renderer *renderer = renderer_make(compute);
+    const bool is_double = settings->precision == PRECISION_DOUBLE;
+    return renderer_finish(renderer, compiled_take(renderer, compiled, is_double, messages) &&
+                                         compiled_upload(renderer, settings, settings->lanes, light_count));
 }
 
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,

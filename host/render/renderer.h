@@ -2,6 +2,7 @@
 // rooms, only this one uses both scenes and OpenCL.
 #pragma once
 
+#include "host/compile/compiled_scene.h"
 #include "host/compile/settings.h"
 #include "host/opencl/compute.h"
 #include "host/render/film.h"
@@ -43,6 +44,13 @@ typedef struct Renderer Renderer;
 // precision. NULL without one: the device failed, see Compute. The compute outlives it.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
+// The same of a scene that renderer_compile compiled for settings->lanes, perhaps on another machine. Takes
+// it, even on failure.
+Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
+                                 const RenderSettings *settings, MessageList *messages);
+// Compiles for settings->lanes, which must not be 0. False with a message.
+bool renderer_compile(CompiledScene *compiled, const Scene *scene, const RenderSettings *settings,
+                      MessageList *messages);
 void renderer_close(Renderer *renderer);
 // Takes another camera, size, region, samples or bounces; all else in `scene` and `settings` is what the
 // renderer was opened with. Textures stay on the device, and kernels where they suit. False as where
@@ -54,15 +62,38 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
 // (compute_ok says so), else settings.stop or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
+// Where a renderer gets its rows and leaves their bands: see scheduler_take, scheduler_give and
+// scheduler_has_ended.
+typedef struct {
+    BandRows (*take)(void *context, uint32_t rows_max, uint32_t step);
+    bool (*give)(void *context, const Film *band);
+    bool (*has_ended)(void *context);
+    void *context;
+} BandQueue;
+
+// Renders the rows of the queue until none are left. False: the device failed, or settings.stop or the queue
+// ended it.
+bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue);
+
+// Workers on other machines, which are the scheduler's last.
+typedef struct {
+    size_t count;
+    // Hands out rows until the image is complete or the render has ended; in the caller's thread.
+    void (*serve)(void *context, Scheduler *scheduler, size_t first_worker);
+    WorkerShare *shares; // filled
+    void *context;
+} RemoteWorkers;
+
 // One image by several renderers.
 typedef struct {
     Renderer *const *renderers; // of one scene and one set of settings, each on a device of its own
     size_t count;
     unsigned aovs;
-    BandSink sink;          // see SchedulerSettings
-    WorkerDropped dropped;  // gets the renderer's index
-    void *context;          // of both
-    Checkpoint *checkpoint; // or NULL
+    BandSink sink;               // see SchedulerSettings
+    WorkerDropped dropped;       // gets the renderer's index
+    void *context;               // of both
+    Checkpoint *checkpoint;      // or NULL
+    const RemoteWorkers *remote; // or NULL
 } RenderJob;
 
 // As renderer_render. False: the last device failed, too, the checkpoint cannot be written or read, or

@@ -152,21 +152,35 @@ static bool rows_are_out(const Scheduler *scheduler)
     return false;
 }
 
+// Takes rows, if there are any for the worker now; else *waits says whether there may be later.
+static BandRows rows_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits)
+{
+    const bool is_free = scheduler->free_rows.count > 0;
+    BandRows rows = {0};
+    if (is_free && !scheduler->has_ended) rows = rows_choose(scheduler, worker, rows_max, step);
+    *waits = rows.row_count == 0 && !scheduler->has_ended && (is_free || rows_are_out(scheduler));
+    if (rows.row_count == 0) return rows;
+    rows_remove(scheduler, rows);
+    scheduler->workers[worker].rows = rows;
+    scheduler->workers[worker].taken_seconds = clock_seconds();
+    return rows;
+}
+
 BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
 {
-    BandRows rows = {0};
+    bool waits;
+    BandRows rows;
     pthread_mutex_lock(&scheduler->mutex);
-    while (!scheduler->has_ended && rows.row_count == 0) {
-        bool is_free = scheduler->free_rows.count > 0;
-        if (is_free) rows = rows_choose(scheduler, worker, rows_max, step);
-        if (!is_free && !rows_are_out(scheduler)) break;
-        if (rows.row_count == 0) pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
-    }
-    if (rows.row_count > 0) {
-        rows_remove(scheduler, rows);
-        scheduler->workers[worker].rows = rows;
-        scheduler->workers[worker].taken_seconds = clock_seconds();
-    }
+    while ((rows = rows_take(scheduler, worker, rows_max, step, &waits)).row_count == 0 && waits)
+        pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
+    pthread_mutex_unlock(&scheduler->mutex);
+    return rows;
+}
+
+BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits)
+{
+    pthread_mutex_lock(&scheduler->mutex);
+    BandRows rows = rows_take(scheduler, worker, rows_max, step, waits);
     pthread_mutex_unlock(&scheduler->mutex);
     return rows;
 }

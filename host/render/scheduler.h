@@ -46,6 +46,8 @@ bool scheduler_close(Scheduler *scheduler, WorkerShare *shares);
 BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step);
 // The band of the rows that the worker took. False: the render has ended.
 bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band);
+// As scheduler_take, but does not wait: *waits says that there may be rows later.
+BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits);
 // Returns the worker's rows; it takes no more.
 void scheduler_drop(Scheduler *scheduler, size_t worker);
 // Ends the render before all rows are done.

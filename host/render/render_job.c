@@ -1,0 +1,93 @@
+// A job: a scheduler, and a worker for each device or machine.
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/render/renderer_state.h"
+#include <pthread.h>
+#include <stdlib.h>
+
+typedef struct {
+    Renderer *renderer;
+    unsigned aovs;
+    Scheduler *scheduler;
+    size_t number;
+    pthread_t thread;
+} Worker;
+
+static BandRows worker_take(void *context, uint32_t rows_max, uint32_t step)
+{
+    const Worker *worker = context;
+    return scheduler_take(worker->scheduler, worker->number, rows_max, step);
+}
+
+static bool worker_give(void *context, const Film *band)
+{
+    const Worker *worker = context;
+    return scheduler_give(worker->scheduler, worker->number, band);
+}
+
+static bool worker_has_ended(void *context)
+{
+    return scheduler_has_ended(((const Worker *)context)->scheduler);
+}
+
+// A failed device is dropped.
+static void *worker_run(void *argument)
+{
+    Worker *worker = argument;
+    const BandQueue queue = {
+        .take = worker_take, .give = worker_give, .has_ended = worker_has_ended, .context = worker};
+    bool is_done = renderer_work(worker->renderer, worker->aovs, &queue);
+    if (!compute_ok(worker->renderer->compute))
+        scheduler_drop(worker->scheduler, worker->number);
+    else if (!is_done)
+        scheduler_end(worker->scheduler);
+    return NULL;
+}
+
+static void thread_start(Worker *worker)
+{
+    if (pthread_create(&worker->thread, NULL, worker_run, worker) != 0)
+        fault("cannot start a thread for %s%s", worker->renderer->compute->device->name, fault_limits());
+}
+
+bool render_job_run(const RenderJob *job)
+{
+    const RemoteWorkers *remote = job->remote;
+    const size_t count = job->count, remote_count = remote ? remote->count : 0;
+    const SchedulerSettings settings = {.row_count = job->renderers[0]->settings.region_height,
+                                        .worker_count = count + remote_count,
+                                        .sink = job->sink,
+                                        .dropped = job->dropped,
+                                        .context = job->context,
+                                        .checkpoint = job->checkpoint};
+    Scheduler *scheduler = scheduler_open(&settings);
+    Worker *workers = memory_allocate_zeroed(count, sizeof *workers);
+    const size_t first_thread = remote ? 0 : 1; // one works in the caller's thread
+    for (size_t i = 0; i < count; i++)
+        workers[i] =
+            (Worker){.renderer = job->renderers[i], .aovs = job->aovs, .scheduler = scheduler, .number = i};
+    for (size_t i = first_thread; i < count; i++)
+        thread_start(&workers[i]);
+    if (remote)
+        remote->serve(remote->context, scheduler, count);
+    else
+        worker_run(&workers[0]);
+    for (size_t i = first_thread; i < count; i++)
+        pthread_join(workers[i].thread, NULL);
+    free(workers);
+    WorkerShare *shares = memory_allocate_zeroed(count + remote_count, sizeof *shares);
+    bool whole = scheduler_close(scheduler, shares);
+    for (size_t i = 0; i < count; i++)
+        job->renderers[i]->report.share = shares[i];
+    for (size_t i = 0; i < remote_count; i++)
+        remote->shares[i] = shares[count + i];
+    free(shares);
+    return whole;
+}
+
+bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
+{
+    const RenderJob job = {
+        .renderers = &renderer, .count = 1, .aovs = aovs, .sink = sink, .context = context};
+    return render_job_run(&job) && compute_ok(renderer->compute);
+}
