@@ -85,17 +85,13 @@ class Bench(TestCase):
         write("report", json.dumps(report))
         report["runs"][0]["frame_samples_ms"] = [1e-6 * time for time in report["runs"][0]["frame_samples_ms"]]
         write("faster", json.dumps(report))
-        command, long = f"bench sphere.yaml {QUICK} --compare", "--seconds 3"
+        command, long = f"bench sphere.yaml {QUICK} --compare", "--seconds 2"
         self.assertRegex(self.glint(f"{command} report {long} --tolerance 1e6").stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
         process = self.glint(f"{command} faster {long} --json", status=3)
         comparison = json.loads(process.stdout)["runs"][0]["comparison"]
         self.assertEqual(comparison["verdict"], "slower")
         self.assertTrue(10 < comparison["low"] <= comparison["ratio"] <= comparison["high"], comparison)
         self.assertRegex(process.stderr, "1 of 1 rows are slower than faster")
-        for run in report["runs"]:
-            run["frame_samples_ms"] = run["frame_samples_ms"][:5]
-        write("short", json.dumps(report))
-        self.assertRegex(self.glint(f"{command} short", status=4).stderr, "too noisy")
         write("sphere.yaml", SPHERE + "# another file\n")
         self.glint(f"{command} report", status=1)  # without a row in common
         self.glint(f"{command} sphere.yaml", status=1)
