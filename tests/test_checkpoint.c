@@ -14,6 +14,11 @@
 
 enum { WIDTH = 5, ROWS = 12, BAND_ROWS = 4, BANDS = ROWS / BAND_ROWS, COLOR_VALUES = BAND_ROWS * WIDTH * 3 };
 static const char key[] = "size: 5x12\nscene: 1234\n";
+static const FilmHeader film = {.width = WIDTH,
+                                .row_count = ROWS,
+                                .light_count = 2,
+                                .real_size = sizeof(float),
+                                .layers = AOV_COLOR | AOV_OBJECT};
 static char *folder, path[64];
 
 static float color_value(uint32_t row, uint32_t i)
@@ -46,7 +51,7 @@ static Film band_make(Values *values, uint32_t first_row)
 static Checkpoint *open_checked(void)
 {
     MessageList messages = {0};
-    Checkpoint *checkpoint = checkpoint_open(path, key, &messages);
+    Checkpoint *checkpoint = checkpoint_open(path, key, &film, &messages);
     message_list_print(&messages, stderr);
     assert_non_null(checkpoint);
     assert_int_equal(messages.count, 0);
@@ -179,13 +184,52 @@ static void test_wrong_bytes(void **state)
     text_free(&bytes);
 }
 
+static void append_film(const Film *band)
+{
+    Checkpoint *checkpoint = open_checked();
+    assert_true(checkpoint_append(checkpoint, band));
+    close_checked(checkpoint, false);
+}
+
+// Whole records that are not the image's are not believed.
+static void test_other_sizes(void **state)
+{
+    (void)state;
+    Values values;
+    const Film right = band_make(&values, ROWS - BAND_ROWS);
+    for (int i = 0; i < 8; i++) {
+        Film band = right;
+        if (i == 0) band.width--;
+        if (i == 1) band.light_count++;
+        if (i == 2) band.real_size = 1;
+        if (i == 3) band.is_double = true;
+        if (i == 4) band.layers[LAYER_OBJECT] = NULL;
+        if (i == 5) band.first_row++; // one row below the last
+        if (i == 6) band.first_row = UINT32_MAX - 1;
+        if (i == 7) band.height = 0;
+        unlink(path);
+        append_film(&band);
+        Checkpoint *checkpoint = open_checked();
+        assert_int_equal(band_count(checkpoint), 0);
+        close_checked(checkpoint, false);
+    }
+    unlink(path);
+    append_film(&right);
+    Film again = right;
+    again.first_row--; // some of the same rows
+    append_film(&again);
+    Checkpoint *checkpoint = open_checked();
+    assert_int_equal(band_count(checkpoint), 1);
+    close_checked(checkpoint, false);
+}
+
 // Refused with a reason, and left as it is.
 static void refused(const char *other_key, const char *reason)
 {
     Text before = {0}, after = {0};
     MessageList messages = {0};
     text_read_file(&before, path, &messages);
-    assert_null(checkpoint_open(path, other_key, &messages));
+    assert_null(checkpoint_open(path, other_key, &film, &messages));
     assert_int_equal(messages.count, 1);
     if (!strstr(messages.items[0].text, reason)) fail_msg("%s", messages.items[0].text);
     message_list_free(&messages);
@@ -200,12 +244,22 @@ static void test_refusals(void **state)
 {
     (void)state;
     Text bytes = file_make();
+    unlink(path);
+    close_checked(open_checked(), false);
+    const size_t header_size = file_size();
+    file_write(bytes.items, bytes.count);
     refused("size: 6x12\nscene: 1234\n", "is of another image (size: 5x12, not 6x12)");
     refused("size: 5x12\nscene: 9\n", "is of another image (scene: 1234, not 9)");
     refused("size: 5x12\nlanes: 4\nscene: 1234\n", "is of another image (lanes: , not 4)");
     Checkpoint *checkpoint = open_checked();
     refused(key, "is in use by another process");
     close_checked(checkpoint, false);
+    for (size_t at = 24; at < bytes.count && at < header_size; at++) { // after magic and format
+        bytes.items[at] ^= 0x10;
+        file_write(bytes.items, bytes.count);
+        refused(key, at < 26 || at >= 32 ? "is damaged" : "is not a checkpoint");
+        bytes.items[at] ^= 0x10;
+    }
     file_write("camera: {position: [0, 0, 0]}\n", 30);
     refused(key, "is not a checkpoint of this version of glint");
     bytes.items[16]++; // the format
@@ -214,8 +268,8 @@ static void test_refusals(void **state)
     text_free(&bytes);
 
     MessageList messages = {0};
-    assert_null(checkpoint_open("/dev/null", key, &messages));
-    assert_null(checkpoint_open("/nowhere/file", key, &messages));
+    assert_null(checkpoint_open("/dev/null", key, &film, &messages));
+    assert_null(checkpoint_open("/nowhere/file", key, &film, &messages));
     assert_int_equal(messages.count, 2);
     message_list_free(&messages);
 }
@@ -293,7 +347,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands_are_read_again),
-                                       cmocka_unit_test(test_torn_writes), cmocka_unit_test(test_wrong_bytes),
+                                       cmocka_unit_test(test_torn_writes),
+                                       cmocka_unit_test(test_wrong_bytes),
+                                       cmocka_unit_test(test_other_sizes),
                                        cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_a_render_goes_on)};
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -251,7 +251,8 @@ static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *optio
     if (!options->checkpoint) return true;
     Text key = {0};
     checkpoint_key(&key, settings, options->output.aovs, renderers, count, ranks);
-    *checkpoint = checkpoint_open(options->checkpoint, text_c(&key), messages);
+    const FilmHeader film = renderer_film_header(renderers[0], options->output.aovs);
+    *checkpoint = checkpoint_open(options->checkpoint, text_c(&key), &film, messages);
     text_free(&key);
     return *checkpoint != NULL;
 }

@@ -53,6 +53,16 @@ static Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t 
                   .real_size = renderer_scalar_size(renderer)};
 }
 
+FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
+{
+    const Film film = film_of_rows(renderer, 0, renderer->settings.region_height);
+    FilmHeader header = film_header(&film);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if ((aovs | AOV_COLOR) >> layer & 1 && film_layer_size(&film, layer) > 0)
+            header.layers |= UINT64_C(1) << layer;
+    return header;
+}
+
 static cl_mem film_buffer(Renderer *renderer, size_t size)
 {
     return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);

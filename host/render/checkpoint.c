@@ -34,8 +34,11 @@ typedef struct {
     unsigned char hash[HASH_BYTES]; // of all above and the layers
 } RecordHeader;
 
+typedef enum { RECORD_WHOLE, RECORD_TORN, RECORD_FAILED } RecordState;
+
 struct Checkpoint {
     char *path;
+    FilmHeader film; // of all rows
     int descriptor;
     pthread_mutex_t mutex;
     off_t end; // of the last record
@@ -103,25 +106,39 @@ static RecordHeader record_of(const Film *band)
     return record;
 }
 
-// Whether a whole record is at the offset.
-static bool record_check(const Checkpoint *checkpoint, off_t offset, off_t file_size, RecordHeader *record,
-                         unsigned char *chunk)
+// Whether the record holds rows of the image and nothing else: its sizes decide what is read into memory.
+static bool record_fits(const Checkpoint *checkpoint, const RecordHeader *record)
 {
-    if (!bytes_read(checkpoint->descriptor, record, sizeof *record, offset)) return false;
+    const FilmHeader *film = &record->film;
+    FilmHeader expected = checkpoint->film;
+    expected.first_row = film->first_row;
+    expected.row_count = film->row_count;
+    return memcmp(film, &expected, sizeof expected) == 0 && film->row_count > 0 &&
+           film->row_count <= checkpoint->film.row_count &&
+           film->first_row <= checkpoint->film.row_count - film->row_count &&
+           record->size == film_header_size(film);
+}
+
+// Torn: no whole record of this image is at the offset. Failed: the file cannot be read.
+static RecordState record_check(const Checkpoint *checkpoint, off_t offset, off_t file_size,
+                                RecordHeader *record, unsigned char *chunk)
+{
+    if (file_size - offset < (off_t)sizeof *record) return RECORD_TORN;
+    if (!bytes_read(checkpoint->descriptor, record, sizeof *record, offset)) return RECORD_FAILED;
     offset += (off_t)sizeof *record;
-    if (record->film.row_count == 0 || record->size > (uint64_t)(file_size - offset)) return false;
+    if (!record_fits(checkpoint, record) || record->size > (uint64_t)(file_size - offset)) return RECORD_TORN;
     crypto_generichash_state hash;
     hash_begin(&hash, record);
     for (uint64_t left = record->size; left > 0;) {
         size_t size = left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES;
-        if (!bytes_read(checkpoint->descriptor, chunk, size, offset)) return false;
+        if (!bytes_read(checkpoint->descriptor, chunk, size, offset)) return RECORD_FAILED;
         crypto_generichash_update(&hash, chunk, size);
         offset += (off_t)size;
         left -= size;
     }
     unsigned char expected[HASH_BYTES];
     crypto_generichash_final(&hash, expected, HASH_BYTES);
-    return memcmp(record->hash, expected, HASH_BYTES) == 0;
+    return memcmp(record->hash, expected, HASH_BYTES) == 0 ? RECORD_WHOLE : RECORD_TORN;
 }
 
 static void record_note(Checkpoint *checkpoint, const RecordHeader *record)
@@ -131,17 +148,32 @@ static void record_note(Checkpoint *checkpoint, const RecordHeader *record)
     checkpoint->end += (off_t)(sizeof *record + record->size);
 }
 
-// Finds the records and cuts off what follows the last whole one.
+// Marks the rows of the record; false: an earlier one has some of them.
+static bool rows_mark(bool *is_saved, const FilmHeader *film)
+{
+    for (uint32_t i = 0; i < film->row_count; i++) {
+        if (is_saved[film->first_row + i]) return false;
+        is_saved[film->first_row + i] = true;
+    }
+    return true;
+}
+
+// Finds the records and cuts off what follows the last whole one; leaves a file that cannot be read.
 static bool records_find(Checkpoint *checkpoint)
 {
     struct stat status;
     if (fstat(checkpoint->descriptor, &status) != 0) return false;
     unsigned char *chunk = memory_allocate(CHUNK_BYTES, 1);
+    bool *is_saved = memory_allocate_zeroed(checkpoint->film.row_count, sizeof *is_saved);
     RecordHeader record;
-    while (record_check(checkpoint, checkpoint->end, status.st_size, &record, chunk))
+    RecordState state;
+    while ((state = record_check(checkpoint, checkpoint->end, status.st_size, &record, chunk)) ==
+               RECORD_WHOLE &&
+           rows_mark(is_saved, &record.film))
         record_note(checkpoint, &record);
+    free(is_saved);
     free(chunk);
-    return ftruncate(checkpoint->descriptor, checkpoint->end) == 0;
+    return state != RECORD_FAILED && ftruncate(checkpoint->descriptor, checkpoint->end) == 0;
 }
 
 // The value in the line of the key whose name is at `line`; empty without one.
@@ -159,6 +191,12 @@ static const char *key_value(const char *key, const char *line, size_t name_leng
     return "";
 }
 
+static void damage_report(const char *path, MessageList *messages)
+{
+    message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is damaged; remove it or name another file",
+                path);
+}
+
 // Says which is the first line in which the keys differ.
 static void difference_report(const char *path, const char *key, const char *found, MessageList *messages)
 {
@@ -174,6 +212,7 @@ static void difference_report(const char *path, const char *key, const char *fou
             path, (int)name_length, line, (int)other_length, other, (int)length, value);
         return;
     }
+    damage_report(path, messages); // it has further lines
 }
 
 static bool open_failed(const char *path, const char *doing, MessageList *messages)
@@ -182,7 +221,7 @@ static bool open_failed(const char *path, const char *doing, MessageList *messag
     return false;
 }
 
-// A new file's header and key. A file that ends within its header is one whose process ended early.
+// A new file's header and key.
 static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const char *key,
                          MessageList *messages)
 {
@@ -193,8 +232,30 @@ static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const
     return is_written || open_failed(checkpoint->path, "write", messages);
 }
 
-// Checks the header of the file, or writes that of a new one.
-static bool header_take(Checkpoint *checkpoint, const char *key, MessageList *messages)
+// Checks the key that is in the file.
+static bool key_check(const Checkpoint *checkpoint, const FileHeader *header, const char *key,
+                      MessageList *messages)
+{
+    char *found = memory_allocate_zeroed(header->key_length + 1, 1);
+    bool is_same = false;
+    if (!bytes_read(checkpoint->descriptor, found, header->key_length, sizeof *header)) {
+        open_failed(checkpoint->path, "read", messages);
+    } else {
+        const FileHeader of_found = file_header(found);
+        is_same = strcmp(found, key) == 0;
+        if (memcmp(header, &of_found, sizeof of_found) != 0) {
+            damage_report(checkpoint->path, messages);
+            is_same = false;
+        } else if (!is_same) {
+            difference_report(checkpoint->path, key, found, messages);
+        }
+    }
+    free(found);
+    return is_same;
+}
+
+// Checks the header of the file, or writes that of a new one, or of one whose process ended within it.
+static bool header_check(Checkpoint *checkpoint, const char *key, MessageList *messages)
 {
     const FileHeader expected = file_header(key);
     FileHeader header = {0};
@@ -212,17 +273,12 @@ static bool header_take(Checkpoint *checkpoint, const char *key, MessageList *me
                     checkpoint->path);
         return false;
     }
-    if (size < sizeof header || (uint64_t)status.st_size < sizeof header + header.key_length)
+    if (size == sizeof header && (uint64_t)status.st_size >= sizeof header + header.key_length)
+        return key_check(checkpoint, &header, key, messages);
+    if (size < sizeof header || memcmp(&header, &expected, sizeof header) == 0)
         return header_write(checkpoint, &expected, key, messages);
-    char *found = memory_allocate_zeroed(header.key_length + 1, 1);
-    bool is_same = bytes_read(checkpoint->descriptor, found, header.key_length, sizeof header);
-    if (!is_same) open_failed(checkpoint->path, "read", messages);
-    if (is_same && memcmp(&header, &expected, sizeof header) != 0) {
-        difference_report(checkpoint->path, key, found, messages);
-        is_same = false;
-    }
-    free(found);
-    return is_same;
+    damage_report(checkpoint->path, messages);
+    return false;
 }
 
 // So that a new file's name outlives a power failure; not every file system can sync a folder.
@@ -239,10 +295,11 @@ static void folder_sync(const char *path)
     free(folder);
 }
 
-Checkpoint *checkpoint_open(const char *path, const char *key, MessageList *messages)
+Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages)
 {
     Checkpoint *checkpoint = memory_allocate_zeroed(1, sizeof *checkpoint);
     checkpoint->path = memory_copy_text(path);
+    checkpoint->film = *film;
     if (pthread_mutex_init(&checkpoint->mutex, NULL) != 0) fault("out of memory: mutex");
     checkpoint->descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
     bool is_open = checkpoint->descriptor >= 0 || open_failed(path, "open", messages);
@@ -250,7 +307,7 @@ Checkpoint *checkpoint_open(const char *path, const char *key, MessageList *mess
         message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is in use by another process", path);
         is_open = false;
     }
-    is_open = is_open && header_take(checkpoint, key, messages);
+    is_open = is_open && header_check(checkpoint, key, messages);
     checkpoint->end = (off_t)(sizeof(FileHeader) + strlen(key));
     if (is_open && !records_find(checkpoint)) is_open = open_failed(path, "read", messages);
     if (is_open) {
@@ -312,6 +369,10 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
         if (checkpoint->bands.items[i].first_row == first_row) offset = checkpoint->offsets.items[i];
     RecordHeader record;
     bool is_read = bytes_read(checkpoint->descriptor, &record, sizeof record, offset);
+    if (is_read && !record_fits(checkpoint, &record)) { // changed since it was opened
+        errno = EIO;
+        is_read = false;
+    }
     if (is_read) *band = film_of_header(&record.film);
     offset += (off_t)sizeof record;
     for (Layer layer = 0; layer < LAYER_COUNT && is_read; layer++) {

@@ -14,9 +14,10 @@
 
 typedef struct Checkpoint Checkpoint;
 
-// Opens the file or creates it. NULL with an error message: it is another image's, not a checkpoint, in use
-// by another process, or cannot be read or written; it is then as it was.
-Checkpoint *checkpoint_open(const char *path, const char *key, MessageList *messages);
+// Opens the file or creates it. `film` describes all rows of the image: no other band is believed. NULL with
+// an error message: the file is another image's, not a checkpoint, damaged, in use by another process, or
+// cannot be read or written; it is then as it was.
+Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages);
 // The rows of each band that the file has, in no order.
 const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count);
 // Adds a band; any thread may. False: it cannot be written; checkpoint_close says why.

@@ -50,14 +50,28 @@ FilmHeader film_header(const Film *film)
     return header;
 }
 
+static Film film_without_layers(const FilmHeader *header)
+{
+    return (Film){.width = header->width,
+                  .height = header->row_count,
+                  .light_count = header->light_count,
+                  .first_row = header->first_row,
+                  .is_double = header->is_double,
+                  .real_size = header->real_size};
+}
+
+uint64_t film_header_size(const FilmHeader *header)
+{
+    const Film film = film_without_layers(header);
+    uint64_t size = 0;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (header->layers >> layer & 1) size += film_layer_size(&film, layer);
+    return size;
+}
+
 Film film_of_header(const FilmHeader *header)
 {
-    Film film = {.width = header->width,
-                 .height = header->row_count,
-                 .light_count = header->light_count,
-                 .first_row = header->first_row,
-                 .is_double = header->is_double,
-                 .real_size = header->real_size};
+    Film film = film_without_layers(header);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (header->layers >> layer & 1)
             film.layers[layer] = memory_allocate(film_layer_size(&film, layer), 1);

@@ -77,6 +77,8 @@ size_t film_layer_size(const Film *film, Layer layer);
 size_t film_size(const Film *film);
 
 FilmHeader film_header(const Film *film);
+// Of the layers that a header describes, in bytes.
+uint64_t film_header_size(const FilmHeader *header);
 // The film that a header describes, with layers whose values are undefined.
 Film film_of_header(const FilmHeader *header);
 

@@ -58,6 +58,8 @@ void renderer_close(Renderer *renderer);
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);
 
+// What all bands with the color and the AOVs of the set have together.
+FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs);
 // Renders the color and the AOVs of the set in bands of about band_seconds each. False: the device failed
 // (compute_ok says so), else settings.stop or the sink ended it. A failed device delivers no further band.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
