@@ -173,7 +173,7 @@ lint-format:
 
 lint-tidy:
 	@printf '%s\n' $(linted) | xargs -P $(LINT_JOBS) -I FILE \
-	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) FILE -- $(OURS) $(version_flags) 2>/dev/null
+	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) FILE -- $(OURS) $(mpi_flags) $(version_flags) 2>/dev/null
 
 lint-cppcheck:
 	@$(CPPCHECK) --quiet --std=c11 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
