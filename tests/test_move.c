@@ -235,6 +235,51 @@ static void far_eyes(void **state)
     scene_free(&scene);
 }
 
+// Fails to move to one camera, then moves to the other.
+static void check_move_after_failure(const char *text, const Camera *failing, const Camera *next)
+{
+    Scene scene = scene_of_text("move.yaml", text);
+    CompiledScene compiled = compiled_make(&scene, &single);
+    MessageList messages = {0};
+    scene.camera = *failing;
+    assert_false(scene_move(&compiled, &scene, &single, &messages));
+    assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
+    message_list_free(&messages);
+    scene.camera = *next;
+    assert_true(scene_move(&compiled, &scene, &single, &messages));
+    CompiledScene expected = compiled_make(&scene, &single);
+    check_numbers(&compiled, &expected);
+    if (expected.pending_children_max > 0) check_bvh(&compiled);
+    compiled_scene_free(&expected);
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
+}
+
+// A move that failed has changed some arrays: the next one, to whichever eye, sets all of them.
+static void moves_after_a_failure(void **state)
+{
+    (void)state;
+    // without a light or a bounded object, so that a far eye keeps the unit and fails for a plane's number
+    static const char planes[] = "camera: {position: [1, 2, -40], look_at: [0, 0, 0], fov: 50}\n"
+                                 "objects:\n"
+                                 "  - plane: {point: [0, -9, 0], normal: [0, 1, 0]}\n"
+                                 "  - plane: {point: [0, 0, 90], normal: [0, 1, -1]}\n";
+    static const char *const texts[] = {planes, scene_text};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        Scene scene = scene_of_text("move.yaml", texts[i]);
+        const Camera start = scene.camera;
+        Camera other = start, wide, far = start;
+        other.position = (Vector3){3, 4, -50};
+        wide = other;
+        wide.half_tangent = 1e42;
+        far.position.z = -1e39;
+        check_move_after_failure(texts[i], &wide, &other); // the eye was right
+        check_move_after_failure(texts[i], &wide, &start); // the eye was right before
+        check_move_after_failure(texts[i], &far, &start);
+        scene_free(&scene);
+    }
+}
+
 static void range_count(void *context, size_t begin, size_t end)
 {
     atomic_uchar *counts = context;
@@ -257,8 +302,11 @@ static void loops_over_threads_cover_each_index_once(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(moved_scene_has_the_numbers_of_a_compiled_one), cmocka_unit_test(powers_come_and_go),
-        cmocka_unit_test(turned_camera_changes_the_header_alone),        cmocka_unit_test(far_eyes),
+        cmocka_unit_test(moved_scene_has_the_numbers_of_a_compiled_one),
+        cmocka_unit_test(powers_come_and_go),
+        cmocka_unit_test(turned_camera_changes_the_header_alone),
+        cmocka_unit_test(far_eyes),
+        cmocka_unit_test(moves_after_a_failure),
         cmocka_unit_test(loops_over_threads_cover_each_index_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -52,13 +52,13 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
     return done;
 }
 
-// What depends on the eye.
+// What depends on the eye. After a failure the arrays are seen from no eye.
 static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                      MessageList *messages)
 {
     const bool is_double = settings->precision == PRECISION_DOUBLE;
     const Rounding rounding = {eye_of(scene, settings), is_double};
-    compiled->eye = rounding.eye;
+    compiled->eye = (Vector3){NAN, NAN, NAN}; // equal to no eye, so that the next move sets all
     objects_move(compiled, scene, &rounding);
     compiled->features |= settings->extra_features;
     materials_flatten(compiled, scene, &rounding);
@@ -69,6 +69,7 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
     compiled->bvh_seconds = clock_seconds() - start;
     culling_fill(compiled, is_double);
     if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
+    compiled->eye = rounding.eye;
     return true;
 }
 

@@ -51,7 +51,7 @@ typedef struct {
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;                   // of these; 0 where there are none
     uint32_t cull_sphere_count;          // of each common origin
-    Vector3 eye;                         // from which the arrays are seen
+    Vector3 eye;                         // from which the arrays are seen; NAN: a move failed
     Bounds contact;                      // where transparent and opaque primitives may touch
 } CompiledScene;
 

@@ -184,7 +184,7 @@ static bool compiled_upload(Renderer *renderer, const RenderSettings *settings, 
     return compute_ok(renderer->compute);
 }
 
-// Compiles and uploads the scene. False, with nothing changed, as renderer_open.
+// Compiles and uploads the scene. False as renderer_open, with nothing changed that kernels read.
 static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                        MessageList *messages)
 {
