@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAITING_BYTES_MAX = 64 << 20 }; // of bands that wait for one above them, about
+enum { WAITING_BYTES_MAX = 64 << 20 }; // unless the settings say otherwise
 
 typedef struct {
     BandRows rows; // taken and not given yet
@@ -99,7 +99,8 @@ static bool is_alone(const Scheduler *scheduler, size_t worker)
 static uint32_t row_limit(const Scheduler *scheduler)
 {
     if (scheduler->row_bytes == 0) return UINT32_MAX;
-    return scheduler->delivered_rows + (uint32_t)(WAITING_BYTES_MAX / scheduler->row_bytes);
+    return scheduler->delivered_rows +
+           (uint32_t)(scheduler->settings.waiting_bytes_max / scheduler->row_bytes);
 }
 
 // The rows for the worker from the first that are free; none while they are too far down.
@@ -228,7 +229,7 @@ static void waiting_pass(Scheduler *scheduler)
 }
 
 // The checkpoint's bands wait like those that were rendered.
-static void checkpoint_take(Scheduler *scheduler)
+static void checkpoint_resume(Scheduler *scheduler)
 {
     size_t count;
     const BandRows *bands = checkpoint_bands(scheduler->settings.checkpoint, &count);
@@ -244,13 +245,14 @@ Scheduler *scheduler_open(const SchedulerSettings *settings)
 {
     Scheduler *scheduler = memory_allocate_zeroed(1, sizeof *scheduler);
     scheduler->settings = *settings;
+    if (settings->waiting_bytes_max == 0) scheduler->settings.waiting_bytes_max = WAITING_BYTES_MAX;
     scheduler->start_seconds = clock_seconds();
     scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
     if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
         fault("out of memory: mutex");
     array_push(scheduler->free_rows, ((BandRows){0, settings->row_count}));
     pthread_mutex_lock(&scheduler->mutex);
-    if (settings->checkpoint) checkpoint_take(scheduler);
+    if (settings->checkpoint) checkpoint_resume(scheduler);
     pthread_mutex_unlock(&scheduler->mutex);
     return scheduler;
 }
@@ -311,6 +313,8 @@ void scheduler_drop(Scheduler *scheduler, size_t worker)
     bool is_last = true;
     for (size_t i = 0; i < scheduler->settings.worker_count; i++)
         is_last = is_last && scheduler->workers[i].is_dropped;
+    while (scheduler->is_delivering)
+        pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
     if (!is_last && scheduler->settings.dropped)
         scheduler->settings.dropped(scheduler->settings.context, worker);
     pthread_cond_broadcast(&scheduler->changed);

@@ -20,10 +20,11 @@ typedef void (*WorkerDropped)(void *context, size_t worker);
 typedef struct {
     uint32_t row_count;
     size_t worker_count;
-    BandSink sink;          // called by the workers' threads, one at a time
-    WorkerDropped dropped;  // likewise; NULL: not called
-    void *context;          // of both
-    Checkpoint *checkpoint; // has the bands that are done, and gets all others; NULL: none
+    BandSink sink;            // called by the workers' threads, one at a time
+    WorkerDropped dropped;    // likewise, never while the sink runs; NULL: not called
+    void *context;            // of both
+    Checkpoint *checkpoint;   // has the bands that are done, and gets all others; NULL: none
+    size_t waiting_bytes_max; // of bands that wait for one above them, about; 0: 64 MiB
 } SchedulerSettings;
 
 // What a worker did.
