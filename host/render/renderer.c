@@ -98,6 +98,9 @@ static void array_upload(Renderer *renderer, size_t kind)
 static void upload(Renderer *renderer)
 {
     CompiledScene *compiled = &renderer->compiled;
+    if (renderer->settings.hashes_scene) // lengths are restored with it
+        renderer->report.scene_hash =
+            hash_bytes(renderer->report.scene_hash, &compiled->unit, sizeof compiled->unit);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         if (compiled->changed[kind]) array_upload(renderer, kind);
         compiled->changed[kind] = false;
@@ -110,10 +113,12 @@ static void upload(Renderer *renderer)
 static void offsets_upload(Renderer *renderer)
 {
     const uint32_t count = renderer->settings.sample_count;
+    const size_t size = 2 * count * renderer_scalar_size(renderer);
     void *offsets = sample_pattern(count, renderer->report.is_double);
+    if (renderer->settings.hashes_scene)
+        renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, offsets, size);
     buffer_release(renderer->offsets);
-    renderer->offsets = buffer_create(renderer->compute, 2 * count * renderer_scalar_size(renderer), offsets,
-                                      CL_MEM_READ_ONLY);
+    renderer->offsets = buffer_create(renderer->compute, size, offsets, CL_MEM_READ_ONLY);
     free(offsets);
 }
 

@@ -131,7 +131,9 @@ typedef struct {
     uint32_t lanes;
     bool is_double; // structs in double
     uint64_t kernel_hash;
-    uint64_t scene_hash; // of the arrays but for the BVH, which does not change the image; where requested
+    // Where requested: of the arrays, their unit and the samples' offsets, but not of the BVH, which does not
+    // change the image.
+    uint64_t scene_hash;
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
     uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting
