@@ -250,7 +250,7 @@ static void test_refusals(void **state)
     file_write(bytes.items, bytes.count);
     refused("size: 6x12\nscene: 1234\n", "is of another image (size: 5x12, not 6x12)");
     refused("size: 5x12\nscene: 9\n", "is of another image (scene: 1234, not 9)");
-    refused("size: 5x12\nlanes: 4\nscene: 1234\n", "is of another image (lanes: , not 4)");
+    refused("size: 5x12\nlanes: 4\nscene: 1234\n", "is of another image (lanes: none, not 4)");
     Checkpoint *checkpoint = open_checked();
     refused(key, "is in use by another process");
     close_checked(checkpoint, false);

@@ -13,30 +13,30 @@ static unsigned long long kernels_hash(void)
     return hash;
 }
 
-static void make_append(Text *makes, const char *name, const char *driver, uint32_t lanes)
+static void model_append(Text *models, const char *name, const char *driver, uint32_t lanes)
 {
-    Text make = {0};
-    text_appendf(&make, "%s, %s, %u lanes", name, driver, lanes);
-    if (!strstr(text_c(makes), text_c(&make)))
-        text_appendf(makes, "%s%s", makes->count > 0 ? " + " : "", text_c(&make));
-    text_free(&make);
+    Text model = {0};
+    text_appendf(&model, "%s, %s, %u lanes", name, driver, lanes);
+    if (!strstr(text_c(models), text_c(&model)))
+        text_appendf(models, "%s%s", models->count > 0 ? " + " : "", text_c(&model));
+    text_free(&model);
 }
 
-// Each make once.
+// Each model once.
 static void devices_append(Text *key, Renderer *const *renderers, size_t count, const Ranks *ranks)
 {
-    Text makes = {0};
+    Text models = {0};
     for (size_t i = 0; i < count; i++) {
         const Device *device = renderer_report(renderers[i])->device;
         Text driver = {0};
         text_appendf(&driver, "%s, %s", device->platform_name, device->driver);
-        make_append(&makes, device->name, text_c(&driver), renderer_report(renderers[i])->lanes);
+        model_append(&models, device->name, text_c(&driver), renderer_report(renderers[i])->lanes);
         text_free(&driver);
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
-        make_append(&makes, ranks->items[i].device, ranks->items[i].driver, ranks->items[i].lanes);
-    text_appendf(key, "devices: %s\n", text_c(&makes));
-    text_free(&makes);
+        model_append(&models, ranks->items[i].device, ranks->items[i].driver, ranks->items[i].lanes);
+    text_appendf(key, "devices: %s\n", text_c(&models));
+    text_free(&models);
 }
 
 void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,

@@ -59,7 +59,8 @@ static const char help_text[] =
         HELP_LAYER) "      --timing[=json]   report the time of every stage and launch\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
-                    "      --checkpoint FILE keep what is rendered in FILE until the image is complete; the\n"
+                    "      --checkpoint FILE\n"
+                    "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command goes on where an earlier one ended\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_DEVICES HELP_COMMON HELP_PERTURB HELP_HELP;
@@ -261,10 +262,10 @@ static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *optio
 static void rest_print(const RenderOptions *options)
 {
     if (progress_interrupted())
-        fprintf(stderr, "glint: interrupted: nothing was written; an earlier %s is as it was\n",
+        fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is as it was\n",
                 options->output.path);
     if (options->checkpoint)
-        fprintf(stderr, "glint: %s has what is rendered: the same command goes on from there\n",
+        fprintf(stderr, "glint: run the same command again to continue; finished bands are in '%s'\n",
                 options->checkpoint);
 }
 

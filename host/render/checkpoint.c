@@ -18,7 +18,7 @@
 
 static const char file_magic[16] = "glint checkpoint";
 static const uint64_t file_format = 1;
-static const double SYNC_SECONDS = 1; // at least, between two syncs: a power failure loses no more than that
+static const double SYNC_SECONDS = 1; // at least, between two syncs, which are slow
 
 enum { HASH_BYTES = 16, KEY_BYTES_MAX = 1 << 16, CHUNK_BYTES = 1 << 20 };
 
@@ -197,6 +197,14 @@ static void damage_report(const char *path, MessageList *messages)
                 path);
 }
 
+// A value of a key as messages have it.
+static char *value_text(const char *value, size_t length)
+{
+    char *text = length > 0 ? strndup(value, length) : strdup("none");
+    if (!text) fault("out of memory: message");
+    return text;
+}
+
 // Says which is the first line in which the keys differ.
 static void difference_report(const char *path, const char *key, const char *found, MessageList *messages)
 {
@@ -205,11 +213,13 @@ static void difference_report(const char *path, const char *key, const char *fou
         const char *value = key_value(key, line, name_length, &length);
         const char *other = key_value(found, line, name_length, &other_length);
         if (length == other_length && strncmp(value, other, length) == 0) continue;
+        char *own = value_text(value, length), *others = value_text(other, other_length);
         message_add(
             messages, MESSAGE_ERROR,
-            "the checkpoint '%s' is of another image (%.*s: %.*s, not %.*s); remove it or name another "
-            "file",
-            path, (int)name_length, line, (int)other_length, other, (int)length, value);
+            "the checkpoint '%s' is of another image (%.*s: %s, not %s); remove it or name another file",
+            path, (int)name_length, line, others, own);
+        free(own);
+        free(others);
         return;
     }
     damage_report(path, messages); // it has further lines

@@ -190,8 +190,8 @@ static bool compiled_upload(Renderer *renderer, const RenderSettings *settings, 
 }
 
 // Compiles and uploads the scene. False as renderer_open, with nothing changed that kernels read.
-static bool scene_take(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
-                       MessageList *messages)
+static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
+                         MessageList *messages)
 {
     const bool is_double = settings->precision == PRECISION_DOUBLE;
     const uint32_t lanes =
@@ -305,7 +305,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
 {
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = renderer_make(compute);
-    return renderer_finish(renderer, scene_take(renderer, scene, settings, messages));
+    return renderer_finish(renderer, scene_assign(renderer, scene, settings, messages));
 }
 
 Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
@@ -325,7 +325,7 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
                    MessageList *messages)
 {
     if (!compute_ok(renderer->compute) || !settings_fit(settings, renderer->compute->device, messages) ||
-        !scene_take(renderer, scene, settings, messages))
+        !scene_assign(renderer, scene, settings, messages))
         return false;
     variant_set(renderer); // another eye may need another feature, or a deeper stack
     return true;
