@@ -92,7 +92,7 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
 # All calls of OpenCL go through this test, which makes them fail.
 opencl_calls := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
 
-$(BUILD)/tests/test_opencl_failure: private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs
+$(BUILD)/tests/test_opencl_failure: private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=pthread_create
 
 ladder: $(BUILD)/tools/numerics/ladder
 

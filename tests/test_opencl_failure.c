@@ -7,6 +7,7 @@
 #include "host/render/renderer.h"
 #include "tests/child.h"
 #include "tests/scene_reading.h"
+#include <errno.h>
 #include <pthread.h>
 #include <semaphore.h>
 #include <setjmp.h>
@@ -430,6 +431,34 @@ static void test_one_of_two_devices(void **state)
     injected.call = NULL;
 }
 
+int __real_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
+                          void *argument);
+int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
+                          void *argument);
+int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
+                          void *argument)
+{
+    return call_fails("pthread_create") ? EAGAIN : __real_pthread_create(thread, attributes, run, argument);
+}
+
+// The second device gets no thread: the first renders the whole image.
+static void test_a_device_without_a_thread(void **state)
+{
+    (void)state;
+    Compute computes[2];
+    Answer answer;
+    injected.call = "pthread_create";
+    injected.index = EVERY_CALL;
+    assert_true(pair_work(computes, &answer));
+    injected.call = NULL;
+    assert_int_equal(pair.dropped_count, 1);
+    assert_int_equal(pair.dropped, 1);
+    assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+    assert_true(compute_ok(&computes[0]));
+    assert_string_equal(computes[1].failure.call, "pthread_create");
+    pair_close(computes);
+}
+
 static void test_both_of_two_devices(void **state)
 {
     (void)state;
@@ -773,6 +802,7 @@ int main(void)
                                        cmocka_unit_test(test_discovery),
                                        cmocka_unit_test(test_unknown_memory),
                                        cmocka_unit_test(test_one_of_two_devices),
+                                       cmocka_unit_test(test_a_device_without_a_thread),
                                        cmocka_unit_test(test_both_of_two_devices)};
     int failed = cmocka_run_group_tests(command_tests, NULL, NULL);
     return cmocka_run_group_tests(tests, set_up, tear_down) + failed;

@@ -1,9 +1,9 @@
 // A job: a scheduler, and a worker for each device or machine.
-#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/render/renderer_state.h"
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
     Renderer *renderer;
@@ -11,6 +11,7 @@ typedef struct {
     Scheduler *scheduler;
     size_t number;
     pthread_t thread;
+    bool has_thread;
 } Worker;
 
 static BandRows worker_take(void *context, uint32_t rows_max, uint32_t step)
@@ -44,10 +45,14 @@ static void *worker_run(void *argument)
     return NULL;
 }
 
+// Without a thread the device counts as failed.
 static void thread_start(Worker *worker)
 {
-    if (pthread_create(&worker->thread, NULL, worker_run, worker) != 0)
-        fault("cannot start a thread for %s%s", worker->renderer->compute->device->name, fault_limits());
+    int error = pthread_create(&worker->thread, NULL, worker_run, worker);
+    worker->has_thread = error == 0;
+    if (worker->has_thread) return;
+    compute_fail(worker->renderer->compute, "pthread_create", CL_OUT_OF_HOST_MEMORY, "%s", strerror(error));
+    scheduler_drop(worker->scheduler, worker->number);
 }
 
 bool render_job_run(const RenderJob *job)
@@ -73,7 +78,7 @@ bool render_job_run(const RenderJob *job)
     else
         worker_run(&workers[0]);
     for (size_t i = first_thread; i < count; i++)
-        pthread_join(workers[i].thread, NULL);
+        if (workers[i].has_thread) pthread_join(workers[i].thread, NULL);
     free(workers);
     WorkerShare *shares = memory_allocate_zeroed(count + remote_count, sizeof *shares);
     bool whole = scheduler_close(scheduler, shares);
