@@ -229,6 +229,13 @@ static void test_intervals(void **state)
     assert_true(fabs(log(eighteen.low) + 0.07) < 1e-12 && fabs(log(eighteen.high) - 0.07) < 1e-12);
     assert_true(eighteen.verdict == VERDICT_UNDECIDED);
     series_free(&ratios);
+    // of 5000, 2^-5000 underflows: the 2401st from each end, since twice the probability of at most 2400
+    // heads is 0.00488 and of 2401 is 0.00533
+    for (int i = 0; i < 5000; i++)
+        series_add(&ratios, 1e-4 * (i + 1));
+    Comparison many = comparison_of_pairs(&ratios, 0, 1, 1.02);
+    assert_true(fabs(log(many.low) - 0.2401) < 1e-12 && fabs(log(many.high) - 0.26) < 1e-12);
+    series_free(&ratios);
 }
 
 int main(void)

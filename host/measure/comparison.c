@@ -24,27 +24,25 @@ typedef struct {
     double low, high;
 } Interval;
 
-// Twice the probability that at most `most` of `count` fair coins show heads.
-static double two_sided_tail(size_t count, size_t most)
+// The probability that `heads` of `count` fair coins show heads: by logarithms, since 2^-count may underflow.
+static double heads_probability(size_t count, size_t heads)
 {
-    double term = exp2(-(double)count), sum = term;
-    for (size_t i = 0; i < most; i++) {
-        term *= (double)(count - i) / (double)(i + 1);
-        sum += term;
-    }
-    return 2 * sum;
+    const double n = (double)count, k = (double)heads;
+    return exp(lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1) - n * log(2));
 }
 
 // Misses the median with a probability of at most `error`.
 static Interval median_interval(const Series *values, double error)
 {
     const size_t count = values->count;
-    if (count == 0 || two_sided_tail(count, 0) > error) return (Interval){-INFINITY, INFINITY};
-    size_t trimmed = 0;
-    while (two_sided_tail(count, trimmed + 1) <= error)
-        trimmed++;
+    size_t end = 0; // how many values from either end of the sorted ones the median may lie beyond
+    for (double missed = 0; 2 * end < count; end++) {
+        missed += 2 * heads_probability(count, end);
+        if (missed > error) break;
+    }
+    if (end == 0) return (Interval){-INFINITY, INFINITY};
     Series sorted = series_sorted(values);
-    Interval interval = {sorted.items[trimmed], sorted.items[count - 1 - trimmed]};
+    Interval interval = {sorted.items[end - 1], sorted.items[count - end]};
     series_free(&sorted);
     return interval;
 }
@@ -74,7 +72,7 @@ static double look_error(size_t look, size_t row_count)
 size_t comparison_pairs_at_look(size_t look, size_t row_count)
 {
     size_t first = 1;
-    while (two_sided_tail(first, 0) > look_error(0, row_count))
+    while (2 * heads_probability(first, 0) > look_error(0, row_count))
         first++;
     return first << look;
 }
