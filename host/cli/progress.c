@@ -37,18 +37,30 @@ void progress_open(Progress *progress, bool quiet)
 {
     double now = clock_seconds();
     *progress =
-        (Progress){.visible = !quiet && isatty(STDERR_FILENO), .start_seconds = now, .shown_seconds = now};
+        (Progress){.visible = !quiet && isatty(STDERR_FILENO), .opened_seconds = now, .shown_seconds = now};
     is_flag_read = 1;
+}
+
+double progress_seconds_left(Progress *progress, double fraction_done)
+{
+    static const double SECONDS_MIN = 1; // before and of the time that is extrapolated
+    double now = clock_seconds();
+    if (progress->start_fraction == 0 || now - progress->opened_seconds < SECONDS_MIN) {
+        progress->start_seconds = now;
+        progress->start_fraction = fraction_done;
+    }
+    double spent = now - progress->start_seconds, done = fraction_done - progress->start_fraction;
+    return spent < SECONDS_MIN || done <= 0 ? -1 : spent * (1 - fraction_done) / done;
 }
 
 void progress_show(Progress *progress, double fraction_done)
 {
-    double now = clock_seconds();
+    double now = clock_seconds(), left = progress_seconds_left(progress, fraction_done);
     // no progress for short renders, a few updates per second for long ones
     if (!progress->visible || now - progress->shown_seconds < 0.25) return;
     progress->shown_seconds = now;
-    double spent = now - progress->start_seconds;
-    fprintf(stderr, "\r%3.0f %%  %.0f s left \033[K", 100 * fraction_done, spent / fraction_done - spent);
+    fprintf(stderr, "\r%3.0f %% \033[K", 100 * fraction_done);
+    if (left >= 0) fprintf(stderr, " %.0f s left ", left);
     fflush(stderr);
 }
 

@@ -5,7 +5,8 @@
 
 typedef struct {
     bool visible;
-    double start_seconds, shown_seconds;
+    double opened_seconds, shown_seconds;
+    double start_seconds, start_fraction; // from where on the time is extrapolated
 } Progress;
 
 // Lets SIGINT, SIGTERM and SIGHUP end the process with EXIT_INTERRUPTED, but for those that its parent
@@ -13,7 +14,9 @@ typedef struct {
 void progress_catch_signals(void);
 // From here on the signals set a flag; the third ends the process.
 void progress_open(Progress *progress, bool quiet);
-// `fraction_done`: above 0, at most 1; the remaining time is extrapolated from it.
+// The remaining time, extrapolated from the fraction that is done, above 0 and at most 1; negative: not known
+// yet. What is done in the first second does not count: a kernel's build, or a checkpoint's bands.
+double progress_seconds_left(Progress *progress, double fraction_done);
 void progress_show(Progress *progress, double fraction_done);
 void progress_close(Progress *progress); // erases the line; signals still only set the flag
 bool progress_interrupted(void);

@@ -185,23 +185,16 @@ typedef struct {
     Progress *progress;
     MessageList *messages;
     const RenderSettings *settings;
-    double first_fraction, first_seconds; // after the first band
     bool is_quiet, is_estimated;
 } BandContext;
 
-// Says once what a long render takes, by the second band: the first one's time includes the kernel's build.
+// Says once what a long render takes.
 static void estimate_print(BandContext *take, double fraction_done)
 {
     enum { SECONDS_MIN = 60, MINUTE = 60, HOUR = 3600 };
-    double now = clock_seconds();
     if (take->is_quiet || take->is_estimated) return;
-    if (take->first_fraction == 0) {
-        take->first_fraction = fraction_done;
-        take->first_seconds = now;
-        return;
-    }
-    take->is_estimated = true;
-    double left = (now - take->first_seconds) * (1 - fraction_done) / (fraction_done - take->first_fraction);
+    double left = progress_seconds_left(take->progress, fraction_done);
+    take->is_estimated = left >= 0;
     if (left < SECONDS_MIN) return;
     bool in_hours = left >= 2 * HOUR;
     fprintf(stderr, "glint: %u x %u pixels: about %.0f %s and %.3g MB\n", take->settings->region_width,
