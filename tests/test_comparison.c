@@ -86,7 +86,7 @@ static Verdict against_simulate(Machine machine, double slowdown, double toleran
             series_free(&times[0]);
             series_free(&times[1]);
         }
-        comparison = comparison_of_pairs(&ratios, look, ROWS, tolerance);
+        comparison = comparison_of_pairs(comparison, &ratios, look, ROWS, tolerance);
     }
     series_free(&ratios);
     return comparison.verdict;
@@ -215,25 +215,26 @@ static void test_intervals(void **state)
     Series ratios = {0};
     for (int i = 0; i < 8; i++)
         series_add(&ratios, 0.01 * (i + 1));
-    Comparison few = comparison_of_pairs(&ratios, 0, 1, 1.02);
+    Comparison few = comparison_of_pairs((Comparison){0}, &ratios, 0, 1, 1.02);
     assert_true(few.low == 0 && few.high == INFINITY && few.verdict == VERDICT_UNDECIDED);
     series_add(&ratios, 5); // one outlier of nine is an end
-    Comparison nine = comparison_of_pairs(&ratios, 0, 1, 1.02);
+    Comparison nine = comparison_of_pairs((Comparison){0}, &ratios, 0, 1, 1.02);
     assert_true(fabs(log(nine.ratio) - 0.05) < 1e-12 && fabs(log(nine.low) - 0.01) < 1e-12);
     assert_true(fabs(log(nine.high) - 5) < 1e-12 && nine.verdict == VERDICT_SLOWER);
-    assert_true(comparison_of_pairs(&ratios, 0, 1, 200).verdict == VERDICT_SAME);
+    assert_true(comparison_of_pairs((Comparison){0}, &ratios, 0, 1, 200).verdict == VERDICT_SAME);
     // of 18, 2 (1 + 18 + 153) / 2^18 <= 0.01 / 4: the third from each end, but not the fourth
     for (int i = 0; i < 9; i++)
         series_add(&ratios, -0.01 * (i + 1));
-    Comparison eighteen = comparison_of_pairs(&ratios, 1, 1, 1.02);
+    Comparison eighteen = comparison_of_pairs((Comparison){0}, &ratios, 1, 1, 1.02);
     assert_true(fabs(log(eighteen.low) + 0.07) < 1e-12 && fabs(log(eighteen.high) - 0.07) < 1e-12);
     assert_true(eighteen.verdict == VERDICT_UNDECIDED);
+    assert_int_equal(comparison_of_pairs(nine, &ratios, 1, 1, 1.02).verdict, VERDICT_SLOWER);
     series_free(&ratios);
     // of 5000, 2^-5000 underflows: the 2401st from each end, since twice the probability of at most 2400
     // heads is 0.00488 and of 2401 is 0.00533
     for (int i = 0; i < 5000; i++)
         series_add(&ratios, 1e-4 * (i + 1));
-    Comparison many = comparison_of_pairs(&ratios, 0, 1, 1.02);
+    Comparison many = comparison_of_pairs((Comparison){0}, &ratios, 0, 1, 1.02);
     assert_true(fabs(log(many.low) - 0.2401) < 1e-12 && fabs(log(many.high) - 0.26) < 1e-12);
     series_free(&ratios);
 }

@@ -77,8 +77,10 @@ size_t comparison_pairs_at_look(size_t look, size_t row_count)
     return first << look;
 }
 
-Comparison comparison_of_pairs(const Series *log_ratios, size_t look, size_t row_count, double tolerance)
+Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, size_t look, size_t row_count,
+                               double tolerance)
 {
+    if (earlier.verdict != VERDICT_UNDECIDED) return earlier;
     return comparison_judge(series_summarize(log_ratios).median,
                             median_interval(log_ratios, look_error(look, row_count)), tolerance);
 }

@@ -33,8 +33,10 @@ extern const double comparison_confidence;
 // Pairs are added until every row has a verdict, and are looked at only at fixed counts: each look has half
 // the error probability of the one before it, so that the sum over all looks stays within the confidence.
 size_t comparison_pairs_at_look(size_t look, size_t row_count);
-// At that look, of the ratios' logarithms: one for each pair of processes, whose order alternates.
-Comparison comparison_of_pairs(const Series *log_ratios, size_t look, size_t row_count, double tolerance);
+// At that look, of the ratios' logarithms: one for each pair of processes, whose order alternates. A verdict
+// of the look before, `earlier`, stays: its interval holds together with those of all looks.
+Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, size_t look, size_t row_count,
+                               double tolerance);
 
 // The logarithm of new over old time of one pair: the median over its rounds, in each of which both ran.
 double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds);
