@@ -123,6 +123,8 @@ for line in worker.stdout:
         self.refuses("bench - --against ./other", "not from '-'")
         self.refuses(f"{command} ./other --compare report", "exclude")
         self.refuses(f"{command} ./other --device none-such", "none-such")
+        write("other", "#!/bin/sh\nkill -INT $PPID\necho 'glint: interrupted' >&2\nexit 130\n")
+        self.assertEqual(self.glint(f"{command} ./other", status=130).stderr, "glint: interrupted\n")
         write("other", f"#!/bin/sh\nexec {PROGRAM} \"$@\" --device none-such\n")
         self.refuses(f"{command} ./other", "no OpenCL device matches|none-such")
 

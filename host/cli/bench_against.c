@@ -55,7 +55,8 @@ typedef struct {
 
 static const char not_available[] = "not available on this device";
 
-// Ends the worker. Returns its exit status; where that is not 0, its messages are printed.
+// Ends the worker. Returns its exit status; where that is not 0, its messages are printed, unless the user
+// interrupted, which all processes were told.
 static int worker_close(Worker *worker)
 {
     if (worker->requests) fclose(worker->requests);
@@ -71,7 +72,7 @@ static int worker_close(Worker *worker)
     if (worker->errors) {
         char line[512];
         rewind(worker->errors);
-        while (status != EXIT_DONE && fgets(line, sizeof line, worker->errors))
+        while (status != EXIT_DONE && !progress_interrupted() && fgets(line, sizeof line, worker->errors))
             fputs(line, stderr);
         fclose(worker->errors);
     }
