@@ -78,6 +78,23 @@ static void infinite_cone_resize(Object *object, double size)
     object->as.cone.slope = 0.5;
 }
 
+// Flat, and seen from beyond its tip.
+static void flat_cone_resize(Object *object, double size)
+{
+    object->as.cone.from = (Vector3){0.1, 0, 0.1};
+    object->as.cone.axis = (Vector3){size, -2 * size, size / 2};
+    object->as.cone.radius[0] = 0;
+    object->as.cone.radius[1] = 7 * size;
+}
+
+// The eye is above its plane, and both ends are rounded to one point if it is large.
+static void plate_resize(Object *object, double size)
+{
+    object->as.cylinder.from = (Vector3){1.5 * size, size / 2, 0};
+    object->as.cylinder.axis = (Vector3){0x1p-8, -3 * 0x1p-8, 0x1p-9};
+    object->as.cylinder.radius = 3 * size;
+}
+
 static void paraboloid_resize(Object *object, double size)
 {
     object->as.paraboloid.apex = (Vector3){0.1, -2 * size, -size};
@@ -127,7 +144,7 @@ static void check_sizes(VerifyRun *run, const SizedShape *shape)
         scene.camera = verify_camera(eye, is_ground ? ahead : whole.center,
                                      is_ground ? 100 : atan(size / eye.y) * (150 / M_PI));
         const double band = eye.y + (shape->is_flat ? size : sqrt(2 * eye.y * size));
-        Film image = verify_render(run, &scene, false, 64, 64);
+        Film image = verify_render(run, &scene, false, 32, 32);
         for (size_t pixel = 0; pixel < film_pixel_count(&image); pixel++)
             check_pixel(run, object, band, is_ground, &image, pixel);
         film_free(&image);
@@ -169,7 +186,9 @@ void verify_revolution_sizes(VerifyRun *run)
         {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [3, 0, 4], radius: 1}\n", tilted_cylinder_resize,
          false},
         {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", end_resize, true},
+        {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", plate_resize, true},
         {LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [3, 0, 4], radius: [1, 2]}\n", cone_resize, false},
+        {LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [0, -1, 0], radius: [0, 1]}\n", flat_cone_resize, true},
         {LIGHT_ABOVE "cone: {apex: [0, 0, 0], axis: [1, 0, 0], angle: 1}\n", infinite_cone_resize, false},
     };
     check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);

@@ -70,13 +70,13 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     }
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
     if (!lanes_any(hit)) return hit;
+    if (has_eye_power(disc->id)) return hit & disc_contains(disc, ray, *t) & (*t > ray->tmin);
     real radius = (real)(disc->center_radius.w);
     // nearly in the plane n . d hardly determines t, but the crossing is no farther from the center than the
     // rim
     real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
     real half_chord = radius * real_sqrt(ray->inverse_squared);
     *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
-    if (has_eye_power(disc->id)) return hit & disc_contains(disc, ray, *t) & (*t > ray->tmin);
     real scaled_radius = radius * crossing.along;
     return hit & (vector_dot(crossing.across, crossing.across) <= scaled_radius * scaled_radius) &
            (*t > ray->tmin);

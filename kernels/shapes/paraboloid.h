@@ -61,7 +61,7 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(squared_axis, off)).high;
     if (has_power) {
         real exact = pair_subtract(pair_multiply(half_b, half_b), pair_multiply(squared_q, power)).high;
-        mask near_side = fabs(c) < (real)(0x1p-3f) * squared_m.high;
+        mask near_side = fabs(c) < (real)(0.5f) * squared_m.high;
         discriminant = lanes_select(near_side, exact, discriminant);
     }
 

@@ -354,10 +354,10 @@ static inline SurfacePoint revolution_side_point(const Revolution *shape, bool s
         position = vector_fma(radial, radius - axis_distance, p);
     }
     return surface_point_make(vector_add(position, base), normal,
-                              vector_norm1(p) + vector_norm1(base) + radius);
+                              vector_norm1(p) + vector_norm1(base) + fabs(radius));
 }
 
-// Likewise of the cap next to p.
+// Likewise of the cap next to p, whose height is the ends' own.
 static inline SurfacePoint revolution_cap_point(const Revolution *shape, Vector p, real height,
                                                 real rounding_scale)
 {
@@ -385,6 +385,9 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     if (shape->id.y & REVOLUTION_CAPPED) {
         RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
         RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
+        // by F, rounded, the point of a thin plate could seem at its other end
+        if (has_eye_power(shape->id))
+            height = vector_dot(ray_point(ray, t), vector_of(shape->axis_slope));
         SurfacePoint cap = revolution_cap_point(shape, p, height, rounding_scale);
         if (has_power) surface_point_move_to_ray(&cap, ray, t, rounding_scale);
         surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);

@@ -73,7 +73,7 @@ static inline bool has_eye_height(uint4 id)
 
 // The plain step. Each product is off by at most 2 u of its factors' lengths, u of itself, and u each for the
 // rounding of `to_plane`, from the ray's start to a vertex, and of the normal; by 4 u where the height nearly
-// vanishes.
+// vanishes, and by 5 u from the plane that the eye's height defines, as the vertex was rounded, too.
 typedef struct {
     real height, along;
     mask behind;           // the plane lies behind the ray's start
@@ -86,7 +86,8 @@ static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_p
     real normal_squared =
         (real)(triangle->a.w * triangle->a.w + triangle->b.w * triangle->b.w + triangle->c.w * triangle->c.w);
     const real quarter_squared = (real)(0x1p-4f);
-    const real error_squared = (real)(16 * UNIT_ROUNDOFF * UNIT_ROUNDOFF);
+    const scalar error = (has_eye_height(triangle->id) ? 5 : 4) * UNIT_ROUNDOFF;
+    const real error_squared = (real)(error * error);
     TrianglePlane plane;
     plane.along = vector_dot(normal, ray->direction);
     plane.height = vector_dot(normal, to_plane);

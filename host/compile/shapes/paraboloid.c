@@ -1,41 +1,42 @@
 #include "host/compile/shapes.h"
 
-// How a paraboloid lies around the eye: its axis' nearest point, that point's height above the apex, and how
+// A paraboloid relative to the eye: its axis' nearest point, that point's height above the apex, and how
 // far the eye is from the unbounded side, to first order, and below the end.
 typedef struct {
     Quad3 foot;
     Quad lift, outside, below_end;
-} ParaboloidAround;
+} ParaboloidFromEye;
 
-static ParaboloidAround paraboloid_around(Quad3 apex, Quad3 unit_axis, Quad focal_length, Quad height)
+static ParaboloidFromEye paraboloid_from_eye(Quad3 apex, Quad3 unit_axis, Quad focal_length, Quad height)
 {
-    ParaboloidAround around = {.lift = -quad3_dot(apex, unit_axis)};
-    around.foot = quad3_add(apex, quad3_scale(unit_axis, around.lift));
-    const Quad squared = quad3_dot(around.foot, around.foot);
-    around.outside = (squared - 4 * focal_length * around.lift) /
-                     (2 * quad_root(squared + 4 * focal_length * focal_length));
-    around.below_end = height - around.lift;
-    return around;
+    ParaboloidFromEye relative = {.lift = -quad3_dot(apex, unit_axis)};
+    relative.foot = quad3_add(apex, quad3_scale(unit_axis, relative.lift));
+    const Quad squared = quad3_dot(relative.foot, relative.foot);
+    relative.outside = (squared - 4 * focal_length * relative.lift) /
+                       (2 * quad_root(squared + 4 * focal_length * focal_length));
+    relative.below_end = height - relative.lift;
+    return relative;
 }
 
 // Whether rounding moves the side, or the end, by more than 2 roundings of its distance from the eye.
 static bool paraboloid_moves(const Rounding *rounding, const Object *object, const Paraboloid *stored,
-                             const ParaboloidAround *exact)
+                             const ParaboloidFromEye *exact)
 {
     const Quad3 axis = quad3(vector3_of(&stored->axis_end));
     const Quad length = quad3_length(axis), focal_length = rounded(rounding, stored->apex_k.w) / (4 * length);
-    const ParaboloidAround moved =
-        paraboloid_around(quad3(vector3_of(&stored->apex_k)), quad3_scale(axis, 1 / length), focal_length,
-                          rounded(rounding, stored->axis_end.w) / length);
+    const ParaboloidFromEye stored_from_eye =
+        paraboloid_from_eye(quad3(vector3_of(&stored->apex_k)), quad3_scale(axis, 1 / length), focal_length,
+                            rounded(rounding, stored->axis_end.w) / length);
     const double tolerance = 2 * roundoff_of(rounding), below = (double)exact->below_end;
     const double beyond = object->as.paraboloid.finite ? fmax(-below, 0) : 0;
-    if (fabs((double)(moved.outside - exact->outside)) > tolerance * hypot((double)exact->outside, beyond))
-        return true;
+    const double side = fabs((double)(stored_from_eye.outside - exact->outside));
+    if (!(side <= tolerance * hypot((double)exact->outside, beyond)))
+        return true; // nor if it is not a number
     if (!object->as.paraboloid.finite) return false;
     const double rim = 2 * sqrt(object->as.paraboloid.focal_length * object->as.paraboloid.height),
                  from_rim = (double)quad3_length(exact->foot) - rim;
     const double across = object->as.paraboloid.caps ? fmax(from_rim, 0) : from_rim;
-    return fabs((double)(moved.below_end - exact->below_end)) > tolerance * hypot(below, across);
+    return fabs((double)(stored_from_eye.below_end - exact->below_end)) > tolerance * hypot(below, across);
 }
 
 // Where rounding matters, the eye's power defines it.
@@ -44,9 +45,9 @@ static void paraboloid_take_power(Paraboloid *shape, Flattening *flattening, con
     const Rounding *rounding = &flattening->rounding;
     const Quad focal_length = object->as.paraboloid.focal_length;
     const bool finite = object->as.paraboloid.finite;
-    const ParaboloidAround exact = paraboloid_around(exact_from_eye(rounding, object->as.paraboloid.apex),
-                                                     quad3_unit(quad3(object->as.paraboloid.axis)),
-                                                     focal_length, object->as.paraboloid.height);
+    const ParaboloidFromEye exact = paraboloid_from_eye(exact_from_eye(rounding, object->as.paraboloid.apex),
+                                                        quad3_unit(quad3(object->as.paraboloid.axis)),
+                                                        focal_length, object->as.paraboloid.height);
     if (!paraboloid_moves(rounding, object, shape, &exact)) return;
     const Quad3 axis = quad3(vector3_of(&shape->axis_end));
     const Quad squared = quad3_dot(axis, axis), length = quad_root(squared);

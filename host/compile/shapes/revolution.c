@@ -30,42 +30,43 @@ static Revolution revolution_rounded(const Rounding *rounding, const RevolutionG
     };
 }
 
-// How a cylinder or cone lies around the eye: its axis' nearest point, the radius there and the slope, how
+// A cylinder or cone relative to the eye: its axis' nearest point, the radius there and the slope, how
 // far the eye is outside the unbounded side, and the heights of the ends above the eye.
 typedef struct {
     Quad3 foot;
     Quad radius, slope, outside, low, high;
-} RevolutionAround;
+} RevolutionFromEye;
 
-static RevolutionAround revolution_around(Quad3 base, Quad3 unit_axis, Quad radius, Quad slope, Quad height)
+static RevolutionFromEye revolution_from_eye(Quad3 base, Quad3 unit_axis, Quad radius, Quad slope,
+                                             Quad height)
 {
-    RevolutionAround around = {.low = quad3_dot(base, unit_axis), .slope = slope};
-    around.high = around.low + height;
-    around.foot = quad3_subtract(base, quad3_scale(unit_axis, around.low));
-    around.radius = radius - slope * around.low;
-    around.outside =
-        (quad3_length(around.foot) - quad_absolute(around.radius)) / quad_root(1 + slope * slope);
-    return around;
+    RevolutionFromEye relative = {.low = quad3_dot(base, unit_axis), .slope = slope};
+    relative.high = relative.low + height;
+    relative.foot = quad3_subtract(base, quad3_scale(unit_axis, relative.low));
+    relative.radius = radius - slope * relative.low;
+    relative.outside =
+        (quad3_length(relative.foot) - quad_absolute(relative.radius)) / quad_root(1 + slope * slope);
+    return relative;
 }
 
-static RevolutionAround revolution_around_exact(const Rounding *rounding, const RevolutionGiven *given)
+static RevolutionFromEye revolution_from_eye_exact(const Rounding *rounding, const RevolutionGiven *given)
 {
     const Quad height = given->finite ? quad3_length(quad3(given->axis)) : 0;
     const Quad slope =
         given->finite ? ((Quad)given->end_radius - given->base_radius) / height : (Quad)given->infinite_slope;
-    return revolution_around(exact_from_eye(rounding, given->from), quad3_unit(quad3(given->axis)),
-                             given->base_radius, slope, height);
+    return revolution_from_eye(exact_from_eye(rounding, given->from), quad3_unit(quad3(given->axis)),
+                               given->base_radius, slope, height);
 }
 
-// As the kernel receives it.
-static RevolutionAround revolution_around_stored(const Rounding *rounding, const Revolution *stored)
+// As the kernel receives it without a power.
+static RevolutionFromEye revolution_from_eye_stored(const Rounding *rounding, const Revolution *stored)
 {
     const Quad3 axis = quad3(vector3_of(&stored->axis_slope));
     const Quad length = quad3_length(axis);
-    return revolution_around(quad3(vector3_of(&stored->base_radius)), quad3_scale(axis, 1 / length),
-                             rounded(rounding, stored->base_radius.w) / length,
-                             rounded(rounding, stored->axis_slope.w),
-                             rounded(rounding, stored->range.x) / length);
+    return revolution_from_eye(quad3(vector3_of(&stored->base_radius)), quad3_scale(axis, 1 / length),
+                               rounded(rounding, stored->base_radius.w) / length,
+                               rounded(rounding, stored->axis_slope.w),
+                               rounded(rounding, stored->range.x) / length);
 }
 
 static double difference(Quad a, Quad b)
@@ -83,13 +84,13 @@ static bool revolution_is_far(const Rounding *rounding, const RevolutionGiven *g
     return given->finite && 2 * distance > fmax(vector_length(from), vector_length(to)) + radius;
 }
 
-// Whether rounding moves the side, or an end, by more than a rounding of its distance from the eye.
-static bool revolution_moves(const Rounding *rounding, const RevolutionGiven *given,
-                             const RevolutionAround *exact, const RevolutionAround *stored)
+// Whether rounding moves the side, or an end, by more than the tolerance times its distance from the eye, or
+// leaves no shape at all, such as one whose ends are the same point: then differences are not numbers.
+static bool revolution_moves(const RevolutionGiven *given, const RevolutionFromEye *exact,
+                             const RevolutionFromEye *stored, double tolerance)
 {
-    const double tolerance = roundoff_of(rounding);
     const double beyond = given->finite ? (double)quad_maximum(quad_maximum(exact->low, -exact->high), 0) : 0;
-    if (difference(exact->outside, stored->outside) > tolerance * hypot((double)exact->outside, beyond))
+    if (!(difference(exact->outside, stored->outside) <= tolerance * hypot((double)exact->outside, beyond)))
         return true;
     if (!given->finite) return false;
     const double off_axis = (double)quad3_length(exact->foot);
@@ -99,7 +100,7 @@ static bool revolution_moves(const Rounding *rounding, const RevolutionGiven *gi
     for (int end = 0; end < 2; end++) {
         const double from_rim = off_axis - radii[end];
         const double across = given->caps ? fmax(from_rim, 0) : from_rim;
-        if (moved[end] > tolerance * hypot(heights[end], across)) return true;
+        if (!(moved[end] <= tolerance * hypot(heights[end], across))) return true;
     }
     return false;
 }
@@ -109,9 +110,12 @@ static void revolution_take_power(Revolution *shape, Flattening *flattening, con
 {
     const Rounding *rounding = &flattening->rounding;
     if (revolution_is_far(rounding, given)) return;
-    const RevolutionAround exact = revolution_around_exact(rounding, given),
-                           stored = revolution_around_stored(rounding, shape);
-    if (!revolution_moves(rounding, given, &exact, &stored)) return;
+    const RevolutionFromEye exact = revolution_from_eye_exact(rounding, given),
+                            stored = revolution_from_eye_stored(rounding, shape);
+    // the radius at the foot is up to the slope times the distance, and displaces a flat cone's rims by its
+    // rounding
+    const double tolerance = roundoff_of(rounding) * fmax(1, fabs((double)exact.slope));
+    if (!revolution_moves(given, &exact, &stored, tolerance)) return;
     const Vector3 axis = vector_rounded(rounding, axis_scaled(given->axis));
     const Quad3 wide_axis = quad3(axis);
     const Quad squared = quad3_dot(wide_axis, wide_axis), length = quad_root(squared);
@@ -204,7 +208,7 @@ static bool revolution_bounds(const void *primitive, Bounds *bounds)
 static double revolution_largest_coordinate(const void *primitive)
 {
     const Revolution *shape = primitive;
-    return vector_largest(vector3_of(&shape->base_radius)) + shape->base_radius.w / shape->range.y;
+    return vector_largest(vector3_of(&shape->base_radius)) + fabs(shape->base_radius.w) / shape->range.y;
 }
 
 // A random axis and the two radii at its ends. Returns where it starts.
