@@ -108,7 +108,7 @@ def png_rows(path):
 class Window:
     """A running glint view; its lines of output are read as they come."""
 
-    def __init__(self, test, scene="scene.yaml", options="", preload=""):
+    def __init__(self, test, scene="scene.yaml", options="", preload="", waits=True):
         self.test, self.lines = test, queue.Queue()
         command = [PROGRAM, "view", scene, "--size", f"{WIDTH}x{HEIGHT}", "--samples", str(SAMPLES), *options.split()]
         # the libraries that SDL loads and unloads leak
@@ -123,6 +123,8 @@ class Window:
         test.addCleanup(self.kill)
         self.id = xdotool("search", "--sync", "--onlyvisible", "--pid", self.process.pid).split()[0]
         xdotool("windowfocus", "--sync", self.id, "windowmove", self.id, 0, 0)
+        if waits:
+            self.title_at_last(" sample")  # until the scene is loaded, there is no camera
 
     def read(self):
         for line in self.process.stdout:
@@ -375,7 +377,7 @@ class View(TestCase):
             with self.subTest(closes=closes):
                 Path("slow.yaml").unlink(missing_ok=True)
                 os.mkfifo("slow.yaml")
-                window = Window(self, "slow.yaml")
+                window = Window(self, "slow.yaml", waits=False)
                 window.title_at_last("preparing")
                 if closes:
                     window.key("Escape")

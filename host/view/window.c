@@ -199,7 +199,6 @@ static void arrow_turn(Window *window, double yaw, double pitch)
 
 static void camera_write(Window *window)
 {
-    if (!window->is_loaded) return;
     MessageList messages = {0};
     char *text = NULL;
     size_t size;
@@ -325,8 +324,25 @@ static void size_read(Window *window)
     window->image_changed = true;
 }
 
+// Events about a scene and its camera, which are not there until the scene is loaded.
+static bool needs_scene(const SDL_Event *event)
+{
+    switch (event->type) {
+    case SDL_MOUSEBUTTONDOWN:
+    case SDL_MOUSEMOTION:
+    case SDL_MOUSEWHEEL:
+        return true;
+    case SDL_KEYDOWN:
+        return event->key.keysym.sym != SDLK_ESCAPE && event->key.keysym.sym != SDLK_f &&
+               event->key.keysym.sym != SDLK_h;
+    default:
+        return false;
+    }
+}
+
 static void event_handle(Window *window, const SDL_Event *event)
 {
+    if (!window->is_loaded && needs_scene(event)) return;
     switch (event->type) {
     case SDL_QUIT:
         window->closes = true;
