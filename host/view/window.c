@@ -479,7 +479,10 @@ static WindowEnd events_run(Window *window)
         if (window->options->stop()) return WINDOW_STOPPED;
         if (window->drag == DRAG_LOOK) fly(window);
         work_exchange(window);
-        if (!window->is_loaded && is_refused(window)) return WINDOW_REFUSED;
+        if (!window->is_loaded && is_refused(window)) {
+            message_take(window); // it may have come since the last look, together with the refusal
+            return WINDOW_REFUSED;
+        }
         if (window->redraws || !window->texture) draw(window);
     }
     return WINDOW_CLOSED;
