@@ -367,6 +367,9 @@ class View(TestCase):
             window.key(key)
             window.line("^clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
         os.remove("fails")
+        write("scene.yaml", SCENE + "  - sphere: {center: [0, 0, 9], radius: 1, material: {image: none.png}}\n")
+        window.line("^scene.yaml:6:.*none.png")
+        window.check()  # the last scene stays
         window.key("Right")
         window.check()
         window.close()

@@ -393,18 +393,21 @@ static void refusal_publish(FrameLoop *loop)
     loop->options.notify(loop->options.notify_context);
 }
 
-// Replaces the renderer by one of the scene, where one is open: False: the scene cannot be rendered, and the
-// last one stays.
+// Replaces the renderer by one of the scene. False: the scene cannot be rendered, and the last one stays.
 static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *messages)
 {
-    if (!loop->renderer) return true;
+    if (loop->current_number == 0) return true; // no image was asked for
+    if (!loop->compute.context)
+        compute_open(&loop->compute, loop->options.device); // the device had failed
+    else if (!loop->renderer)
+        return true; // the last one cannot be rendered either
     Scene seen = *scene;
     seen.camera = loop->current.camera;
     Renderer *renderer = renderer_open(&loop->compute, &seen, &loop->settings, messages);
     if (!renderer && compute_ok(&loop->compute)) return false;
     renderers_close(loop);
     loop->renderer = renderer;
-    if (!renderer) failure_publish(loop);
+    if (!renderer) compute_close(&loop->compute); // the image, which is due, opens it again or says why not
     return true;
 }
 
