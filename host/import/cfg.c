@@ -46,8 +46,11 @@ typedef struct {
     bool has_camera;
 } CfgReader;
 
+typedef enum { BLOCK_CAMERA, BLOCK_LIGHT, BLOCK_OBJECT } BlockKind;
+
 typedef struct {
     const char *name;
+    BlockKind kind;
     const char *keys[BLOCK_KEYS_MAX]; // all required; ended by NULL
     void (*finish)(CfgReader *reader, const BlockValues *values);
 } Block;
@@ -110,12 +113,12 @@ static void cone_finish(CfgReader *reader, const BlockValues *values)
 #define OBJECT_KEYS "color", "diffuse", "specular"
 
 static const Block blocks[] = {
-    {"camera", {"position", "look_at"}, camera_finish},
-    {"light", {"position", "intensity"}, light_finish},
-    {"sphere", {"radius", "center", OBJECT_KEYS}, sphere_finish},
-    {"plane", {"position", "normal", OBJECT_KEYS}, plane_finish},
-    {"cylinder", {"radius", "center", "normal", OBJECT_KEYS}, cylinder_finish},
-    {"cone", {"angle", "center", "normal", OBJECT_KEYS}, cone_finish},
+    {"camera", BLOCK_CAMERA, {"position", "look_at"}, camera_finish},
+    {"light", BLOCK_LIGHT, {"position", "intensity"}, light_finish},
+    {"sphere", BLOCK_OBJECT, {"radius", "center", OBJECT_KEYS}, sphere_finish},
+    {"plane", BLOCK_OBJECT, {"position", "normal", OBJECT_KEYS}, plane_finish},
+    {"cylinder", BLOCK_OBJECT, {"radius", "center", "normal", OBJECT_KEYS}, cylinder_finish},
+    {"cone", BLOCK_OBJECT, {"angle", "center", "normal", OBJECT_KEYS}, cone_finish},
 };
 
 static const Key *key_find(const Block *block, Word word)
@@ -133,7 +136,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
 {
     Line *line = &reader->line;
     Word word = line_word(line);
-    if (word_is(word, "transfo") && block->finish != camera_finish && block->finish != light_finish) {
+    if (word_is(word, "transfo") && block->kind == BLOCK_OBJECT) {
         report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
         return true;
     }
@@ -250,7 +253,7 @@ static void block_open(CfgReader *reader)
     }
     line_word(line);
     line_end(line);
-    bool is_camera = block->finish == camera_finish;
+    bool is_camera = block->kind == BLOCK_CAMERA;
     if (is_camera && reader->has_camera) report_error(&reader->report, start, "a second camera");
     reader->has_camera |= is_camera;
     BlockValues values = {0};
