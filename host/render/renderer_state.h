@@ -28,7 +28,7 @@ struct Renderer {
     size_t array_sizes[FLAT_COUNT];
     cl_mem offsets; // of a pixel's samples
     size_t light_count;
-    // The one in use, and the one before: near a sphere a moving eye goes to and fro between two.
+    // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
     KernelVariant variant, other_variant;
 };
 
