@@ -1,6 +1,6 @@
 #!/bin/bash
 # The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/chaos.md). At length:
-# tools/chaos --long. A sanitized build has allocators and handlers of its own.
+# tools/chaos, and tools/chaos --long. A sanitized build has allocators and handlers of its own.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}
@@ -10,4 +10,4 @@ case $BUILD in *-sanitize)
     ;;
 esac
 unset OCL_ICD_VENDORS GLINT_DEVICE
-exec tools/chaos --glint "${GLINT:-$BUILD/glint}"
+exec tools/chaos --seconds 25 --glint "${GLINT:-$BUILD/glint}"
