@@ -117,7 +117,7 @@ for line in worker.stdout:
             self.assertGreaterEqual(len(run["frame_samples_ms"]), 50)
             self.assertEqual(len(run["frame_samples_ms"]), len(run["against_frame_samples_ms"]))
         process = self.glint(f"{command} {PROGRAM} --seconds 0.01", status=4)
-        self.assertRegex(process.stdout, "2 samples, 5 bounces: 1 pairs\n.*: too noisy to say")
+        self.assertRegex(process.stdout, "2 samples, 5 bounces: 1 pair\n.*: too noisy to say")
         self.refuses(f"{command} ./none", "cannot run './none'")
         self.refuses(f"{command} /bin/true", "does not answer")
         self.refuses("bench - --against ./other", "not from '-'")

@@ -56,7 +56,7 @@ typedef struct {
 static const char not_available[] = "not available on this device";
 
 // Ends the worker. Returns its exit status; where that is not 0, its messages are printed, unless the user
-// interrupted, which all processes were told.
+// interrupted, which every process received.
 static int worker_close(Worker *worker)
 {
     if (worker->requests) fclose(worker->requests);
@@ -287,9 +287,9 @@ static void against_print_text(const Against *against, const Device *device)
            device->driver, against->options->other, 100 * comparison_confidence);
     for (size_t i = 0; i < against->set->count; i++) {
         const BenchKey *key = &against->set->rows[i].key;
-        printf("%s, %ux%u, %s, %u lanes, BVH %s, %u samples, %u bounces: %zu pairs\n", key->scene, key->width,
+        printf("%s, %ux%u, %s, %u lanes, BVH %s, %u samples, %u bounces: %zu %s\n", key->scene, key->width,
                key->height, key->precision, key->lanes, key->bvh, key->samples, key->bounces,
-               against->ratios[i].count);
+               against->ratios[i].count, against->ratios[i].count == 1 ? "pair" : "pairs");
         comparison_print(&against->comparisons[i], stdout);
     }
 }

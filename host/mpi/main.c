@@ -137,7 +137,7 @@ static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *
 
 typedef struct {
     Request request;
-    bool wants_rows, is_told, is_done;
+    bool wants_rows, end_sent, is_done;
 } RankState;
 
 static void band_receive(Scheduler *scheduler, size_t worker, int rank)
@@ -190,9 +190,9 @@ static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, i
         state->wants_rows = false;
         return true;
     }
-    if (state->is_told || !scheduler_has_ended(scheduler)) return false;
+    if (state->end_sent || !scheduler_has_ended(scheduler)) return false;
     send_bytes(NULL, 0, rank, TAG_END);
-    state->is_told = true;
+    state->end_sent = true;
     return true;
 }
 
@@ -219,13 +219,13 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
 
 static bool has_ended(void *ended)
 {
-    bool *is_told = ended;
+    bool *end_received = ended;
     MPI_Status status;
-    if (!*is_told && has_message(0, TAG_END, &status)) {
+    if (!*end_received && has_message(0, TAG_END, &status)) {
         receive_bytes(NULL, 0, 0, TAG_END);
-        *is_told = true;
+        *end_received = true;
     }
-    return *is_told;
+    return *end_received;
 }
 
 static BandRows rows_take(void *ended, uint32_t rows_max, uint32_t step)
@@ -266,9 +266,9 @@ static void rank_render(Compute *compute, CompiledScene *compiled, const Job *jo
     MessageList messages = {0};
     Renderer *renderer =
         renderer_open_compiled(compute, compiled, job->light_count, &job->settings, &messages);
-    bool is_told = false;
+    bool end_received = false;
     const BandQueue queue = {
-        .take = rows_take, .give = band_give, .has_ended = has_ended, .context = &is_told};
+        .take = rows_take, .give = band_give, .has_ended = has_ended, .context = &end_received};
     if (renderer) renderer_work(renderer, job->aovs, &queue);
     if (messages.count > 0)
         snprintf(failure, size, "%s", messages.items[0].text);

@@ -428,7 +428,7 @@ static bool is_own_write(FrameLoop *loop)
     return same;
 }
 
-// Reads the scene, for the first time or anew. False, with a message published, where it has a mistake: the
+// Reads the scene, for the first time or again. False, with a message published, where it has a mistake: the
 // last one stays.
 static bool scene_reload(FrameLoop *loop)
 {

@@ -1,6 +1,6 @@
 // Renders what the window shows, on a thread of its own: while the camera moves coarse frames in time, at
 // rest the image in passes, until it has all samples. A new request ends the work on the last. Reads the
-// scene anew when its files change.
+// scene again when its files change.
 #pragma once
 
 #include "host/image/image.h"
@@ -72,6 +72,6 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList 
 bool frame_loop_take(FrameLoop *loop, Frame *frame);
 // Whether the scene's file has another camera than at the last call, or was read for the first time.
 bool frame_loop_take_camera(FrameLoop *loop, Camera *camera);
-// What went wrong, or was saved, since the last call; empty: what was wrong is mended. Caller frees; NULL:
+// What went wrong, or was saved, since the last call; empty: what was wrong is fixed. Caller frees; NULL:
 // nothing.
 char *frame_loop_take_message(FrameLoop *loop);

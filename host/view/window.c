@@ -441,7 +441,7 @@ static ImageSize size_fit(ImageSize size)
 }
 
 // The size is the scene's own unless another was asked for.
-static void scene_take(Window *window)
+static void scene_receive(Window *window)
 {
     ImageSize size;
     window->is_loaded = frame_loop_scene(window->frames, &size) == SCENE_LOADED;
@@ -459,7 +459,7 @@ static bool is_refused(const Window *window)
 
 static void work_exchange(Window *window)
 {
-    if (!window->is_loaded) scene_take(window);
+    if (!window->is_loaded) scene_receive(window);
     if (frame_loop_take_camera(window->frames, &window->file_camera)) {
         window->camera = window->file_camera;
         window->camera_changed = true;
