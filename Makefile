@@ -94,6 +94,9 @@ opencl_calls := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
 
 $(BUILD)/tests/test_opencl_failure: private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=pthread_create
 
+# The paces of its workers are exact.
+$(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds
+
 ladder: $(BUILD)/tools/numerics/ladder
 
 $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/random_ray.o) $(library)

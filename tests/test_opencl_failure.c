@@ -99,6 +99,20 @@ static bool call_fails(const char *call)
         return object;                                                                                       \
     }
 
+static bool first_is_tiny; // the first device has room for no scene
+
+cl_int __real_clGetDeviceInfo(cl_device_id, cl_device_info, size_t, void *, size_t *);
+cl_int __wrap_clGetDeviceInfo(cl_device_id, cl_device_info, size_t, void *, size_t *);
+cl_int __wrap_clGetDeviceInfo(cl_device_id id, cl_device_info what, size_t size, void *value, size_t *needed)
+{
+    static cl_device_id first;
+    if (call_fails("clGetDeviceInfo")) return CL_OUT_OF_RESOURCES;
+    const cl_int status = __real_clGetDeviceInfo(id, what, size, value, needed);
+    if (!first) first = id;
+    if (first_is_tiny && id == first && what == CL_DEVICE_MAX_MEM_ALLOC_SIZE) *(cl_ulong *)value = 1;
+    return status;
+}
+
 // A command whose event is requested creates one.
 #define EVENT(event) ((void)live_count++, (event))
 
@@ -112,9 +126,6 @@ STATUS(clGetPlatformInfo, (cl_platform_id id, cl_platform_info what, size_t size
        (id, what, size, value, needed))
 STATUS(clGetDeviceIDs, (cl_platform_id id, cl_device_type type, cl_uint n, cl_device_id *ids, cl_uint *count),
        (id, type, n, ids, count))
-STATUS(clGetDeviceInfo, (cl_device_id id, cl_device_info what, size_t size, void *value, size_t *needed),
-       (id, what, size, value, needed))
-
 CREATE(cl_context, clCreateContext, (const cl_context_properties *properties, cl_uint n, const cl_device_id *ids,
        ContextNotify notify, void *data, cl_int *status), (properties, n, ids, notify, data, status))
 CREATE(cl_command_queue, clCreateCommandQueue, (cl_context context, cl_device_id id,
@@ -685,7 +696,8 @@ static void assert_same_bytes(const char *one, const char *other)
     text_free(&second);
 }
 
-// One of two devices fails: a warning, and the same image. Both fail: the message and status of a device.
+// One of two devices fails, or has no room for the scene: a warning, and the same image. Both fail, or the
+// one without room is named: an error.
 static void test_several_devices(void **state)
 {
     (void)state;
@@ -693,39 +705,42 @@ static void test_several_devices(void **state)
     if (access(pocl, R_OK) != 0) skip();
     char one[] = "/tmp/glint-test-XXXXXX.npy", other[] = "/tmp/glint-test-XXXXXX.npy";
     assert_true(close(mkstemps(one, 4)) == 0 && close(mkstemps(other, 4)) == 0);
-    const char *files[] = {one, other, "/dev/null/none.npy"};
+    static const char dropped[] = "glint: warning: the other devices go on without one: ";
     const struct {
         const char *call;
         size_t index;
-        const char *expected;
+        bool first_is_tiny;
+        const char *devices, *file, *expected, *reason;
         int status;
     } runs[] = {
-        {NULL, 0, "", EXIT_DONE},
-        {"clEnqueueNDRangeKernel", 0,
-         "glint: warning: the other devices go on without one: clEnqueueNDRangeKernel: "
-         "CL_OUT_OF_RESOURCES (-5) on ",
+        {NULL, 0, false, "all", one, "", "", EXIT_DONE},
+        {"clEnqueueNDRangeKernel", 0, false, "all", other, dropped,
+         "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_DONE},
+        {"clCreateContext", 0, false, "all", other, dropped, "clCreateContext: CL_OUT_OF_RESOURCES (-5) on ",
          EXIT_DONE},
-        {"clCreateContext", 0,
-         "glint: warning: the other devices go on without one: clCreateContext: CL_OUT_OF_RESOURCES (-5) on ",
-         EXIT_DONE},
-        {"clEnqueueNDRangeKernel", EVERY_CALL,
-         "\nglint: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE}};
+        {NULL, 0, true, "all", other, dropped, "the scene needs ", EXIT_DONE},
+        {"clEnqueueNDRangeKernel", EVERY_CALL, false, "all", "/dev/null/none.npy",
+         "\nglint: ", "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE},
+        {NULL, 0, true, "0,1", "/dev/null/none.npy", "glint: error: ", "the scene needs ", EXIT_USER}};
     driver_folder = pocl;
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
-        const char *file = files[i == 0 ? 0 : i == 3 ? 2 : 1];
-        Command command = {
-            command_render,
-            {"render", "scenes/spheres16.yaml", "--size", "64x48", "--device", "all", "-o", file}};
+        Command command = {command_render,
+                           {"render", "scenes/spheres16.yaml", "--size", "64x48", "--device", runs[i].devices,
+                            "-o", runs[i].file}};
+        char expected[160];
+        snprintf(expected, sizeof expected, "%s%s", runs[i].expected, runs[i].reason);
         failing_call = runs[i].call;
         failing_index = runs[i].index;
+        first_is_tiny = runs[i].first_is_tiny;
         ChildEnd end = child_run(command_fail, &command, sizeof command);
-        if (!strstr(end.errors, runs[i].expected)) print_error("%s\n", end.errors);
-        assert_non_null(strstr(end.errors, runs[i].expected));
+        if (!strstr(end.errors, expected)) print_error("%s\n", end.errors);
+        assert_non_null(strstr(end.errors, expected));
         assert_int_equal(end.status, runs[i].status);
-        if (i == 1 || i == 2) assert_same_bytes(one, other);
+        if (runs[i].file == other) assert_same_bytes(one, other);
     }
     driver_folder = NULL;
     failing_index = 0;
+    first_is_tiny = false;
     unlink(one);
     unlink(other);
 }

@@ -20,6 +20,14 @@ typedef struct {
     bool is_right;
 } Sink;
 
+// The clock of the scheduler (the Makefile's --wrap): time passes only where a test says so.
+static atomic_uint milliseconds;
+double __wrap_clock_seconds(void);
+double __wrap_clock_seconds(void)
+{
+    return 1e-3 * milliseconds;
+}
+
 // Each value of a band is its row.
 static bool band_sink(void *context, const Film *band, double fraction_done)
 {
@@ -78,6 +86,20 @@ static void work(Scheduler *scheduler, size_t worker)
         if (!give(scheduler, worker, rows)) break;
 }
 
+// Renders the rows in their time at that pace.
+static bool give_at(Scheduler *scheduler, size_t worker, BandRows rows, unsigned rows_per_second)
+{
+    milliseconds += 1000 * rows.row_count / rows_per_second;
+    return give(scheduler, worker, rows);
+}
+
+// Each worker's first band.
+static void set_paces(Scheduler *scheduler, size_t worker_count, const unsigned *rows_per_second)
+{
+    for (size_t i = 0; i < worker_count; i++)
+        assert_true(give_at(scheduler, i, take(scheduler, i), rows_per_second[i]));
+}
+
 static void test_one_worker_gets_what_it_asks_for(void **state)
 {
     (void)state;
@@ -114,42 +136,63 @@ static void test_lower_bands_wait(void **state)
     assert_int_equal(shares[1].rows, second.row_count);
 }
 
-// Half of a worker's share of the rows that are left, in whole steps, until all are taken. No pace is known,
-// so that shares are equal.
-static void test_bands_shrink(void **state)
+// A worker may be a thousand times slower than the others.
+static void test_first_bands_are_short(void **state)
 {
     (void)state;
     Sink sink;
-    Scheduler *scheduler = start(&sink, 2);
-    static const uint32_t expected[] = {16, 12}; // of 64 and 48, then of 36 …
-    for (size_t i = 0; i < 2; i++)
-        assert_int_equal(take(scheduler, i).row_count, expected[i]);
-    scheduler_end(scheduler);
-    assert_false(scheduler_close(scheduler, NULL));
-
-    scheduler = start(&sink, 16); // less than a step each: a step
-    for (size_t i = 0; i < 16; i++)
+    Scheduler *scheduler = start(&sink, 3);
+    for (size_t i = 0; i < 3; i++)
         assert_int_equal(take(scheduler, i).row_count, STEP);
     scheduler_end(scheduler);
     assert_false(scheduler_close(scheduler, NULL));
 }
 
-// The slower worker gets less than an equal share.
+// Half of a worker's share of the rows that are left, in whole steps and at least one.
+static void test_bands_shrink(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    set_paces(scheduler, 2, (const unsigned[]){4, 4});
+    static const uint32_t expected[] = {12, 8, 8, 4, 4, 4, 4, 4, 4, 4}; // of 56, 44, 36, 28 …
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+        const BandRows rows = take(scheduler, i % 2);
+        assert_int_equal(rows.row_count, expected[i]);
+        assert_true(give_at(scheduler, i % 2, rows, 4));
+    }
+    assert_true(scheduler_close(scheduler, NULL));
+    assert_true(sink.is_right);
+}
+
 static void test_bands_follow_the_pace(void **state)
 {
     (void)state;
-    enum { MANY = 1000 };
-    Sink sink = {.is_right = true};
-    Scheduler *scheduler = scheduler_open(
-        &(SchedulerSettings){.row_count = MANY, .worker_count = 2, .sink = band_sink, .context = &sink});
-    BandRows slow = scheduler_take(scheduler, 0, 1, 1), fast = scheduler_take(scheduler, 1, 1, 1);
-    give(scheduler, 1, fast);
-    usleep(20000); // for a clear difference; any is enough
-    give(scheduler, 0, slow);
-    slow = scheduler_take(scheduler, 0, MANY, 1);
-    assert_in_range(slow.row_count, 1, (MANY - 2) / 4 - 1);
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    set_paces(scheduler, 2, (const unsigned[]){1, 4});
+    assert_int_equal(scheduler_take(scheduler, 0, ROWS, 1).row_count, 5);  // half of a fifth of 56
+    assert_int_equal(scheduler_take(scheduler, 1, ROWS, 1).row_count, 20); // half of four fifths of 51
     scheduler_end(scheduler);
     assert_false(scheduler_close(scheduler, NULL));
+}
+
+// A worker gets no rows where the other ends sooner with all that are left, unless that fails.
+static void test_the_slow_leave_the_rest(void **state)
+{
+    (void)state;
+    Sink sink;
+    Scheduler *scheduler = start(&sink, 2);
+    set_paces(scheduler, 2, (const unsigned[]){1, 100});
+    bool waits = false;
+    assert_int_equal(scheduler_try(scheduler, 0, ROWS_MAX, STEP, &waits).row_count, 0);
+    assert_true(waits);
+    const BandRows lost = take(scheduler, 1);
+    assert_int_equal(lost.row_count, ROWS_MAX);
+    scheduler_drop(scheduler, 1);
+    work(scheduler, 0);
+    assert_true(scheduler_close(scheduler, NULL));
+    assert_true(sink.is_right);
 }
 
 static void test_a_dropped_workers_rows_go_to_others(void **state)
@@ -225,11 +268,11 @@ static void test_few_bands_wait(void **state)
                                                 .worker_count = 2,
                                                 .sink = band_sink,
                                                 .context = &sink,
-                                                .waiting_bytes_max = (ROWS_MAX + 2 * STEP) * ROW_BYTES});
+                                                .waiting_bytes_max = 3 * STEP * ROW_BYTES});
         BandRows top = take(scheduler, 0);
-        assert_int_equal(top.row_count, ROWS_MAX);
-        work_a_step(scheduler, ROWS_MAX);
-        work_a_step(scheduler, ROWS_MAX + STEP);
+        assert_int_equal(top.row_count, STEP);
+        work_a_step(scheduler, STEP);
+        work_a_step(scheduler, 2 * STEP);
         bool waits = false;
         assert_int_equal(scheduler_try(scheduler, 1, STEP, STEP, &waits).row_count, 0);
         assert_true(waits);
@@ -238,7 +281,7 @@ static void test_few_bands_wait(void **state)
             work_a_step(scheduler, 0);
         } else {
             assert_true(give(scheduler, 0, top));
-            work_a_step(scheduler, ROWS_MAX + 2 * STEP);
+            work_a_step(scheduler, 3 * STEP);
         }
         work(scheduler, 1);
         assert_true(scheduler_close(scheduler, NULL));
@@ -309,8 +352,10 @@ int main(void)
     alarm(60); // a worker that waits for ever
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_one_worker_gets_what_it_asks_for),
                                        cmocka_unit_test(test_lower_bands_wait),
+                                       cmocka_unit_test(test_first_bands_are_short),
                                        cmocka_unit_test(test_bands_shrink),
                                        cmocka_unit_test(test_bands_follow_the_pace),
+                                       cmocka_unit_test(test_the_slow_leave_the_rest),
                                        cmocka_unit_test(test_a_dropped_workers_rows_go_to_others),
                                        cmocka_unit_test(test_nobody_is_left),
                                        cmocka_unit_test(test_the_sink_ends_the_render),

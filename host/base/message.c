@@ -152,3 +152,11 @@ void message_list_free(MessageList *list)
     free(list->items);
     *list = (MessageList){0};
 }
+
+void message_list_move(MessageList *to, MessageList *from)
+{
+    for (size_t i = 0; i < from->count; i++)
+        array_push(*to, from->items[i]);
+    free(from->items);
+    *from = (MessageList){0};
+}

@@ -308,8 +308,10 @@ bool devices_open(OpenDevices *open, const char *selector)
     device_list_open(&open->devices);
     MessageList messages = {0};
     const Device **devices;
-    size_t count = devices_choose(&open->devices, device_selector(selector), &devices, &messages);
+    const char *listed = device_selector(selector);
+    size_t count = devices_choose(&open->devices, listed, &devices, &messages);
     messages_print(&messages, NULL);
+    open->are_all = listed && strcasecmp(listed, "all") == 0;
     computes_open(open, devices, count);
     free(devices);
     if (count == 0) devices_abandon(open);

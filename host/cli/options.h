@@ -141,6 +141,7 @@ typedef struct {
         bool is_dropped; // it failed, and the others did its work
     } * items;
     size_t count;
+    bool are_all; // chosen by "all": those that do not suit a render can be left out
 } OpenDevices;
 
 // As device_open, for all devices of a list or of "all".
@@ -152,7 +153,7 @@ bool devices_open_one(OpenDevices *open, const char *selector, size_t number, Me
 void devices_abandon(OpenDevices *open);
 // Warns that the device failed and that the others do its work.
 void devices_drop(OpenDevices *open, size_t index);
-// Closes a device that was dropped; those after it move up.
+// Closes a device; those after it move up.
 void devices_remove(OpenDevices *open, size_t index);
 // As device_close, for all that were not dropped.
 int devices_close(OpenDevices *open, int status);

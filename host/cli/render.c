@@ -218,21 +218,41 @@ static void device_drop(void *context, size_t index)
     if (index < devices->count) devices_drop(devices, index); // else a rank, which said why
 }
 
-// Opens a renderer on each device; those that fail are removed, if others are left. False: with messages, the
-// scene or settings do not fit a device, else the device failed.
+// Says why devices do not suit the render, and that the others do their work.
+static void unfit_print(MessageList *unfit)
+{
+    for (size_t i = 0; i < unfit->count; i++)
+        if (unfit->items[i].severity == MESSAGE_ERROR)
+            fprintf(stderr, "glint: warning: the other devices go on without one: %s\n",
+                    unfit->items[i].text);
+    message_list_free(unfit);
+}
+
+// Opens a renderer on each device. If others are left, those that fail are removed, and of all devices those
+// that the scene or settings do not fit. False: with messages, these do not fit a device, else the device
+// failed.
 static bool renderers_open(Renderer **renderers, OpenDevices *devices, const Scene *scene,
                            const RenderSettings *settings, MessageList *messages)
 {
+    MessageList unfit = {0};
     for (size_t i = 0; i < devices->count;) {
-        renderers[i] = renderer_open(&devices->items[i].compute, scene, settings, messages);
-        if (renderers[i]) {
+        MessageList of_device = {0};
+        Renderer *renderer = renderer_open(&devices->items[i].compute, scene, settings, &of_device);
+        const bool fits = message_count(&of_device, MESSAGE_ERROR) == 0;
+        const bool is_dispensable = devices->count > 1 && (fits || devices->are_all);
+        message_list_move(renderer || !is_dispensable ? messages : &unfit, &of_device);
+        renderers[i] = renderer;
+        if (renderer) {
             i++;
-        } else {
-            if (messages->count > 0 || devices->count == 1) return false;
-            devices_drop(devices, i);
+        } else if (is_dispensable) {
+            if (fits) devices_drop(devices, i);
             devices_remove(devices, i);
+        } else {
+            message_list_free(&unfit);
+            return false;
         }
     }
+    unfit_print(&unfit);
     return true;
 }
 

@@ -1,5 +1,7 @@
 // Guided self-scheduling (Polychronopoulos and Kuck, 1987, "Guided Self-Scheduling", with shares by pace): a
-// worker gets at most half of its share of the rows that are left, so that the last bands are short.
+// worker gets at most half of its share of the rows that are left, so that the last bands are short. One
+// whose pace is unknown gets a step, since it may be a thousand times slower than the others; one that would
+// end after another had rendered all that is left gets nothing more.
 #include "host/render/scheduler.h"
 
 #include "host/base/array.h"
@@ -59,8 +61,8 @@ bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
     return is_whole;
 }
 
-// The part of the rest that the worker would render if all ended together. Unknown paces count as the mean of
-// the known ones.
+// The part of the rest that the worker, whose pace is known, would render if all ended together. Unknown
+// paces count as the mean of the known ones.
 static double share_of(const Scheduler *scheduler, size_t worker)
 {
     double sum = 0;
@@ -72,10 +74,8 @@ static double share_of(const Scheduler *scheduler, size_t worker)
         known += other->rows_per_second > 0;
         sum += other->rows_per_second;
     }
-    double pace = scheduler->workers[worker].rows_per_second;
-    if (known == 0) return 1 / (double)active;
     double mean = sum / (double)known;
-    return (pace > 0 ? pace : mean) / (mean * (double)active);
+    return scheduler->workers[worker].rows_per_second / (mean * (double)active);
 }
 
 static uint32_t rows_free(const Scheduler *scheduler)
@@ -103,15 +103,37 @@ static uint32_t row_limit(const Scheduler *scheduler)
            (uint32_t)(scheduler->settings.waiting_bytes_max / scheduler->row_bytes);
 }
 
-// The rows for the worker from the first that are free; none while they are too far down.
+// Seconds until the first of the others would end with all that is left; infinite while no pace is known.
+static double others_seconds(const Scheduler *scheduler, size_t worker)
+{
+    double least = INFINITY;
+    for (size_t i = 0; i < scheduler->settings.worker_count; i++) {
+        const Worker *other = &scheduler->workers[i];
+        if (i == worker || other->is_dropped || other->rows_per_second <= 0) continue;
+        const uint32_t rows = other->rows.row_count + rows_free(scheduler);
+        least = fmin(least, rows / other->rows_per_second);
+    }
+    return least;
+}
+
+// At most how many rows a worker beside others gets. The fastest always gets some.
+static uint32_t rows_fair(const Scheduler *scheduler, size_t worker, uint32_t step)
+{
+    const double pace = scheduler->workers[worker].rows_per_second, left = rows_free(scheduler);
+    if (pace <= 0) return step;
+    if (fmin(step, left) / pace > others_seconds(scheduler, worker)) return 0;
+    return (uint32_t)fmax(1, 0.5 * share_of(scheduler, worker) * left / step) * step;
+}
+
+// The rows for the worker from the first that are free; none while they are too far down, or where another
+// worker ends sooner.
 static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
 {
     const BandRows *first = &scheduler->free_rows.items[0];
     uint32_t rows = rows_max, limit = row_limit(scheduler);
     if (!is_alone(scheduler, worker)) {
-        double fair = 0.5 * share_of(scheduler, worker) * rows_free(scheduler);
-        uint32_t steps = (uint32_t)fmax(1, fair / step);
-        if (rows > steps * step) rows = steps * step;
+        const uint32_t fair = rows_fair(scheduler, worker, step);
+        if (rows > fair) rows = fair;
     }
     if (rows > first->row_count) rows = first->row_count;
     if (first->first_row > scheduler->delivered_rows && first->first_row + rows > limit) rows = 0;

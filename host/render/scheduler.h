@@ -3,7 +3,7 @@
 // dropped, and its rows go to the others.
 //
 // Bands are sized by each worker's measured pace, and shrink towards the end so that all workers end
-// together.
+// together. A worker's first band is a step.
 #pragma once
 
 #include "host/render/checkpoint.h"
@@ -42,8 +42,8 @@ Scheduler *scheduler_open(const SchedulerSettings *settings);
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares);
 
 // The next rows for the worker: at most `rows_max`, and a multiple of `step` where possible. Waits where all
-// are handed out, since a worker may yet fail, or while too many bands wait for one above them. No rows: the
-// image is complete, or the render has ended.
+// are handed out or left to a faster worker, since that may yet fail, or while too many bands wait for one
+// above them. No rows: the image is complete, or the render has ended.
 BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step);
 // The band of the rows that the worker took. False: the render has ended.
 bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band);
