@@ -97,6 +97,9 @@ $(BUILD)/tests/test_opencl_failure: private LDFLAGS += $(opencl_calls:%=-Wl,--wr
 # The paces of its workers are exact.
 $(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds
 
+# A file is removed before it is locked.
+$(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock
+
 ladder: $(BUILD)/tools/numerics/ladder
 
 $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/random_ray.o) $(library)

@@ -274,6 +274,53 @@ static void test_refusals(void **state)
     message_list_free(&messages);
 }
 
+// A symbolic link stays; the file behind it is removed, and is made by the next render.
+static void test_symbolic_links(void **state)
+{
+    (void)state;
+    char file[80];
+    snprintf(file, sizeof file, "%s-file", path);
+    unlink(path);
+    assert_int_equal(symlink(file, path), 0);
+    for (int i = 0; i < 2; i++) {
+        Checkpoint *checkpoint = open_checked();
+        append(checkpoint, 0);
+        assert_int_equal(access(file, F_OK), 0);
+        close_checked(checkpoint, true);
+        assert_int_not_equal(access(file, F_OK), 0);
+    }
+    struct stat status;
+    assert_int_equal(lstat(path, &status), 0);
+    assert_true(S_ISLNK(status.st_mode));
+    unlink(path);
+}
+
+// Another process completes its image and removes the file before this one has locked it.
+static bool file_is_removed;
+
+int __real_flock(int descriptor, int operation);
+int __wrap_flock(int descriptor, int operation);
+int __wrap_flock(int descriptor, int operation)
+{
+    if (file_is_removed) unlink(path);
+    file_is_removed = false;
+    return __real_flock(descriptor, operation);
+}
+
+static void test_a_file_removed_before_the_lock(void **state)
+{
+    (void)state;
+    unlink(path);
+    file_is_removed = true;
+    Checkpoint *checkpoint = open_checked();
+    assert_false(file_is_removed);
+    append(checkpoint, 0);
+    close_checked(checkpoint, false);
+    checkpoint = open_checked();
+    assert_int_equal(band_count(checkpoint), 1);
+    close_checked(checkpoint, true);
+}
+
 typedef struct {
     uint32_t rows, rendered;
     bool is_right;
@@ -351,6 +398,8 @@ int main(void)
                                        cmocka_unit_test(test_wrong_bytes),
                                        cmocka_unit_test(test_other_sizes),
                                        cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_symbolic_links),
+                                       cmocka_unit_test(test_a_file_removed_before_the_lock),
                                        cmocka_unit_test(test_a_render_goes_on)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -6,6 +6,7 @@ import random
 import resource
 import struct
 import subprocess
+import time
 from pathlib import Path
 
 from glint import IS_LONG, PROGRAM, SPHERE, TestCase, find_icd, has_device, main, skip_all, write
@@ -15,8 +16,13 @@ POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
 TWO = POCL | {"POCL_DEVICES": "pthread pthread"}
 ROWS = 256
 RENDER = f"render sphere.yaml --size 64x{ROWS} --samples 100 --precision strict --quiet"
+ROW_BYTES = 64 * 3 * 4
 BYTES_MAX = 120 << 10  # a file of at most that has no whole checkpoint, but the first band
 KILLS = 200 if IS_LONG else 6
+
+
+def size(path):
+    return os.stat(path).st_size if os.path.exists(path) else 0
 
 
 class Checkpoints(TestCase):
@@ -110,12 +116,15 @@ class Checkpoints(TestCase):
         kills = renders = 0
         while kills < KILLS:
             process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
-            try:
-                status = process.wait(moments.uniform(0, 0.5))
-            except subprocess.TimeoutExpired:
+            # somewhere between what is saved and a little more than the whole, and at any moment of a band
+            least = moments.uniform(size("saved"), 1.1 * ROWS * ROW_BYTES)
+            while process.poll() is None and size("saved") < least:
+                time.sleep(0.001)
+            time.sleep(moments.choice((0, moments.uniform(0, 0.02))))
+            if process.poll() is None:
                 process.kill()
                 kills += 1
-                status = process.wait()
+            status = process.wait()
             if status == 0:
                 self.assertSameBytes("image.npy", "whole.npy")
                 os.remove("image.npy")

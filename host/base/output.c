@@ -1,6 +1,7 @@
 #include "host/base/output.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 
 #include <dirent.h>
@@ -79,24 +80,14 @@ bool output_is_temporary(const char *file_name, const char *name)
     return file_name[length + strspn(file_name + length, "0123456789")] == '\0';
 }
 
-// Whether this process holds the lock; false if it lost it to one that removes stale temporaries.
-static bool temporary_lock(int descriptor)
-{
-    struct stat status;
-    // a file system without locks has no stale temporaries removed
-    if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) return errno != EWOULDBLOCK;
-    return fstat(descriptor, &status) == 0 && status.st_nlink > 0;
-}
-
 void output_remove_stale(int folder, const char *file_name)
 {
-    struct stat opened, named;
+    struct stat opened;
     int descriptor = openat(folder, file_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0) return;
     // its process may have removed or renamed it meanwhile, and another may use the name again
     if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && fstat(descriptor, &opened) == 0 &&
-        fstatat(folder, file_name, &named, AT_SYMLINK_NOFOLLOW) == 0 && named.st_dev == opened.st_dev &&
-        named.st_ino == opened.st_ino && S_ISREG(named.st_mode) && named.st_uid == geteuid())
+        S_ISREG(opened.st_mode) && opened.st_uid == geteuid() && file_has_name(descriptor, folder, file_name))
         unlinkat(folder, file_name, 0);
     close(descriptor);
 }
@@ -124,7 +115,8 @@ static int named_open(OutputFile *output, mode_t mode)
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
         int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-        if (descriptor >= 0 && temporary_lock(descriptor)) {
+        // not locked: lost to a process that removes stale temporaries
+        if (descriptor >= 0 && file_lock(descriptor) == FILE_LOCKED) {
             output->temporary = name;
             pending_add(output->folder, name);
             return descriptor;
@@ -207,7 +199,6 @@ static bool output_open_beside(OutputFile *output, mode_t created, const mode_t 
     return output_failed(output, "create", messages);
 }
 
-// Opens the target's folder. One that may be written but not listed cannot be synced.
 static bool folder_open(OutputFile *output)
 {
     char *slash = strrchr(output->target, '/');
@@ -216,13 +207,8 @@ static bool folder_open(OutputFile *output)
         errno = ENOENT;
         return false;
     }
-    char *folder = slash ? strndup(output->target, (size_t)(slash + 1 - output->target)) : strdup(".");
-    if (!folder) fault("out of memory: file name");
-    output->folder = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (output->folder < 0 && errno == EACCES)
-        output->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
+    output->folder = file_folder_open(output->target);
     output->has_folder = output->folder >= 0;
-    free(folder);
     return output->has_folder;
 }
 
@@ -289,12 +275,6 @@ bool output_write(OutputFile *output, const void *bytes, size_t size, MessageLis
     return false;
 }
 
-// False where a write failed; not every file system can sync every file.
-static bool sync_done(int descriptor)
-{
-    return fsync(descriptor) == 0 || errno == EINVAL || errno == ENOSYS || errno == EBADF;
-}
-
 bool output_finish(OutputFile *output, MessageList *messages)
 {
     FILE *file = output->file;
@@ -303,7 +283,7 @@ bool output_finish(OutputFile *output, MessageList *messages)
     errno = EIO; // if an earlier write failed, its error is lost
     if (fflush(file) != 0 || ferror(file)) return output_failed(output, "write", messages);
     bool needs_sync = output->has_folder && !output->is_private;
-    if (needs_sync && !sync_done(fileno(file))) return output_failed(output, "write", messages);
+    if (needs_sync && !file_sync(fileno(file))) return output_failed(output, "write", messages);
     return true;
 }
 
@@ -320,7 +300,7 @@ bool output_commit(OutputFile *output, MessageList *messages)
                 output->temporary = NULL;
             }
         }
-        if (!is_named || (!output->is_private && !sync_done(output->folder)))
+        if (!is_named || (!output->is_private && !file_sync(output->folder)))
             return output_failed(output, "write", messages);
     }
     FILE *file = output->file;

@@ -5,6 +5,7 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -12,7 +13,6 @@
 #include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -291,18 +291,43 @@ static bool header_check(Checkpoint *checkpoint, const char *key, MessageList *m
     return false;
 }
 
-// So that a new file's name outlives a power failure; not every file system can sync a folder.
-static void folder_sync(const char *path)
+// The name of the open file itself where the checkpoint's is that of a symbolic link; NULL: it has none.
+static char *file_name(const Checkpoint *checkpoint)
 {
-    const char *slash = strrchr(path, '/');
-    char *folder = slash ? strndup(path, (size_t)(slash + 1 - path)) : memory_copy_text(".");
-    if (!folder) fault("out of memory: file name");
-    int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor >= 0) {
-        fsync(descriptor);
-        close(descriptor);
+    char *name = realpath(checkpoint->path, NULL);
+    if (name && file_has_name(checkpoint->descriptor, AT_FDCWD, name)) return name;
+    free(name);
+    return NULL;
+}
+
+// So that a new file's name outlives a power failure; not every file system can sync a folder.
+static void folder_sync(const Checkpoint *checkpoint)
+{
+    char *name = file_name(checkpoint);
+    int folder = file_folder_open(name ? name : checkpoint->path);
+    if (folder >= 0) {
+        file_sync(folder);
+        close(folder);
     }
-    free(folder);
+    free(name);
+}
+
+// Opens and locks the file. A process that completed its image may remove it between the two.
+static bool file_open(Checkpoint *checkpoint, MessageList *messages)
+{
+    enum { TRIES_MAX = 100 };
+    for (int i = 0; i < TRIES_MAX; i++) {
+        checkpoint->descriptor = open(checkpoint->path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
+        if (checkpoint->descriptor < 0) return open_failed(checkpoint->path, "open", messages);
+        FileLock lock = file_lock(checkpoint->descriptor);
+        if (lock == FILE_LOCKED) return true;
+        if (lock == FILE_BUSY) break;
+        close(checkpoint->descriptor);
+        checkpoint->descriptor = -1;
+    }
+    message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is in use by another process",
+                checkpoint->path);
+    return false;
 }
 
 Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages)
@@ -311,17 +336,11 @@ Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader 
     checkpoint->path = memory_copy_text(path);
     checkpoint->film = *film;
     if (pthread_mutex_init(&checkpoint->mutex, NULL) != 0) fault("out of memory: mutex");
-    checkpoint->descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
-    bool is_open = checkpoint->descriptor >= 0 || open_failed(path, "open", messages);
-    if (is_open && flock(checkpoint->descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-        message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is in use by another process", path);
-        is_open = false;
-    }
-    is_open = is_open && header_check(checkpoint, key, messages);
+    bool is_open = file_open(checkpoint, messages) && header_check(checkpoint, key, messages);
     checkpoint->end = (off_t)(sizeof(FileHeader) + strlen(key));
     if (is_open && !records_find(checkpoint)) is_open = open_failed(path, "read", messages);
     if (is_open) {
-        folder_sync(path);
+        folder_sync(checkpoint);
         return checkpoint;
     }
     checkpoint_close(checkpoint, false, messages);
@@ -400,10 +419,9 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
 // Unless another file has the name now, such as the image itself.
 static void file_remove(const Checkpoint *checkpoint)
 {
-    struct stat own, named;
-    if (fstat(checkpoint->descriptor, &own) == 0 && lstat(checkpoint->path, &named) == 0 &&
-        own.st_dev == named.st_dev && own.st_ino == named.st_ino)
-        unlink(checkpoint->path);
+    char *name = file_name(checkpoint);
+    if (name) unlink(name);
+    free(name);
 }
 
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages)
