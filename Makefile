@@ -208,6 +208,7 @@ data := $(DESTDIR)$(PREFIX)/share
 
 install: all
 	install -D $(BUILD)/glint $(DESTDIR)$(PREFIX)/bin/glint
+	if [ -e $(BUILD)/glint-mpi ]; then install $(BUILD)/glint-mpi $(DESTDIR)$(PREFIX)/bin/glint-mpi; fi
 	install -D -m 644 docs/glint.1 $(data)/man/man1/glint.1
 	install -D -m 644 tools/completions/glint.bash $(data)/bash-completion/completions/glint
 	install -D -m 644 tools/completions/glint.zsh $(data)/zsh/site-functions/_glint
@@ -221,7 +222,7 @@ install: all
 	install -m 644 docs/*.md docs/*.png docs/*.gif $(data)/doc/glint/docs
 
 uninstall:
-	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
+	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(DESTDIR)$(PREFIX)/bin/glint-mpi $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
 	    $(data)/zsh/site-functions/_glint $(data)/fish/vendor_completions.d/glint.fish
 	rm -rf $(data)/glint $(data)/doc/glint
 

@@ -1,24 +1,57 @@
 #!/usr/bin/env -S python3 -B
 """glint-mpi: the image of several ranks has the bytes of one process's; errors of any rank end the job with a message; a killed
-rank ends it, and its checkpoint goes on.
+rank ends it, and its checkpoint goes on. A rank whose device fails, or that sends nonsense, is left out.
 
 run_tests: sanitize-long-only"""
 import json
 import os
-import random
 import shlex
 import shutil
+import signal
 import subprocess
-import unittest
+import time
 from pathlib import Path
 
-from glint import IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, has_device, main, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, has_device, main, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
 BUILD = os.environ.get("BUILD", "build")
 RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
+
+
+# What a rank does wrong: its device fails, or is slow for so many microseconds, or what it sends with the tag FAULT_TAG has a wrong word.
+FAULTS = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <mpi.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void *f, unsigned g, void *h, void *i)
+{
+    if (!getenv("FAULT_USEC")) return -5;
+    usleep(atoi(getenv("FAULT_USEC")));
+    return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
+}
+int MPI_Send(const void *bytes, int size, MPI_Datatype type, int rank, int tag, MPI_Comm ranks)
+{
+    const char *fault_tag = getenv("FAULT_TAG");
+    unsigned words[64];
+    if (!fault_tag || tag != atoi(fault_tag) || size > (int)sizeof words) return PMPI_Send(bytes, size, type, rank, tag, ranks);
+    memcpy(words, bytes, size);
+    words[atoi(getenv("FAULT_WORD"))] = strtoul(getenv("FAULT_VALUE"), NULL, 0);
+    return PMPI_Send(words, size - atoi(getenv("FAULT_CUT")), type, rank, tag, ranks);
+}
+"""
+TAKE, BAND = 0, 2  # tags
+FAULTY = [  # tag, word, its value, bytes cut off the end
+    (TAKE, 1, 0, 0), (TAKE, 0, 8, 4), (BAND, 1, 1, 0), (BAND, 6, 0xFF, 0), (BAND, 0, 64, 8),
+]
+if IS_LONG:
+    FAULTY += [(TAKE, 0, 0, 0), (BAND, 0, 65, 0), (BAND, 2, 0xFFFFFFFF, 0), (BAND, 4, 8, 0)]
+SLOW = {"FAULT_USEC": 200000}  # so that the other rank gets rows
 
 
 def environment():
@@ -64,21 +97,82 @@ class Mpi(TestCase):
         process = self.mpirun(f"-n 1 {RANKS} {RENDER} : -n 1 -x OCL_ICD_VENDORS=/none {RANKS} {RENDER}", 1)
         self.assertRegex(process.stderr, "rank 1 on .*: no OpenCL device")
 
+    def faults_build(self):
+        flags = subprocess.run(["pkg-config", "--cflags", "ompi-c"], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
+        subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "faults.so", *flags], input=FAULTS, text=True, check=True)
+        self.glint(f"{RENDER} -o one.npy", env=POCL)
+
+    def mpirun_faulty(self, *faults, status=0):
+        """Each rank is faulty as its variables say; None: it is not."""
+        parts = []
+        for fault in faults:
+            shim = "" if fault is None else f"-x LD_PRELOAD=./faults.so {' '.join(f'-x {name}={value}' for name, value in fault.items())}"
+            parts.append(f"-n 1 {shim} {RANKS} {RENDER} -o ranks.npy")
+        process = self.mpirun(" : ".join(parts), status)
+        if status == 0:
+            self.assertSameBytes("one.npy", "ranks.npy")
+            os.remove("ranks.npy")
+        self.assertFalse(os.path.exists("ranks.npy"))
+        return process.stderr
+
+    def test_failing_devices(self):
+        """The others render the rows of a rank whose device fails; with none left the job ends with 2."""
+        self.faults_build()
+        self.assertRegex(self.mpirun_faulty(SLOW, {}), "warning: rank 1 on .*: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
+        self.assertRegex(self.mpirun_faulty({}, None), "warning: the other devices go on without one: clEnqueueNDRangeKernel")
+        self.assertRegex(self.mpirun_faulty({}, {}, status=2), "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
+
+    def test_nonsense(self):
+        """Nothing that a rank sends is believed."""
+        self.faults_build()
+        for tag, word, value, cut in FAULTY:
+            fault = {"FAULT_TAG": tag, "FAULT_WORD": word, "FAULT_VALUE": value, "FAULT_CUT": cut, "FAULT_USEC": 0}
+            self.assertRegex(self.mpirun_faulty(SLOW, fault), "warning: rank 1 on .*: it sent what is not a band")
+
+    def start(self, command, *options):
+        """A job with a checkpoint; returns when that has another band, or the job is done."""
+        size = lambda: os.stat("saved").st_size if os.path.exists("saved") else 0
+        before = max(size(), 4096)
+        process = subprocess.Popen(["mpirun", "-n", "3", RANKS, *command.split(), "-o", "ranks.npy", "--checkpoint", "saved", *options],
+                                   env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                   text=True)
+        while process.poll() is None and size() <= before:
+            time.sleep(0.001)
+        return process
+
+    def ranks_of(self, process):
+        """The process of each rank."""
+        ranks = {}
+        for children in Path(f"/proc/{process.pid}/task").glob("*/children"):
+            for child in children.read_text(encoding="utf-8").split():
+                variables = Path(f"/proc/{child}/environ").read_text(encoding="utf-8").split("\0")
+                ranks |= {int(text.split("=")[1]): int(child) for text in variables if text.startswith("OMPI_COMM_WORLD_RANK=")}
+        return ranks
+
+    def test_interrupts(self):
+        """Of mpirun, which then exits with a status of its own, and of the first rank alone."""
+        command = f"{RENDER.replace('20', '100000')} --precision strict"
+        for interrupted, signal_number, status in ("mpirun", signal.SIGINT, None), ("rank", signal.SIGTERM, 130):
+            process = self.start(command)
+            self.assertIsNone(process.poll(), "it was done before the interrupt")
+            os.kill(process.pid if interrupted == "mpirun" else self.ranks_of(process)[0], signal_number)
+            _, errors = process.communicate(timeout=60)
+            self.assertRegex(errors, "glint: interrupted: no image was written")
+            self.assertRegex(errors, "run the same command again to continue; finished bands are in 'saved'")
+            self.assertNotEqual(process.returncode, 0)
+            if status:
+                self.assertEqual(process.returncode, status)
+            self.assertGreater(os.stat("saved").st_size, 4096)
+            self.assertFalse(os.path.exists("ranks.npy"))
+
     def test_a_killed_rank(self):
-        command = f"{RENDER.replace('20', '20000')} --precision strict"
+        command = f"{RENDER.replace('20', '5000')} --precision strict"
         self.glint(f"{command} -o one.npy", env=POCL)
-        moments = random.Random(1)
-        for kill in range(3):
-            process = subprocess.Popen(["mpirun", "-n", "3", RANKS, *command.split(), "-o", "ranks.npy", "--checkpoint", "saved"],
-                                       env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                       stderr=subprocess.DEVNULL)
-            try:
-                process.wait(moments.uniform(0.5, 1.5))
-            except subprocess.TimeoutExpired:
-                ranks = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text(encoding="utf-8").split()
-                if ranks:
-                    os.kill(int(ranks[kill % len(ranks)]), 9)
-            process.wait(120)
+        for rank in range(3):
+            process = self.start(command)
+            if process.poll() is None:
+                os.kill(self.ranks_of(process)[rank], 9)
+            process.communicate(timeout=120)
         self.mpirun(f"-n 3 {RANKS} {command} -o ranks.npy --checkpoint saved")
         self.assertSameBytes("one.npy", "ranks.npy")
         self.assertFalse(os.path.exists("saved"))

@@ -14,6 +14,7 @@ typedef struct Ranks {
     size_t count; // without the first, which is this process
     Rank *items;
     WorkerShare *shares;
+    FilmHeader film; // of the image, once it is rendered
     // Sends all of them what they need to render. False with a message.
     bool (*begin)(struct Ranks *ranks, const Scene *scene, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);

@@ -300,6 +300,7 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
                            .messages = messages,
                            .settings = settings,
                            .is_quiet = options->quiet};
+    if (ranks) ranks->film = renderer_film_header(renderers[0], options->output.aovs);
     const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,
                                   .serve = ranks ? ranks->serve : NULL,
                                   .shares = ranks ? ranks->shares : NULL,

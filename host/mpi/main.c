@@ -93,6 +93,14 @@ static MPI_Comm ranks_of_lanes(int rank, uint32_t own, uint32_t lanes)
 
 // The first rank's side.
 
+static Rank rank_of_message(const Rank *received)
+{
+    Rank rank = *received;
+    rank.device[sizeof rank.device - 1] = rank.driver[sizeof rank.driver - 1] = '\0';
+    rank.host[sizeof rank.host - 1] = rank.failure[sizeof rank.failure - 1] = '\0';
+    return rank;
+}
+
 static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *settings, unsigned aovs,
                         const char *device_selector, MessageList *messages)
 {
@@ -107,7 +115,8 @@ static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *
     broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
     Rank *all = memory_allocate_zeroed(ranks->count + 1, sizeof *all);
     MPI_Gather(MPI_IN_PLACE, 0, MPI_BYTE, all, sizeof *all, MPI_BYTE, 0, MPI_COMM_WORLD);
-    memcpy(ranks->items, all + 1, ranks->count * sizeof *all);
+    for (size_t i = 0; i < ranks->count; i++)
+        ranks->items[i] = rank_of_message(&all[i + 1]);
     free(all);
     bool go_on = true;
     for (size_t i = 0; i < ranks->count; i++) {
@@ -137,19 +146,57 @@ static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *
 
 typedef struct {
     Request request;
-    bool wants_rows, end_sent, is_done;
+    BandRows rows; // handed out, and not received yet
+    bool wants_rows, end_sent, is_rejected, is_done;
 } RankState;
 
-static void band_receive(Scheduler *scheduler, size_t worker, int rank)
+// Receives the message of a status, which must have that size; else discards it and returns false.
+static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
+{
+    int count;
+    MPI_Get_count(status, MPI_BYTE, &count);
+    const bool fits = (size_t)count == size;
+    void *discarded = fits ? NULL : memory_allocate((size_t)count + 1, 1);
+    MPI_Recv(fits ? bytes : discarded, count, MPI_BYTE, status->MPI_SOURCE, status->MPI_TAG, MPI_COMM_WORLD,
+             MPI_STATUS_IGNORE);
+    free(discarded);
+    return fits;
+}
+
+static bool request_receive(RankState *state, const MPI_Status *status)
+{
+    state->wants_rows = true;
+    return receive_checked(&state->request, sizeof state->request, status) && state->request.rows_max > 0 &&
+           state->request.step > 0;
+}
+
+// False: it is not the band of the rows that the rank was given.
+static bool band_receive(const Ranks *ranks, RankState *state, Scheduler *scheduler, size_t worker,
+                         const MPI_Status *status)
 {
     FilmHeader header;
-    receive_bytes(&header, sizeof header, rank, TAG_BAND);
+    if (!receive_checked(&header, sizeof header, status) || !film_header_fits(&header, &ranks->film) ||
+        header.first_row != state->rows.first_row || header.row_count != state->rows.row_count)
+        return false;
     Film band = film_of_header(&header);
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (band.layers[layer])
-            receive_bytes(band.layers[layer], film_layer_size(&band, layer), rank, TAG_LAYERS);
-    scheduler_give(scheduler, worker, &band);
+    bool is_whole = true;
+    for (Layer layer = 0; layer < LAYER_COUNT && is_whole; layer++) {
+        MPI_Status of_layer;
+        if (!band.layers[layer]) continue;
+        MPI_Probe(status->MPI_SOURCE, TAG_LAYERS, MPI_COMM_WORLD, &of_layer);
+        is_whole = receive_checked(band.layers[layer], film_layer_size(&band, layer), &of_layer);
+    }
+    state->rows = (BandRows){0};
+    if (is_whole) scheduler_give(scheduler, worker, &band);
     film_free(&band);
+    return is_whole;
+}
+
+// The others render the rows of a rank that cannot.
+static void rank_drop(const Ranks *ranks, Scheduler *scheduler, size_t worker, int rank, const char *why)
+{
+    fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host, why);
+    scheduler_drop(scheduler, worker);
 }
 
 static void message_receive(const Ranks *ranks, RankState *states, Scheduler *scheduler, size_t first_worker,
@@ -159,21 +206,24 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
     const size_t index = (size_t)rank - 1, worker = first_worker + index;
     RankState *state = &states[index];
     char failure[sizeof ranks->items->failure];
-    switch (status->MPI_TAG) {
-    case TAG_TAKE:
-        receive_bytes(&state->request, sizeof state->request, rank, TAG_TAKE);
-        state->wants_rows = true;
-        break;
-    case TAG_BAND:
-        band_receive(scheduler, worker, rank);
-        break;
-    default:
-        receive_bytes(failure, sizeof failure, rank, TAG_DONE);
+    bool is_right = false;
+    if (status->MPI_TAG == TAG_TAKE) {
+        is_right = request_receive(state, status);
+    } else if (status->MPI_TAG == TAG_BAND && !state->is_rejected) {
+        is_right = band_receive(ranks, state, scheduler, worker, status);
+    } else if (status->MPI_TAG == TAG_DONE) {
+        is_right = receive_checked(failure, sizeof failure, status);
+        failure[sizeof failure - 1] = '\0';
         state->is_done = true;
-        if (failure[0] == '\0') break;
-        fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[index].host, failure);
-        scheduler_drop(scheduler, worker);
+        if (is_right && failure[0] != '\0' && !state->is_rejected)
+            rank_drop(ranks, scheduler, worker, rank, failure);
+    } else {
+        receive_checked(NULL, SIZE_MAX, status);
     }
+    if (is_right || state->is_rejected) return;
+    state->is_rejected = true;
+    rank_drop(ranks, scheduler, worker, rank,
+              "it sent what is not a band of its rows; the others go on without it");
 }
 
 // Answers a rank that wants rows, and tells the others when the render has ended. False: there is nothing to
@@ -182,11 +232,13 @@ static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, i
 {
     if (state->is_done) return false;
     if (state->wants_rows) {
-        bool waits;
-        const BandRows rows =
-            scheduler_try(scheduler, worker, state->request.rows_max, state->request.step, &waits);
+        bool waits = false;
+        BandRows rows = {0};
+        if (!state->is_rejected)
+            rows = scheduler_try(scheduler, worker, state->request.rows_max, state->request.step, &waits);
         if (rows.row_count == 0 && waits) return false;
         send_bytes(&rows, sizeof rows, rank, TAG_ROWS);
+        state->rows = rows;
         state->wants_rows = false;
         return true;
     }
@@ -281,8 +333,17 @@ static void rank_render(Compute *compute, CompiledScene *compiled, const Job *jo
     renderer_close(renderer);
 }
 
+// An interrupt reaches all ranks: the first one ends the render, and the job.
+static void signals_ignore(void)
+{
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++)
+        signal(signals[i], SIG_IGN);
+}
+
 static void rank_run(int rank, size_t local_rank)
 {
+    signals_ignore();
     Job job;
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     if (!job.is_there) return;

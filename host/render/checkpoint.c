@@ -109,14 +109,8 @@ static RecordHeader record_of(const Film *band)
 // Whether the record holds rows of the image and nothing else: its sizes decide what is read into memory.
 static bool record_fits(const Checkpoint *checkpoint, const RecordHeader *record)
 {
-    const FilmHeader *film = &record->film;
-    FilmHeader expected = checkpoint->film;
-    expected.first_row = film->first_row;
-    expected.row_count = film->row_count;
-    return memcmp(film, &expected, sizeof expected) == 0 && film->row_count > 0 &&
-           film->row_count <= checkpoint->film.row_count &&
-           film->first_row <= checkpoint->film.row_count - film->row_count &&
-           record->size == film_header_size(film);
+    return film_header_fits(&record->film, &checkpoint->film) &&
+           record->size == film_header_size(&record->film);
 }
 
 // Torn: no whole record of this image is at the offset. Failed: the file cannot be read.

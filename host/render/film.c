@@ -60,6 +60,15 @@ static Film film_without_layers(const FilmHeader *header)
                   .real_size = header->real_size};
 }
 
+bool film_header_fits(const FilmHeader *band, const FilmHeader *image)
+{
+    FilmHeader expected = *image;
+    expected.first_row = band->first_row;
+    expected.row_count = band->row_count;
+    return memcmp(band, &expected, sizeof expected) == 0 && band->row_count > 0 &&
+           band->row_count <= image->row_count && band->first_row <= image->row_count - band->row_count;
+}
+
 uint64_t film_header_size(const FilmHeader *header)
 {
     const Film film = film_without_layers(header);

@@ -77,6 +77,8 @@ size_t film_layer_size(const Film *film, Layer layer);
 size_t film_size(const Film *film);
 
 FilmHeader film_header(const Film *film);
+// Whether a header, which may come from anywhere, is that of a band of rows of the image.
+bool film_header_fits(const FilmHeader *band, const FilmHeader *image);
 // Of the layers that a header describes, in bytes.
 uint64_t film_header_size(const FilmHeader *header);
 // The film that a header describes, with layers whose values are undefined.
