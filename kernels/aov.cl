@@ -43,7 +43,7 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
 kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint light_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1};
     const HitLayers layers = {HIT_AOV_LIST(LAYER_VALUE)};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);

@@ -6,6 +6,7 @@
 
 typedef struct {
     uint first_x, first_y, width, height; // in the whole image
+    uint cell;                            // 1, or the side of the squares that have one pixel each
 } Band;
 
 typedef struct {
@@ -14,6 +15,25 @@ typedef struct {
     integer index; // of each pixel within the band
     uint width;    // of the band
 } Tile;
+
+// A hash of 15 bits; the same in both widths of integer.
+static inline integer bits_scramble(integer bits)
+{
+    bits = (bits ^ (bits >> 7)) & 0x7fff;
+    bits = (bits * 25693) & 0x7fff;
+    bits = ((bits ^ (bits >> 8)) * 11821) & 0x7fff;
+    return bits ^ (bits >> 7);
+}
+
+// Of each square of cell x cell pixels, whose corner is given, one at a place that a hash chooses: a
+// stratified sample of the image (host/measure/pilot.h).
+static inline Pixels pixels_scatter(Pixels corner, uint cell)
+{
+    integer side = (integer)((scalar_integer)cell);
+    integer across = bits_scramble(bits_scramble(corner.x) + corner.y);
+    integer down = bits_scramble(across + 23505);
+    return (Pixels){corner.x + ((across * side) >> 15), corner.y + ((down * side) >> 15)};
+}
 
 // The work-item's tile number `which`, from 0 to TILES - 1.
 static inline Tile band_tile(const Band *band, uint which)
@@ -27,8 +47,10 @@ static inline Tile band_tile(const Band *band, uint which)
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
     tile.index = y * (integer)((scalar_integer)band->width) + x;
     tile.width = band->width;
-    tile.pixels.x = x + (integer)((scalar_integer)band->first_x);
-    tile.pixels.y = y + (integer)((scalar_integer)band->first_y);
+    integer cell = (integer)((scalar_integer)band->cell);
+    tile.pixels.x = x * cell + (integer)((scalar_integer)band->first_x);
+    tile.pixels.y = y * cell + (integer)((scalar_integer)band->first_y);
+    if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
 

@@ -15,7 +15,7 @@ static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile
 kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
         if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths);

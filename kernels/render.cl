@@ -55,11 +55,11 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar *film,
                    global scalar *compensation, uint4 band_pixels, uint first_sample, uint last_sample,
-                   global uint *ray_counts)
+                   global uint *ray_counts, uint cell)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell};
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
         tiles_render(&scene, &band, first_tile, offsets, film, compensation, first_sample, last_sample);
 }

@@ -8,7 +8,7 @@ import math
 import tempfile
 from collections import namedtuple
 
-from glint import PLANET, ROOT, TestCase, main, need_device, read, run, skip_all, write
+from glint import PLANET, ROOT, TestCase, main, need_device, png_read, read, run, skip_all, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
 MISS = 0xFFFFFFFF
@@ -267,6 +267,32 @@ class Accuracy(TestCase):
         self.assertEqual(expected_judgement(scene)["picks"], [{"variant": pick["variant"]} for pick in scene["picks"]])
         for wrong in ["", "0", "-1", "1e-3,", "nan", "1;2", ",".join(["1"] * 17)]:
             self.refuses(f"accuracy {SPHERES} {SMALL} --budget={wrong}", "--budget")
+
+    def test_max_error(self):
+        """The budget is kept, by the reported choice; image and report name it."""
+        for budget, only in ("0.5", None), ("0.2:flip", None), ("1e-3:max", None), ("1e-9", "double"), ("1e-5:flip", "double"):
+            limit, _, metric = budget.partition(":")
+            with self.subTest(budget):
+                report = self.json(f"render {SPHERES} --size 96x64 --bounces 16 --aov color --max-error {budget} --timing=json --quiet -o chosen.png")
+                pilot, chosen = report["pilot"], report["precision"]
+                candidates = {candidate["precision"]: candidate for candidate in pilot["candidates"]}
+                self.assertTrue(candidates[chosen]["keeps"])
+                self.assertIn(only, (None, chosen))
+                self.assertEqual((pilot["limit"], pilot["metric"], pilot["pixels"]), (float(limit), metric or "rmse", 32 * 21))
+                texts = png_read("chosen.png")[2]
+                self.assertEqual(texts["Precision"], chosen)
+                self.assertEqual(texts["Budget"], f"{float(limit):g} {pilot['metric']}")
+                self.assertTrue(texts["Pilot"].startswith(f"{chosen}: "))
+                reference, image = np.load(f"{self.saved}/1-spheres16-reference.color.npy"), np.load("chosen.color.npy")
+                error = {"rmse": np.sqrt(np.mean((image - reference) ** 2)), "max": np.abs(image - reference).max(),
+                         "flip": flip(*(srgb_encode(np.clip(light, 0, 1)) for light in (reference, image)))[1]}[pilot["metric"]]
+                self.assertLessEqual(error, float(limit))
+
+    def test_max_error_refused(self):
+        for wrong in "", "0", "-1", "nan", "inf", "0.1x", "0.1:", "0.1:psnr":
+            self.refuses(f"render {SPHERES} --max-error={wrong}", "--max-error")
+        for other in "precision", "checkpoint":
+            self.refuses(f"render {SPHERES} --max-error 0.1 --{other} strict", other)
 
     def test_scene_beyond_single(self):
         write("planet.yaml", PLANET)

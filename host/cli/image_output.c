@@ -128,6 +128,13 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     NOTE_EACH("Device", "%s", report->device->name);
     NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
     NOTE("Precision", "%s", precision_names[settings->precision]);
+    if (output->options->pilot) {
+        const Pilot *pilot = output->options->pilot;
+        NOTE("Budget", "%g %s", pilot->budget.limit, error_metric_names[pilot->budget.metric]);
+        text_free(&value);
+        pilot_describe(&value, pilot);
+        notes_add(notes, "Pilot", text_c(&value));
+    }
     NOTE_EACH("Lanes", "%u", report->lanes);
     NOTE("Samples", "%u", settings->sample_count);
     NOTE("Bounces", "%u", settings->bounce_count);

@@ -3,6 +3,7 @@
 
 #include "host/cli/ranks.h"
 #include "host/image/image.h"
+#include "host/measure/pilot.h"
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
@@ -11,7 +12,8 @@ typedef struct {
     unsigned aovs; // color: the linear values
     Transfer transfer;
     unsigned bits;
-    bool synchronous; // a band is encoded before the next one is rendered: neither takes the other's time
+    const Pilot *pilot; // that chose the precision, or NULL
+    bool synchronous;   // a band is encoded before the next one is rendered: neither takes the other's time
 } ImageOutputOptions;
 
 typedef struct ImageOutput ImageOutput;

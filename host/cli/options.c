@@ -58,6 +58,24 @@ bool option_size(const char *option, const char *value, uint32_t *width, uint32_
     return true;
 }
 
+bool option_error_budget(const char *option, const char *value, ErrorBudget *budget)
+{
+    char *end;
+    *budget = (ErrorBudget){.limit = strtod(value, &end)};
+    if (end == value || !(budget->limit > 0 && isfinite(budget->limit)) || (*end != ':' && *end != '\0')) {
+        fprintf(stderr,
+                "glint: --%s: expected a number above 0, perhaps with a metric, such as 0.01:flip, "
+                "not \"%s\"\n",
+                option, value);
+        return false;
+    }
+    unsigned metric = ERROR_RMSE;
+    if (*end == ':' && !option_choice(option, end + 1, error_metric_names, ERROR_METRIC_COUNT, &metric))
+        return false;
+    budget->metric = (ErrorMetric)metric;
+    return true;
+}
+
 bool option_max_pixels(const char *value)
 {
     uint32_t largest;
@@ -141,6 +159,7 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     case OPTION_PRECISION:
         *valid = option_choice("precision", value, precision_names, PRECISION_COUNT, &choice);
         common->precision = (Precision)choice;
+        common->has_precision = true;
         return true;
     case OPTION_LANES:
         *valid = option_choice("lanes", value, lanes_choice_names, LANES_CHOICE_COUNT, &choice);

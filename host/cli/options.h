@@ -1,6 +1,7 @@
 // Shared by the commands: reading option values, opening the device, loading the scene.
 #pragma once
 
+#include "host/measure/error_budget.h"
 #include "host/opencl/compute.h"
 #include "host/render/renderer.h"
 #include "host/scene/scene.h"
@@ -12,7 +13,8 @@
 typedef struct {
     const char *device;
     Precision precision;
-    uint32_t lanes; // 0: the device's default
+    bool has_precision; // given
+    uint32_t lanes;     // 0: the device's default
     BvhChoice bvh;
     bool no_cache, lenient;
     uint32_t perturb_seed, perturb_scale; // 0: not given
@@ -91,6 +93,8 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // WxH
 bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
                    unsigned *result);
+// E or E:METRIC; without a metric the RMSE.
+bool option_error_budget(const char *option, const char *value, ErrorBudget *budget);
 bool option_max_pixels(const char *value); // and sets the limit
 // Comma-separated names; the result has one bit per name.
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,

@@ -20,6 +20,7 @@ enum {
     OPTION_SAMPLES,
     OPTION_REGION,
     OPTION_AOV,
+    OPTION_MAX_ERROR,
     OPTION_TIMING,
     OPTION_TRANSFER,
     OPTION_BITS,
@@ -34,6 +35,7 @@ static const struct option long_options[] = {
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"region", required_argument, NULL, OPTION_REGION},
     {"aov", required_argument, NULL, OPTION_AOV},
+    {"max-error", required_argument, NULL, OPTION_MAX_ERROR},
     {"timing", optional_argument, NULL, OPTION_TIMING},
     {"transfer", required_argument, NULL, OPTION_TRANSFER},
     {"bits", required_argument, NULL, OPTION_BITS},
@@ -56,7 +58,11 @@ static const char help_text[] =
     "      --region X,Y,W,H  render these pixels of the image only\n"
     "      --aov LIST        more files beside the image, IMAGE.NAME.npy for each NAME of the list:\n" //
     LAYER_LIST(
-        HELP_LAYER) "      --timing[=json]   report the time of every stage and launch\n"
+        HELP_LAYER) "      --max-error E[:METRIC]\n"
+                    "                        choose the fastest precision that keeps this error in linear "
+                    "light; the metric is\n"
+                    "                        rmse, max or flip (default: rmse)\n"
+                    "      --timing[=json]   report the time of every stage and launch\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
                     "      --checkpoint FILE\n"
@@ -73,6 +79,7 @@ typedef struct {
     uint32_t sample_count, bounce_count;
     uint32_t region[4]; // x, y, width, height
     bool has_region, has_transfer, quiet;
+    ErrorBudget budget; // limit 0: none
     TimingStyle timing;
 } RenderOptions;
 
@@ -113,6 +120,8 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         return region_read(value, options->region);
     case OPTION_AOV:
         return option_set("aov", value, layer_names, LAYER_COUNT, &options->output.aovs);
+    case OPTION_MAX_ERROR:
+        return option_error_budget("max-error", value, &options->budget);
     case OPTION_TIMING:
         return timing_style_read(value, &options->timing);
     case OPTION_TRANSFER:
@@ -149,6 +158,12 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
     if (!option_only_scene("render", argument_count, arguments)) return EXIT_USER;
+    if (options->budget.limit > 0 && options->common.has_precision)
+        return option_usage_fault("render", "--max-error chooses the precision: leave out --precision");
+    if (options->budget.limit > 0 && options->checkpoint)
+        return option_usage_fault("render",
+                                  "--max-error may choose otherwise when a checkpoint is continued: "
+                                  "name its choice with --precision");
     options->scene = arguments[optind];
     return OPTIONS_READ;
 }
@@ -335,11 +350,38 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     return status;
 }
 
+// The precision that --max-error asks for, into the settings.
+static int precision_choose(Pilot *pilot, const RenderOptions *options, RenderSettings *settings,
+                            const Scene *scene, Compute *compute)
+{
+    MessageList messages = {0};
+    Progress progress;
+    progress_open(&progress, true); // for the interrupts
+    const bool chosen = pilot_run(pilot, &options->budget, compute, scene, settings, &messages);
+    progress_close(&progress);
+    const bool is_unfit = messages.count > 0;
+    messages_print(&messages, NULL);
+    if (!chosen) return is_unfit ? EXIT_USER : progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
+    settings->precision = pilot->chosen;
+    if (options->quiet) return EXIT_DONE;
+    Text line = {0};
+    pilot_describe(&line, pilot);
+    fprintf(stderr, "glint: --max-error: %s\n", text_c(&line));
+    text_free(&line);
+    return EXIT_DONE;
+}
+
 static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices *devices, Ranks *ranks,
                         HostTimes *times)
 {
     RenderSettings settings;
+    Pilot pilot;
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
+    if (options->budget.limit > 0) {
+        const int status = precision_choose(&pilot, options, &settings, scene, &devices->items[0].compute);
+        if (status != EXIT_DONE) return status;
+        times->pilot = options->output.pilot = &pilot;
+    }
     if (!options->has_transfer)
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
     options->output.synchronous = options->timing != TIMING_NONE;

@@ -90,6 +90,25 @@ static void device_print(const RenderReport *report)
     launches_print("read-back", report->reads.items, report->reads.count);
 }
 
+static void pilot_print(const Pilot *pilot)
+{
+    Text line = {0};
+    pilot_describe(&line, pilot);
+    line_print("pilot", pilot->seconds, text_c(&line));
+    text_free(&line);
+    line_print("  builds", pilot->build_seconds, "");
+    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+        const PilotCandidate *candidate = &pilot->candidates[i];
+        if (candidate->status != PILOT_MEASURED) continue;
+        fprintf(stderr, "    %-9s %9.3g ns a pixel", precision_names[i], 1e9 * candidate->pixel_seconds);
+        if (i != PRECISION_DOUBLE)
+            fprintf(stderr, ", %s %.2g in the sample; bound %.2g: %s",
+                    error_metric_names[pilot->budget.metric], candidate->verdict.error,
+                    candidate->verdict.bound, candidate->verdict.keeps ? "kept" : "not known to be kept");
+        fputc('\n', stderr);
+    }
+}
+
 static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,
                        const RenderSettings *settings, const HostTimes *host)
 {
@@ -97,6 +116,7 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
             settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
             precision_names[settings->precision]);
     line_print("parse", host->parse_seconds, "");
+    if (host->pilot) pilot_print(host->pilot);
     for (size_t i = 0; i < count; i++) {
         const RenderReport *report = renderer_report(renderers[i]);
         fprintf(stderr, "%s, %u %s (kernel %016llx)\n", report->device->name, report->lanes,
@@ -177,6 +197,38 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_end(json);
 }
 
+static void candidate_json(Json *json, const Pilot *pilot, Precision precision)
+{
+    static const char *const statuses[] = {"untried", "measured", "unavailable"};
+    const PilotCandidate *candidate = &pilot->candidates[precision];
+    json_begin_object(json, NULL);
+    json_text(json, "precision", precision_names[precision]);
+    json_text(json, "status", statuses[candidate->status]);
+    if (candidate->status == PILOT_MEASURED) {
+        json_number(json, "error", candidate->verdict.error);
+        json_number(json, "bound", candidate->verdict.bound);
+        json_boolean(json, "keeps", candidate->verdict.keeps);
+        json_number(json, "pixel_ns", 1e9 * candidate->pixel_seconds);
+    }
+    json_end(json);
+}
+
+static void pilot_json(Json *json, const Pilot *pilot)
+{
+    json_begin_object(json, "pilot");
+    json_number(json, "limit", pilot->budget.limit);
+    json_text(json, "metric", error_metric_names[pilot->budget.metric]);
+    json_number(json, "confidence", pilot->confidence);
+    json_integer(json, "pixels", (int64_t)pilot->pixels);
+    json_number(json, "total_ms", 1e3 * pilot->seconds);
+    json_number(json, "build_ms", 1e3 * pilot->build_seconds);
+    json_begin_array(json, "candidates");
+    for (unsigned i = 0; i < PRECISION_COUNT; i++)
+        candidate_json(json, pilot, (Precision)i);
+    json_end(json);
+    json_end(json);
+}
+
 static void json_report(Renderer *const *renderers, size_t count, const Ranks *ranks,
                         const RenderSettings *settings, const HostTimes *host)
 {
@@ -187,6 +239,7 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     json_integer(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
+    if (host->pilot) pilot_json(json, host->pilot);
     json_begin_array(json, "by_device");
     for (size_t i = 0; i < count; i++)
         render_device_json(json, renderer_report(renderers[i]), settings);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/cli/ranks.h"
+#include "host/measure/pilot.h"
 
 typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON } TimingStyle;
 
@@ -9,6 +10,7 @@ bool timing_style_read(const char *value, TimingStyle *style); // value NULL: te
 
 typedef struct {
     double parse_seconds, encode_seconds;
+    const Pilot *pilot;    // that chose the precision, or NULL
     double render_seconds; // from the first band to the last, builds included
 } HostTimes;
 

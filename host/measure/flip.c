@@ -236,6 +236,12 @@ static Channel feature_strength(const Channel *gray, double (*shape)(double x, d
     return across;
 }
 
+static Triple ycc_from_display(const float color[3])
+{
+    return ycc_from_rgb((Triple){srgb_decode((double)color[0]), srgb_decode((double)color[1]),
+                                 srgb_decode((double)color[2])});
+}
+
 // An image as the eye has it.
 typedef struct {
     Channel ycc[3]; // blurred
@@ -249,9 +255,7 @@ static Seen seen_open(const float *image, uint32_t width, uint32_t height)
     for (int i = 0; i < 3; i++)
         seen.ycc[i] = channel_open(width, height);
     for (size_t i = 0; i < (size_t)width * height; i++) {
-        const float *pixel = image + 3 * i;
-        Triple ycc = ycc_from_rgb((Triple){srgb_decode((double)pixel[0]), srgb_decode((double)pixel[1]),
-                                           srgb_decode((double)pixel[2])});
+        Triple ycc = ycc_from_display(image + 3 * i);
         seen.ycc[0].values[i] = (float)ycc.x;
         seen.ycc[1].values[i] = (float)ycc.y;
         seen.ycc[2].values[i] = (float)ycc.z;
@@ -278,11 +282,16 @@ static double clipped(double value)
     return fmax(0, fmin(value, 1));
 }
 
-static Triple seen_color(const Seen *seen, size_t i)
+static Triple seen_color(Triple ycc)
 {
-    Triple rgb = rgb_from_ycc((Triple){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
-                                       (double)seen->ycc[2].values[i]});
+    Triple rgb = rgb_from_ycc(ycc);
     return hunt_lab((Triple){clipped(rgb.x), clipped(rgb.y), clipped(rgb.z)});
+}
+
+static Triple seen_color_at(const Seen *seen, size_t i)
+{
+    return seen_color((Triple){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
+                               (double)seen->ycc[2].values[i]});
 }
 
 // The part of 0..1 up to compressed_to is for the smaller distances, the rest for those up to the largest.
@@ -293,12 +302,23 @@ static double compressed(double distance, double largest)
     return compressed_to + (distance - knee) / (largest - knee) * (1 - compressed_to);
 }
 
+// Of the colors as seen (section 4.1.3).
+static double color_difference(Triple reference, Triple test)
+{
+    double largest = color_distance(hunt_lab((Triple){0, 1, 0}), hunt_lab((Triple){0, 0, 1}));
+    return compressed(color_distance(reference, test), largest);
+}
+
+double flip_of_colors(const float reference[3], const float test[3])
+{
+    return color_difference(seen_color(ycc_from_display(reference)), seen_color(ycc_from_display(test)));
+}
+
 void flip_map(const float *reference, const float *test, uint32_t width, uint32_t height, float *map)
 {
     Seen seen = seen_open(reference, width, height), other = seen_open(test, width, height);
-    double largest = color_distance(hunt_lab((Triple){0, 1, 0}), hunt_lab((Triple){0, 0, 1}));
     for (size_t i = 0; i < (size_t)width * height; i++) {
-        double color = compressed(color_distance(seen_color(&seen, i), seen_color(&other, i)), largest);
+        double color = color_difference(seen_color_at(&seen, i), seen_color_at(&other, i));
         double edge = fabs((double)seen.edges.values[i] - (double)other.edges.values[i]);
         double point = fabs((double)seen.points.values[i] - (double)other.points.values[i]);
         double feature = pow(fmax(edge, point) / sqrt(2), feature_exponent);

@@ -11,3 +11,6 @@
 // Both images: 3 sRGB display values per pixel, each within 0..1. Fills `map` with a value within 0..1 for
 // each pixel: 0 where no difference is seen.
 void flip_map(const float *reference, const float *test, uint32_t width, uint32_t height, float *map);
+
+// Of one pixel, if both images were of one color each: 0..1.
+double flip_of_colors(const float reference[3], const float test[3]);

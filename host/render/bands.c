@@ -107,11 +107,16 @@ static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows
     return renderer_launch(renderer, kind, 2, items, group);
 }
 
+static uint32_t settings_cell(const RenderSettings *settings)
+{
+    return settings->cell > 0 ? settings->cell : 1;
+}
+
 static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint argument, BandRows rows)
 {
     const RenderSettings *settings = &renderer->settings;
-    cl_uint4 band = {
-        {settings->region_x, settings->region_y + rows.first_row, settings->region_width, rows.row_count}};
+    const uint32_t first_y = settings->region_y + rows.first_row * settings_cell(settings);
+    cl_uint4 band = {{settings->region_x, first_y, settings->region_width, rows.row_count}};
     kernel_argument(renderer->compute, kernel, argument, sizeof band, &band);
 }
 
@@ -143,6 +148,8 @@ static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRo
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &buffers->ray_counts);
+    const uint32_t cell = settings_cell(&renderer->settings);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 7, sizeof cell, &cell);
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
     LaunchTime time = band_launch(renderer, KERNEL_RENDER, rows);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);

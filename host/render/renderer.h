@@ -15,8 +15,11 @@
 typedef struct {
     uint32_t width, height;                                   // of the whole image
     uint32_t region_x, region_y, region_width, region_height; // the part to render
-    uint32_t sample_count;                                    // per pixel, >= 1
-    uint32_t bounce_count;                                    // at most, per ray; 0..16
+    // Above 1: of each cell x cell pixels from region_x, region_y on, region_width x region_height squares,
+    // only one is rendered, in color without AOVs. At most 4096.
+    uint32_t cell;
+    uint32_t sample_count; // per pixel, >= 1
+    uint32_t bounce_count; // at most, per ray; 0..16
     Precision precision;
     uint32_t lanes; // rays per work-item: 1, 4, 8, 16; 0: device_lanes
     BvhChoice bvh;

@@ -3,7 +3,7 @@
 _glint_options() {
     case ${1-} in
     render) echo "-o --output --size --samples --region --device --precision --lanes --bvh --bounces --aov" \
-        "--timing --transfer --bits --no-cache --lenient --max-pixels --perturb --checkpoint" \
+        "--max-error --timing --transfer --bits --no-cache --lenient --max-pixels --perturb --checkpoint" \
         "--quiet -h --help" ;;
     view) echo "--size --samples --bounces --write-camera --device --precision --lanes --bvh --no-cache --lenient --max-pixels -h --help" ;;
     trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --max-pixels --perturb -h --help" ;;
@@ -38,7 +38,7 @@ _glint() {
     --device) words="cpu gpu all" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
-    --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance | --max-pixels) return ;;
+    --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance | --max-error | --max-pixels) return ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

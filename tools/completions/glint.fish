@@ -40,6 +40,7 @@ complete -c glint -n '__fish_seen_subcommand_from render' -l region -x -d 'Pixel
 complete -c glint -n '__fish_seen_subcommand_from view' -l write-camera -d 'C writes the camera into the scene file'
 complete -c glint -n '__fish_seen_subcommand_from render view bench accuracy' -l bounces -x -d 'Reflections and refractions at most'
 complete -c glint -n '__fish_seen_subcommand_from render' -l aov -x -a '(__glint_aovs)' -d 'More files beside the image'
+complete -c glint -n '__fish_seen_subcommand_from render' -l max-error -x -d 'Error that the precision must keep, as E or E:METRIC'
 complete -c glint -n '__fish_seen_subcommand_from render' -l timing -d 'Report the time of every stage'
 complete -c glint -n '__fish_seen_subcommand_from render' -l transfer -x -a 'srgb none' -d 'Curve to display values'
 complete -c glint -n '__fish_seen_subcommand_from render' -l bits -x -a '8 16' -d 'Bits per channel'

@@ -17,6 +17,7 @@ _glint_render() {
         '--bvh[use a BVH]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
         '--aov[more files beside the image]:names:_glint_aovs' \
+        '--max-error[error that the precision must keep]:E[\:METRIC]:' \
         '--timing=-[report the time of every stage]::form:(json)' \
         '--transfer[curve from linear light to display values]:curve:(srgb none)' \
         '--bits[bits per channel]:bits:(8 16)' \

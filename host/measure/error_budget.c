@@ -1,0 +1,118 @@
+#include "host/measure/error_budget.h"
+
+#include "host/base/memory.h"
+#include "host/image/srgb.h"
+#include "host/measure/flip.h"
+#include "host/measure/image_metrics.h"
+#include <math.h>
+#include <stdlib.h>
+
+const char *const error_metric_names[ERROR_METRIC_COUNT] = {"rmse", "max", "flip"};
+
+// FLIP blurs: one wrong pixel adds to its neighbors' values, together at most this many times what it would
+// have in an image of one color (21 times in 2000 trials on uniform, halved and random surroundings).
+static const double flip_spread = 24;
+
+// Were the mean m or more, the product of 1 + m - x over the values would be expected to be at most 1: that
+// of the factors' means is, by the means of its factors (arithmetic and geometric). So it reaches 1 / risk
+// with a probability of at most `risk` (Markov), and an m for which it does is a bound (Waudby-Smith, Ramdas:
+// Estimating means of bounded random variables by betting, JRSS B 86(1), 2024; here with one fixed bet, the
+// best one where the values are small). Of n zeros it is about -ln(risk) / n. The logarithm of the product is
+// concave in m, so that Newton's method, started below its zero, stays there.
+double mean_upper_bound(const double *values, size_t count, double risk)
+{
+    enum { STEPS_MAX = 60 };
+    const double target = -log(risk);
+    double mean = 0;
+    for (size_t i = 0; i < count; i++)
+        mean += values[i] / (double)count;
+    double bound = mean + target / (double)count;
+    for (int step = 0; step < STEPS_MAX && bound < 1; step++) {
+        double sum = -target, slope = 0;
+        for (size_t i = 0; i < count; i++) {
+            sum += log1p(bound - values[i]);
+            slope += 1 / (1 + bound - values[i]);
+        }
+        const double next = bound - sum / slope;
+        if (!(next > bound * (1 + 1e-12))) break;
+        bound = next;
+    }
+    return fmin(bound, 1);
+}
+
+static void display_color(float display[3], const double color[3], bool display_values)
+{
+    for (int i = 0; i < 3; i++) {
+        const double value = fmax(0, fmin(color[i], 1));
+        display[i] = (float)(display_values ? value : srgb_encode(value));
+    }
+}
+
+// The mean over the channels of the squared error.
+static double square_error(const double reference[3], const double test[3])
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++)
+        sum += (test[i] - reference[i]) * (test[i] - reference[i]);
+    return sum / 3;
+}
+
+static double largest_error(const double reference[3], const double test[3])
+{
+    return fmax(fabs(test[0] - reference[0]),
+                fmax(fabs(test[1] - reference[1]), fabs(test[2] - reference[2])));
+}
+
+// Of the colors of both films; not finite if one of them is not.
+static double color_range(const Film *reference, const Film *sample)
+{
+    double low = INFINITY, high = -INFINITY, sum = 0;
+    for (size_t i = 0; i < 3 * film_pixel_count(reference); i++) {
+        low = fmin(low, fmin(reference->color[i], sample->color[i]));
+        high = fmax(high, fmax(reference->color[i], sample->color[i]));
+        sum += reference->color[i] + sample->color[i]; // fmin and fmax ignore a NaN
+    }
+    return isfinite(sum) ? high - low : INFINITY;
+}
+
+// Of one pixel, within 0..1: what the bound is computed of.
+static double pixel_share(const ErrorBudget *budget, const double reference[3], const double test[3],
+                          double range, bool display_values)
+{
+    float colors[2][3];
+    switch (budget->metric) {
+    case ERROR_RMSE:
+        return range > 0 ? square_error(reference, test) / (range * range) : 0;
+    case ERROR_MAX:
+        return largest_error(reference, test) > budget->limit;
+    default:
+        display_color(colors[0], reference, display_values);
+        display_color(colors[1], test, display_values);
+        return flip_of_colors(colors[0], colors[1]);
+    }
+}
+
+SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample, double risk,
+                           bool display_values)
+{
+    const size_t count = film_pixel_count(reference);
+    const double range = color_range(reference, sample);
+    if (!isfinite(range)) return (SampleVerdict){.error = INFINITY, .bound = INFINITY};
+    double *shares = memory_allocate(count, sizeof *shares), mean = 0;
+    for (size_t i = 0; i < count; i++) {
+        shares[i] =
+            pixel_share(budget, reference->color + 3 * i, sample->color + 3 * i, range, display_values);
+        mean += shares[i] / (double)count;
+    }
+    const double bound = mean_upper_bound(shares, count, risk);
+    const ErrorSummary summary = error_summarize(reference->color, sample->color, 3 * count);
+    free(shares);
+    switch (budget->metric) {
+    case ERROR_RMSE:
+        return (SampleVerdict){summary.rmse, range * sqrt(bound), range * sqrt(bound) <= budget->limit};
+    case ERROR_MAX:
+        return (SampleVerdict){summary.largest, bound, summary.largest <= budget->limit};
+    default:
+        return (SampleVerdict){mean, flip_spread * bound, flip_spread * bound <= budget->limit};
+    }
+}

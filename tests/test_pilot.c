@@ -1,0 +1,181 @@
+// The sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it chooses.
+#include "host/measure/pilot.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 71, HEIGHT = 50, CELL = 5 };
+
+// Where in its cell of the whole image a pixel of the sample is; fails if it is none of them.
+static unsigned place_in_cell(const Film *whole, const double *color, uint32_t x, uint32_t y)
+{
+    for (uint32_t i = 0; i < CELL * CELL; i++) {
+        const size_t pixel = (size_t)(y * CELL + i / CELL) * WIDTH + x * CELL + i % CELL;
+        if (memcmp(whole->color + 3 * pixel, color, 3 * sizeof *color) == 0) return i;
+    }
+    fail_msg("the sample of cell %u,%u is no pixel of it", x, y);
+    return 0;
+}
+
+// Every cell has one, at places that differ, whatever the bands.
+static void sample_has_a_pixel_of_each_cell(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_file("scenes/globe.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.sample_count = 2;
+    Film whole = film_render(&probe_compute, &scene, &settings, 0);
+    settings.cell = CELL;
+    settings.region_width = WIDTH / CELL;
+    settings.region_height = HEIGHT / CELL;
+    Film sample = film_render(&probe_compute, &scene, &settings, 0);
+    settings.band_rows = 4;
+    Film in_bands = film_render(&probe_compute, &scene, &settings, 0);
+    film_assert_same(&in_bands, &sample, "a sample in bands");
+    unsigned counts[CELL * CELL] = {0};
+    for (uint32_t y = 0; y < sample.height; y++)
+        for (uint32_t x = 0; x < sample.width; x++)
+            counts[place_in_cell(&whole, sample.color + 3 * ((size_t)y * sample.width + x), x, y)]++;
+    for (unsigned i = 0; i < CELL * CELL; i++)
+        assert_in_range(counts[i], 0, 24); // of 140; the background's first counts for all
+    film_free(&whole);
+    film_free(&sample);
+    film_free(&in_bands);
+    scene_free(&scene);
+}
+
+static double random_unit(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) * 0x1p-53;
+}
+
+static void bound_of_zeros_and_ones(void **state)
+{
+    (void)state;
+    double values[1000] = {0};
+    assert_true(fabs(mean_upper_bound(values, 1000, 0.05) - (pow(0.05, -1e-3) - 1)) < 1e-12);
+    values[7] = 1; // (1 + m)^999 m = 20
+    const double one = mean_upper_bound(values, 1000, 0.05);
+    assert_true(fabs(pow(1 + one, 999) * one * 0.05 - 1) < 1e-6);
+    for (size_t i = 0; i < 1000; i++)
+        values[i] = 1;
+    assert_true(mean_upper_bound(values, 1000, 0.05) == 1);
+    assert_true(mean_upper_bound(values, 1, 0.05) == 1);
+}
+
+// Rare values, as wrong pixels are, of strata that differ: the bound misses the mean no more often than it
+// may, and is not idle: 400 zeros alone give 0.006.
+static void bound_covers_the_mean(void **state)
+{
+    (void)state;
+    enum { TRIALS = 2000, COUNT = 400 };
+    const double risk = 0.1;
+    uint64_t seed = 3;
+    for (int kind = 0; kind < 3; kind++) {
+        unsigned missed = 0;
+        double values[COUNT], mean = 0, bounds = 0;
+        for (size_t i = 0; i < COUNT; i++)
+            mean += (kind == 0 ? 0.005 : kind == 1 && i % 4 == 0 ? 0.02 : 0.001) / COUNT;
+        if (kind == 2) mean = 0.5;
+        for (int trial = 0; trial < TRIALS; trial++) {
+            for (size_t i = 0; i < COUNT; i++) {
+                const double share = kind == 0 ? 0.005 : kind == 1 && i % 4 == 0 ? 0.02 : 0.001;
+                values[i] = kind == 2 ? random_unit(&seed) : random_unit(&seed) < share;
+            }
+            const double bound = mean_upper_bound(values, COUNT, risk);
+            missed += bound < mean;
+            bounds += bound / TRIALS;
+        }
+        assert_true(missed <= risk * TRIALS);
+        assert_true(bounds < mean + (kind == 2 ? 0.07 : 0.03));
+    }
+}
+
+static Film film_of(const double *colors, uint32_t count)
+{
+    Film film = film_allocate(count, 1, 0, 0);
+    memcpy(film.color, colors, 3 * count * sizeof *colors);
+    return film;
+}
+
+static void verdicts_of_a_sample(void **state)
+{
+    (void)state;
+    enum { COUNT = 1000 };
+    double colors[3 * COUNT], wrong[3 * COUNT];
+    for (size_t i = 0; i < 3 * COUNT; i++)
+        wrong[i] = colors[i] = (double)(i % 5) / 2; // 0 to 2
+    const double floor_of_none = sqrt(pow(0.05, -1.0 / COUNT) - 1);
+    Film reference = film_of(colors, COUNT), equal = film_of(wrong, COUNT);
+    ErrorBudget budget = {0.2, ERROR_RMSE};
+    SampleVerdict verdict = sample_judge(&budget, &reference, &equal, 0.05, false);
+    assert_true(verdict.error == 0 && verdict.keeps);
+    assert_true(fabs(verdict.bound - 2 * floor_of_none) < 1e-9);
+    budget.limit = 0.1;
+    assert_false(sample_judge(&budget, &reference, &equal, 0.05, false).keeps);
+    budget = (ErrorBudget){1e-9, ERROR_MAX};
+    verdict = sample_judge(&budget, &reference, &equal, 0.05, false);
+    assert_true(verdict.keeps && fabs(verdict.bound - floor_of_none * floor_of_none) < 1e-9);
+    wrong[0] += 0.5;
+    Film off = film_of(wrong, COUNT);
+    verdict = sample_judge(&budget, &reference, &off, 0.05, false);
+    assert_true(!verdict.keeps && verdict.error == 0.5 && verdict.bound > 2 * floor_of_none * floor_of_none);
+    budget = (ErrorBudget){0.5, ERROR_FLIP};
+    verdict = sample_judge(&budget, &reference, &off, 0.05, false);
+    assert_true(verdict.keeps && verdict.error > 0 && verdict.error < 1e-3 && verdict.bound > 0.07);
+    off.color[5] = NAN;
+    assert_true(isinf(sample_judge(&budget, &reference, &off, 0.05, false).bound));
+    assert_false(sample_judge(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &off, 0.05, false).keeps);
+    film_free(&reference);
+    film_free(&equal);
+    film_free(&off);
+}
+
+// No sample this small proves an RMSE of 1e-6, and every precision keeps one of a thousand.
+static void pilot_chooses(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    Scene scene = scene_of_file("scenes/globe.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_FAST);
+    MessageList messages = {0};
+    Pilot pilot;
+    assert_true(
+        pilot_run(&pilot, &(ErrorBudget){1e-6, ERROR_RMSE}, &probe_compute, &scene, &settings, &messages));
+    assert_int_equal(pilot.chosen, PRECISION_DOUBLE);
+    assert_int_equal(pilot.pixels, (WIDTH / 3) * (HEIGHT / 3));
+    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+        const PilotCandidate *candidate = &pilot.candidates[i];
+        assert_int_equal(candidate->status, i == PRECISION_DOUBLE ? PILOT_MEASURED : PILOT_UNTRIED);
+        assert_true((candidate->pixel_seconds > 0) == (i == PRECISION_DOUBLE));
+        assert_true(candidate->verdict.keeps == (i == PRECISION_DOUBLE));
+    }
+    assert_true(
+        pilot_run(&pilot, &(ErrorBudget){1e3, ERROR_RMSE}, &probe_compute, &scene, &settings, &messages));
+    assert_true(pilot.candidates[pilot.chosen].verdict.keeps);
+    assert_int_equal(pilot.candidates[PRECISION_SINGLE].status, PILOT_MEASURED);
+    assert_true(pilot.candidates[PRECISION_SINGLE].verdict.error < 1e-3);
+    assert_int_equal(pilot.candidates[PRECISION_STRICT].status, PILOT_UNTRIED);
+    assert_int_equal(messages.count, 0);
+    scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sample_has_a_pixel_of_each_cell),
+        cmocka_unit_test(bound_of_zeros_and_ones),
+        cmocka_unit_test(bound_covers_the_mean),
+        cmocka_unit_test(verdicts_of_a_sample),
+        cmocka_unit_test(pilot_chooses),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
