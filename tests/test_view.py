@@ -375,7 +375,8 @@ class View(TestCase):
         window.close()
 
     def test_slow_scene(self):
-        """The window is there while the scene is read, here from a pipe; it can be closed meanwhile."""
+        """The window is there while the scene is read, here from a pipe; it can be closed meanwhile. What is saved then is seen."""
+        later = SCENE.replace("0.9, 0.8, 0.7", "1, 0, 0")
         for closes in False, True:
             with self.subTest(closes=closes):
                 Path("slow.yaml").unlink(missing_ok=True)
@@ -388,12 +389,12 @@ class View(TestCase):
                     while xdotool_finds(window.process.pid):
                         self.assertLess(time.monotonic(), end, "the window is still shown")
                 with open("slow.yaml", "w") as pipe:
-                    self.write_by_rename("slow.yaml", SCENE)  # where it is read again
+                    self.write_by_rename("slow.yaml", later)  # while the pipe is read
                     pipe.write(SCENE)
                 if closes:
                     self.assertEqual(window.process.wait(DEADLINE), 0)
                 else:
-                    window.shows_at_last(self.image_of(SCENE))
+                    window.shows_at_last(self.image_of(later))
                     window.close()
 
     @staticmethod
@@ -433,6 +434,36 @@ class View(TestCase):
             self.assertLess(time.monotonic(), end, "no help is shown")
         window.key("h")
         window.check()
+        window.close()
+
+    def test_facts(self):
+        """What a pixel sees: object, line, material, t and normal, and the tree of its rays, which follow the camera."""
+        write("scene.yaml", SCENE + """\
+  - sphere:
+      {center: [0.25, 0.5, -2], radius: 0.5, material: {reflection: 0.5, transmission: 0.25}}
+  - plane: {point: [0, -9, 0], normal: [0, 1, 0]}
+""")
+        window = Window(self)
+        window.title_at_last(" samples")
+        window.mouse(80, 60)
+        before = screen()
+        window.key("i")
+        window.line(r"^pixel 80,60: sphere 3, scene.yaml:6, t ")
+        numbers = window.line(r"^  at ([-.\d]+) ([-.\d]+) ([-.\d]+), normal ([-.\d]+) ([-.\d]+) ([-.\d]+)$").groups()
+        point, normal = [float(number) for number in numbers[:3]], [float(number) for number in numbers[3:]]
+        for axis, center in enumerate((0.25, 0.5, -2)):  # of radius 0.5
+            self.assertAlmostEqual((point[axis] - center) / 0.5, normal[axis], 3)
+        window.line(r"^  reflected, 0.5: nothing$")
+        window.line(r"^  refracted, 0.25: sphere 3, scene.yaml:6, t ")
+        window.line(r"^    reflected, 0.125: sphere 3")
+        end = time.monotonic() + DEADLINE
+        while screen() == before:
+            self.assertLess(time.monotonic(), end, "no facts are shown")
+        window.key("i")
+        window.mouse(80, 119)
+        window.key("i")
+        window.line(r"^pixel 80,119: plane 4, scene.yaml:8, t ")
+        window.key("i")
         window.close()
 
     def test_interrupt(self):

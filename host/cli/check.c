@@ -7,6 +7,7 @@
 #include "host/compile/scene_bounds.h"
 #include "host/import/load.h"
 #include "host/import/report.h"
+#include "host/scene/describe.h"
 #include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
@@ -14,18 +15,22 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { OPTION_JSON = OPTION_OWN };
+enum { OPTION_JSON = OPTION_OWN, OPTION_OBJECT };
 
 static const struct option long_options[] = {
     {"json", no_argument, NULL, OPTION_JSON},
+    {"object", required_argument, NULL, OPTION_OBJECT},
     {"lenient", no_argument, NULL, OPTION_LENIENT},
     {"help", no_argument, NULL, 'h'},
     {0},
 };
 
-static const char help_text[] = "usage: glint check SCENE [OPTIONS]\n\n"
-                                "Reports a scene's objects, lights, materials, bounds and kernel features, "
-                                "and warns of what is ignored.\n\n" //
+static const char help_text[] =
+    "usage: glint check SCENE [OPTIONS]\n\n"
+    "Reports a scene's objects, lights, materials, bounds and kernel features, "
+    "and warns of what is ignored.\n\n"
+    "      --object ID       only what object that is, and its line; IDs are those of "
+    "glint trace\n" //
     HELP_JSON HELP_LENIENT HELP_HELP;
 
 typedef struct {
@@ -158,15 +163,34 @@ static bool images_are_there(const Scene *scene, MessageList *messages)
     return report_close(&report);
 }
 
+static bool object_print(const Scene *scene, const char *path, uint32_t id)
+{
+    size_t primitive;
+    if (!scene_find_object(scene, id, &primitive)) {
+        fprintf(stderr, "glint: --object: there is no object %u; %zu is the number of IDs\n", id,
+                scene_primitive_count(scene));
+        return false;
+    }
+    Text text = {0};
+    object_describe(&text, scene, path, id);
+    printf("%s\n", text_c(&text));
+    text_free(&text);
+    return true;
+}
+
 int command_check(int argument_count, char **arguments)
 {
     SceneOptions scene_options = {0};
     bool as_json = false;
+    uint32_t object = UINT32_MAX; // UINT32_MAX: not asked for
     int option;
     while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
         switch (option) {
         case OPTION_JSON:
             as_json = true;
+            break;
+        case OPTION_OBJECT:
+            if (!option_count("object", optarg, 0, UINT32_MAX - 1, &object)) return EXIT_USER;
             break;
         case OPTION_LENIENT:
             scene_options.lenient = true;
@@ -178,6 +202,7 @@ int command_check(int argument_count, char **arguments)
         }
     }
     if (!option_only_scene("check", argument_count, arguments)) return EXIT_USER;
+    if (as_json && object != UINT32_MAX) return option_usage_fault("check", "--object and --json");
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};
@@ -187,7 +212,9 @@ int command_check(int argument_count, char **arguments)
         message_list_free(&messages);
     } else {
         messages_print(&messages, path);
-        if (loaded) {
+        if (loaded && object != UINT32_MAX) {
+            loaded = object_print(&scene, path, object);
+        } else if (loaded) {
             SceneFacts facts = facts_of(&scene);
             text_print(path, &scene, &facts);
         }

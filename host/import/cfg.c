@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
+#include "host/import/place.h"
 
 #include <string.h>
 
@@ -265,13 +266,16 @@ static void block_open(CfgReader *reader)
 
 static void blocks_read(CfgReader *reader)
 {
+    Places places = places_open(reader->report.source);
     while (!report_is_full(&reader->report) && line_next_filled(&reader->line)) {
         Word word = line_peek(&reader->line);
         if (word_opens_block(word))
             block_open(reader);
         else
             report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
+        places_note(&places, reader->scene, word.offset);
     }
+    places_close(&places);
     if (!reader->has_camera && !report_is_full(&reader->report))
         report_error(&reader->report, reader->report.source->length, "no camera: a block =>camera");
 }

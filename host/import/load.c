@@ -5,14 +5,6 @@
 #include <string.h>
 #include <strings.h>
 
-void file_names_free(FileNames *names)
-{
-    for (size_t i = 0; i < names->count; i++)
-        free(names->items[i]);
-    free(names->items);
-    *names = (FileNames){0};
-}
-
 bool scene_finish(Scene *scene, Report *report)
 {
     if (!report_close(report)) {

@@ -5,16 +5,10 @@
 #include "host/scene/scene.h"
 
 typedef struct {
-    char **items;
-    size_t count, capacity;
-} FileNames;
-
-void file_names_free(FileNames *names); // and zeroes
-
-typedef struct {
     bool lenient; // skip unknown elements of .rt with a warning
-    // Receives the meshes and images that the file names, as far as it was read; NULL: not wanted.
-    FileNames *files;
+    // Called with each mesh and image that the file names, before it is read; NULL: not wanted.
+    void (*file_named)(void *context, const char *path);
+    void *context;
 } SceneOptions;
 
 // Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff). On a mistake in the file returns

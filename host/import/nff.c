@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
+#include "host/import/place.h"
 #include "host/scene/polygon.h"
 
 #include <stdlib.h>
@@ -374,10 +375,14 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
     NffReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report)) {
         bool is_empty = true;
+        Places places = places_open(source);
         while (!report_is_full(&reader.report) && reach_word(&reader)) {
+            const size_t offset = line_peek(&reader.line).offset;
             is_empty = false;
             element_read(&reader);
+            places_note(&places, scene, offset);
         }
+        places_close(&places);
         if (is_empty)
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_view && !report_is_full(&reader.report))

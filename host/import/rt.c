@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
+#include "host/import/place.h"
 
 typedef struct {
     Report report;
@@ -305,13 +306,17 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     RtReader reader = {
         .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
+    Places places = places_open(source);
     if (line_open(&reader.line, &reader.report)) {
-        while (!report_is_full(&reader.report) && line_next(&reader.line, '#'))
+        while (!report_is_full(&reader.report) && line_next(&reader.line, '#')) {
             element_read(&reader);
+            places_note(&places, scene, reader.line.start);
+        }
         if (!reader.has_element)
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a line with C");
     }
+    places_close(&places);
     return scene_finish(scene, &reader.report);
 }

@@ -77,6 +77,7 @@ extern const char *const shape_names[SHAPE_COUNT];
 typedef struct {
     ShapeKind kind;
     uint32_t material; // index into the scene's materials
+    uint32_t line;     // of the scene's file, from 1; 0: unknown
     union {
         struct {
             Vector3 center;

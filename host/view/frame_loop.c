@@ -6,6 +6,7 @@
 #include "host/base/numbers.h"
 #include "host/base/output.h"
 #include "host/view/camera_file.h"
+#include "host/view/pixel_facts.h"
 #include "host/view/preview.h"
 #include "host/view/watch.h"
 #include <pthread.h>
@@ -31,6 +32,9 @@ struct FrameLoop {
     bool has_ready;
     Camera file_camera;
     bool has_camera;
+    uint32_t probe[2]; // a pixel
+    bool has_probe;
+    char *facts;  // of the last one
     Text written; // into the scene's file, and not yet noticed
 
     // the thread's own
@@ -183,6 +187,25 @@ static bool is_last(const Film *film, const Film *band)
     return band->first_row + band->height == film->height;
 }
 
+// Answers the question about a pixel, if there is one.
+static void probe_answer(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    const bool has_probe = loop->has_probe;
+    const uint32_t x = loop->probe[0], y = loop->probe[1];
+    loop->has_probe = false;
+    pthread_mutex_unlock(&loop->mutex);
+    if (!has_probe) return;
+    const PixelView view = {loop->renderer, &loop->scene, loop->options.scene_path, loop->current.size,
+                            loop->settings.bounce_count};
+    char *facts = pixel_facts(&view, x, y);
+    pthread_mutex_lock(&loop->mutex);
+    free(loop->facts);
+    loop->facts = facts;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
 static bool coarse_take(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
@@ -194,6 +217,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
 {
     FrameLoop *loop = context;
     film_copy_band(&loop->film, band);
+    if (!atomic_load(&first_is_due)) probe_answer(loop);
     if (!is_last(&loop->film, band)) return true;
     const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
     if (is_first && loop->current.is_moving && loop->divisor == 1)
@@ -349,15 +373,12 @@ static void image_save(FrameLoop *loop, char *path)
     free(path);
 }
 
-// The scene's file, and those that it names, also where it has a mistake: it may lie in one of them.
-static void files_watch(const FrameLoop *loop, const FileNames *named)
+// The scene's file is watched before it is read, and so are those that it names: no change is missed. They
+// stay watched where the scene has a mistake, which may lie in one of them.
+static void file_watch(void *context, const char *path)
 {
-    const char **paths = memory_allocate(1 + named->count, sizeof *paths);
-    paths[0] = loop->options.scene_path;
-    for (size_t i = 0; i < named->count; i++)
-        paths[1 + i] = named->items[i];
-    watch_set(loop->watch, paths, 1 + named->count);
-    free(paths);
+    const FrameLoop *loop = context;
+    watch_add(loop->watch, path);
 }
 
 static void files_changed(void *context)
@@ -434,13 +455,12 @@ static bool scene_reload(FrameLoop *loop)
 {
     const bool was_mistaken = loop->is_mistaken;
     MessageList messages = {0};
-    FileNames files = {0};
     SceneOptions options = loop->options.scene_options;
-    options.files = &files;
+    options.file_named = file_watch;
+    options.context = loop;
     Scene scene;
+    watch_only(loop->watch, loop->options.scene_path);
     bool loaded = scene_load(&scene, loop->options.scene_path, &options, &messages);
-    files_watch(loop, &files);
-    file_names_free(&files);
     if (loaded && !renderer_renew(loop, &scene, &messages)) {
         scene_free(&scene);
         loaded = false;
@@ -458,14 +478,14 @@ static bool scene_reload(FrameLoop *loop)
     return true;
 }
 
-typedef enum { WORK_RENDER, WORK_SAVE, WORK_RELOAD, WORK_END } Work;
+typedef enum { WORK_RENDER, WORK_SAVE, WORK_PROBE, WORK_RELOAD, WORK_END } Work;
 
 // Waits for the next work.
 static Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
 {
     pthread_mutex_lock(&loop->mutex);
     while (!loop->quits && !loop->reloads && loop->request_number == loop->current_number &&
-           !(can_save && loop->save_path))
+           !(can_save && loop->save_path) && !(loop->renderer && loop->has_probe))
         pthread_cond_wait(&loop->changed, &loop->mutex);
     Work work = WORK_SAVE;
     if (loop->quits) {
@@ -477,6 +497,8 @@ static Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
         work = WORK_RENDER;
         loop->current = loop->request;
         loop->current_number = loop->request_number;
+    } else if (loop->renderer && loop->has_probe) {
+        work = WORK_PROBE;
     } else {
         *save_path = loop->save_path;
         loop->save_path = NULL;
@@ -494,6 +516,8 @@ static void *loop_run(void *context)
     for (Work work;
          (work = work_wait(loop, is_complete && loop->current.view == VIEW_COLOR, &save_path)) != WORK_END;) {
         if (work == WORK_SAVE) image_save(loop, save_path);
+        if (work == WORK_PROBE) probe_answer(loop);
+        if (work == WORK_PROBE && !compute_ok(&loop->compute)) failure_publish(loop);
         if (work == WORK_RELOAD && !is_own_write(loop)) is_complete = !scene_reload(loop) && is_complete;
         if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete && loop->current_number > 0))
             is_complete = request_render(loop);
@@ -537,6 +561,7 @@ void frame_loop_close(FrameLoop *loop)
     frame_free(&loop->ready);
     free(loop->save_path);
     free(loop->message);
+    free(loop->facts);
     text_free(&loop->written);
     free(loop);
 }
@@ -568,6 +593,25 @@ void frame_loop_save(FrameLoop *loop, const char *path)
     loop->save_path = memory_copy_text(path);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
+}
+
+void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
+{
+    pthread_mutex_lock(&loop->mutex);
+    loop->probe[0] = x;
+    loop->probe[1] = y;
+    loop->has_probe = true;
+    pthread_cond_signal(&loop->changed);
+    pthread_mutex_unlock(&loop->mutex);
+}
+
+char *frame_loop_take_facts(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    char *facts = loop->facts;
+    loop->facts = NULL;
+    pthread_mutex_unlock(&loop->mutex);
+    return facts;
 }
 
 bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages)

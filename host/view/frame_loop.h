@@ -64,6 +64,11 @@ unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
 // Asks for the image of the last request to be saved when it is complete: its color.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
+// Asks what a pixel of the last request's image sees; pixel_facts says it.
+void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y);
+// The answer to the last question. Caller frees; NULL: none since the last call.
+char *frame_loop_take_facts(FrameLoop *loop);
+
 // Writes the camera into the scene's file, which then is not read again for that. False with messages if it
 // cannot.
 bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages);

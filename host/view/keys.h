@@ -12,6 +12,7 @@
     KEY("V", "next view: depth, normal, object, shadow, error, color")                                       \
     KEY("1 2 3 4", "precision fast, single, strict, double")                                                 \
     KEY("T", "show or hide times, device and samples")                                                       \
+    KEY("I", "show or hide what the pixel under the cursor sees; print it")                                  \
     KEY("R", "reset the camera")                                                                             \
     KEY("C", "print the camera as YAML; --write-camera: into the scene, too")                                \
     KEY("S", "save the image, once complete, as PNG; Shift S: EXR")                                          \

@@ -122,13 +122,20 @@ static void file_add(Watch *watch, const char *path)
     array_push(watch->files, file);
 }
 
+void watch_add(Watch *watch, const char *path)
+{
+    if (!watch) return;
+    pthread_mutex_lock(&watch->mutex);
+    file_add(watch, path);
+    pthread_mutex_unlock(&watch->mutex);
+}
+
 // Folders are watched until the end: what happens to their other files is ignored.
-void watch_set(Watch *watch, const char *const *paths, size_t count)
+void watch_only(Watch *watch, const char *path)
 {
     if (!watch) return;
     pthread_mutex_lock(&watch->mutex);
     files_forget(watch);
-    for (size_t i = 0; i < count; i++)
-        file_add(watch, paths[i]);
+    file_add(watch, path);
     pthread_mutex_unlock(&watch->mutex);
 }

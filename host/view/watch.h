@@ -8,5 +8,6 @@ typedef struct Watch Watch;
 // Calls `changed` on a thread of its own. NULL: the system cannot watch files.
 Watch *watch_open(void (*changed)(void *context), void *context);
 void watch_close(Watch *watch); // accepts NULL
-// Watches these files instead of those before, whether they exist or not. Accepts NULL.
-void watch_set(Watch *watch, const char *const *paths, size_t count);
+// Watches this file alone, or it, too, whether it exists or not. Accept NULL.
+void watch_only(Watch *watch, const char *path);
+void watch_add(Watch *watch, const char *path);

@@ -52,7 +52,11 @@ typedef struct {
     double pivot_at[2];
     double flown_seconds; // the moment up to which the camera has flown
 
-    char *message; // at the bottom, until the next key
+    char *message;   // at the bottom, until the next key
+    double hover[2]; // the cursor, in pixels
+    char *facts;     // of the pixel there; NULL: not shown, or not known yet
+    bool shows_facts, facts_are_due, prints_facts;
+    unsigned facts_request; // whose image they are of
     bool shows_help, shows_times, redraws, closes;
 } Window;
 
@@ -249,6 +253,37 @@ static void image_save(Window *window, const char *ending)
     text_free(&path);
 }
 
+static void facts_toggle(Window *window)
+{
+    int x, y;
+    SDL_GetMouseState(&x, &y);
+    position_set(window, window->hover, x, y);
+    window->shows_facts = window->facts_are_due = window->prints_facts = !window->shows_facts;
+    free(window->facts);
+    window->facts = NULL;
+    window->redraws = true;
+}
+
+// Asks for the facts of the pixel under the cursor, if they are shown, and takes them.
+static void facts_exchange(Window *window)
+{
+    const double *at = window->hover;
+    const bool is_inside =
+        at[0] >= 0 && at[1] >= 0 && at[0] < window->size.width && at[1] < window->size.height;
+    if (window->shows_facts && window->facts_are_due && is_inside && window->request > 0) {
+        frame_loop_probe(window->frames, (uint32_t)at[0], (uint32_t)at[1]);
+        window->facts_are_due = false;
+    }
+    char *facts = frame_loop_take_facts(window->frames);
+    if (!facts) return;
+    if (window->prints_facts) fputs(facts, stdout);
+    fflush(stdout);
+    window->prints_facts = false;
+    free(window->facts);
+    window->facts = facts;
+    window->redraws = true;
+}
+
 static void full_screen_toggle(const Window *window)
 {
     bool is_full = SDL_GetWindowFlags(window->window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
@@ -304,6 +339,9 @@ static void key_press(Window *window, const SDL_KeyboardEvent *event)
     case SDLK_t:
         window->shows_times = !window->shows_times;
         break;
+    case SDLK_i:
+        facts_toggle(window);
+        break;
     case SDLK_h:
         window->shows_help = !window->shows_help;
         break;
@@ -358,6 +396,8 @@ static void event_handle(Window *window, const SDL_Event *event)
         window->drag = DRAG_NONE;
         break;
     case SDL_MOUSEMOTION:
+        position_set(window, window->hover, event->motion.x, event->motion.y);
+        window->facts_are_due = true;
         drag_move(window, &event->motion);
         break;
     case SDL_MOUSEWHEEL:
@@ -395,6 +435,17 @@ static void help_draw(const Window *window)
     text_free(&help);
 }
 
+// The times, and what the pixel under the cursor sees.
+static void facts_draw(const Window *window)
+{
+    Text text = {0};
+    if (window->shows_times && window->frame.summary) text_appendf(&text, "%s", window->frame.summary);
+    if (window->shows_facts && window->facts)
+        text_appendf(&text, "%s%s", text.count > 0 ? "\n" : "", window->facts);
+    caption_draw(window->caption, CAPTION_TOP, text_c(&text));
+    text_free(&text);
+}
+
 static void waiting_draw(const Window *window)
 {
     Text text = {0};
@@ -411,8 +462,8 @@ static void draw(Window *window)
     if (window->texture) SDL_RenderCopy(window->target, window->texture, NULL, NULL);
     if (window->shows_help)
         help_draw(window);
-    else if (window->shows_times && window->frame.summary)
-        caption_draw(window->caption, CAPTION_TOP, window->frame.summary);
+    else
+        facts_draw(window);
     if (window->message)
         caption_draw(window->caption, CAPTION_BOTTOM, window->message);
     else if (!window->texture)
@@ -465,7 +516,12 @@ static void work_exchange(Window *window)
         window->camera_changed = true;
     }
     request_send(window);
-    if (frame_loop_take(window->frames, &window->frame)) frame_show(window);
+    if (frame_loop_take(window->frames, &window->frame)) {
+        window->facts_are_due |= window->frame.number != window->facts_request;
+        window->facts_request = window->frame.number;
+        frame_show(window);
+    }
+    facts_exchange(window);
     message_take(window);
 }
 
@@ -500,6 +556,7 @@ static void window_close(Window *window)
     if (window->frames) frame_loop_close(window->frames);
     frame_free(&window->frame);
     free(window->message);
+    free(window->facts);
     caption_close(window->caption);
     if (window->texture) SDL_DestroyTexture(window->texture);
     if (window->target) SDL_DestroyRenderer(window->target);

@@ -7,7 +7,7 @@ _glint_options() {
         "--quiet -h --help" ;;
     view) echo "--size --samples --bounces --write-camera --device --precision --lanes --bvh --no-cache --lenient --max-pixels -h --help" ;;
     trace) echo "--rays -o --output --device --precision --lanes --bvh --no-cache --lenient --max-pixels --perturb -h --help" ;;
-    check) echo "--json --lenient -h --help" ;;
+    check) echo "--json --object --lenient -h --help" ;;
     devices) echo "--json -h --help" ;;
     diff) echo "--heatmap --max-pixels --json -h --help" ;;
     bench) echo "--precision --lanes --bvh --size --seconds --launches --json --compare --against --worker" \

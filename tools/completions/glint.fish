@@ -33,6 +33,7 @@ complete -c glint -n '__fish_seen_subcommand_from render view trace diff bench a
 complete -c glint -n '__fish_seen_subcommand_from cache' -l clear -d 'Remove all programs'
 complete -c glint -n '__fish_seen_subcommand_from verify' -l lean -d 'Build small kernels, for a slow compiler'
 complete -c glint -n '__fish_seen_subcommand_from check devices diff bench accuracy verify' -l json -d 'For programs'
+complete -c glint -n '__fish_seen_subcommand_from check' -l object -x -d 'What object an ID is of'
 complete -c glint -n '__fish_seen_subcommand_from trace' -l rays -r -F -d 'File of rays'
 complete -c glint -n '__fish_seen_subcommand_from render view bench accuracy' -l size -x -d 'Width and height, as WxH'
 complete -c glint -n '__fish_seen_subcommand_from render view' -l samples -x -d 'Rays for each pixel'

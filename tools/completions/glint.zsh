@@ -67,6 +67,7 @@ _glint_trace() {
 _glint_check() {
     _arguments \
         '--json[print JSON]' \
+        '--object=[what object an ID is of]:ID' \
         '--lenient[skip unknown elements of a .rt scene]' \
         '(- *)'{-h,--help}'[list the options]' \
         '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'

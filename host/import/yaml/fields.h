@@ -18,7 +18,7 @@ typedef struct {
     YamlTree tree;
     Report report;
     Scene *scene;
-    FileNames *files; // SceneOptions
+    const SceneOptions *options;
     struct {
         MaterialName *items;
         size_t count, capacity;

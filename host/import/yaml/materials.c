@@ -44,7 +44,8 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - scene_file) : 0;
     Text path = {0};
     text_appendf(&path, "%.*s%s", folder_length, scene_file, file);
-    if (reader->files) array_push(*reader->files, memory_copy_text(path.items));
+    const SceneOptions *options = reader->options;
+    if (options->file_named) options->file_named(options->context, path.items);
     return path.items;
 }
 

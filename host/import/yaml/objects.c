@@ -1,4 +1,5 @@
 #include "host/base/array.h"
+#include "host/import/place.h"
 #include "host/import/yaml/yaml.h"
 
 #include <string.h>
@@ -237,7 +238,11 @@ void yaml_read_objects(YamlReader *reader, const YamlNode *node)
         expected_report(reader, "objects", "a list", node);
         return;
     }
+    Places places = places_open(reader->report.source);
     for (const YamlNode *item = yaml_first(&reader->tree, node); item && !report_is_full(&reader->report);
-         item = yaml_next(&reader->tree, item))
+         item = yaml_next(&reader->tree, item)) {
         object_read(reader, item);
+        places_note(&places, reader->scene, item->offset);
+    }
+    places_close(&places);
 }

@@ -75,7 +75,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
     *scene = (Scene){.color_meaning = COLORS_LINEAR};
     YamlReader reader = {.report = report_open(source, messages),
                          .scene = scene,
-                         .files = options->files,
+                         .options = options,
                          .default_material = UINT32_MAX};
     if (yaml_tree_read(&reader.tree, &reader.report)) document_read(&reader);
     if (scene->textures.count > 0) {

@@ -1,0 +1,89 @@
+#include "host/view/pixel_facts.h"
+
+#include "host/base/text.h"
+#include "host/scene/describe.h"
+#include <math.h>
+
+enum { LINES_MAX = 24 };
+
+typedef struct {
+    const PixelView *view;
+    Text text;
+    unsigned line_count;
+} Tree;
+
+// A ray with a name and its share of the pixel's color.
+typedef struct {
+    const char *name;
+    double weight;
+    unsigned depth;
+    TraceRay ray;
+} Branch;
+
+static Vector3 vector_of(const double values[3])
+{
+    return (Vector3){values[0], values[1], values[2]};
+}
+
+static TraceRay ray_from(const double origin[3], const double direction[3])
+{
+    return (TraceRay){.origin = {origin[0], origin[1], origin[2]},
+                      .direction = {direction[0], direction[1], direction[2]},
+                      .tmax = INFINITY};
+}
+
+static void branch_write(Tree *tree, const Branch *branch);
+
+// The rays that a hit sends on (kernels/shading/bounce.h): at total internal reflection one gets it all.
+static void branches_write(Tree *tree, const Branch *branch, const Material *material, const TraceHit *hit)
+{
+    const bool is_total = material->transmission > 0 && hit->transmission == 0;
+    const Branch reflected = {is_total ? "totally reflected" : "reflected",
+                              branch->weight *
+                                  (material->reflection + (is_total ? material->transmission : 0)),
+                              branch->depth + 1, ray_from(hit->reflected_origin, hit->reflected_direction)};
+    const Branch refracted = {"refracted", branch->weight * hit->transmission, branch->depth + 1,
+                              ray_from(hit->refracted_origin, hit->refracted_direction)};
+    branch_write(tree, &reflected);
+    branch_write(tree, &refracted);
+}
+
+static void branch_write(Tree *tree, const Branch *branch)
+{
+    const PixelView *view = tree->view;
+    TraceHit hit;
+    if (branch->weight <= 0 || branch->depth > view->bounce_count || tree->line_count > LINES_MAX) return;
+    if (tree->line_count++ == LINES_MAX) {
+        text_appendf(&tree->text, "and more\n");
+        return;
+    }
+    if (!renderer_trace(view->renderer, &branch->ray, 1, &hit)) return;
+    text_appendf(&tree->text, "%*s", 2 * (int)branch->depth, "");
+    if (branch->depth > 0) text_appendf(&tree->text, "%s, %.3g: ", branch->name, branch->weight);
+    size_t primitive;
+    const Object *object = scene_find_object(view->scene, hit.object, &primitive);
+    object_describe(&tree->text, view->scene, view->scene_path, hit.object);
+    if (!object) {
+        text_appendf(&tree->text, "\n");
+        return;
+    }
+    text_appendf(&tree->text, ", t %.6g\n", hit.t);
+    if (branch->depth == 0) {
+        const Vector3 point = vector_add(vector_of(hit.position), view->scene->camera.position);
+        text_appendf(&tree->text, "  at %.6g %.6g %.6g, normal %.4g %.4g %.4g\n", point.x, point.y, point.z,
+                     hit.normal[0], hit.normal[1], hit.normal[2]);
+    }
+    const uint32_t material = object_material(view->scene, object, primitive);
+    branches_write(tree, branch, &view->scene->materials.items[material], &hit);
+}
+
+char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y)
+{
+    Tree tree = {.view = view};
+    const Vector3 ray = camera_ray(&view->scene->camera, view->size, x + 0.5, y + 0.5);
+    const double eye[3] = {0}, direction[3] = {ray.x, ray.y, ray.z}; // the eye is the origin
+    const Branch first = {NULL, 1, 0, ray_from(eye, direction)};
+    text_appendf(&tree.text, "pixel %u,%u: ", x, y);
+    branch_write(&tree, &first);
+    return tree.text.items;
+}
