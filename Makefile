@@ -219,7 +219,7 @@ install: all
 	install -m 644 scenes/images/* $(data)/glint/scenes/images
 	install -d $(data)/doc/glint/docs
 	install -m 644 README.md SECURITY.md LICENSE $(data)/doc/glint
-	install -m 644 docs/*.md docs/*.png docs/*.gif $(data)/doc/glint/docs
+	install -m 644 docs/*.md docs/*.png docs/*.gif docs/*.svg $(data)/doc/glint/docs
 
 uninstall:
 	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(DESTDIR)$(PREFIX)/bin/glint-mpi $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \

@@ -16,6 +16,8 @@ for document in "${documents[@]}"; do
     done
 done
 
+check "docs/scaling.md says what is simulated" tools/scaling --check --ranks 1,10,100
+
 # Changed figures are written, as they would be by a new measurement.
 sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/docs/measurements/accuracy.json"
 check "a new measurement" tools/report "$scratch/docs/accuracy.md"

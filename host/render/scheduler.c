@@ -13,7 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAITING_BYTES_MAX = 64 << 20 }; // unless the settings say otherwise
+// Of bands that wait, unless the settings say otherwise: a band of each worker, as a rule (docs/scaling.md).
+static const size_t WAITING_BYTES_MIN = 64 << 20, WAITING_BYTES_OF_WORKER = 16 << 20;
 
 typedef struct {
     BandRows rows; // taken and not given yet
@@ -267,7 +268,11 @@ Scheduler *scheduler_open(const SchedulerSettings *settings)
 {
     Scheduler *scheduler = memory_allocate_zeroed(1, sizeof *scheduler);
     scheduler->settings = *settings;
-    if (settings->waiting_bytes_max == 0) scheduler->settings.waiting_bytes_max = WAITING_BYTES_MAX;
+    if (settings->waiting_bytes_max == 0) {
+        const size_t of_workers = settings->worker_count * WAITING_BYTES_OF_WORKER;
+        scheduler->settings.waiting_bytes_max =
+            of_workers > WAITING_BYTES_MIN ? of_workers : WAITING_BYTES_MIN;
+    }
     scheduler->start_seconds = clock_seconds();
     scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
     if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
