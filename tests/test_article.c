@@ -3,7 +3,7 @@
 // run_tests: sanitize-long-only
 #include "host/import/load.h"
 #include "tests/probe.h"
-#include "tests/reference_color.h"
+#include "host/verify/reference_color.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

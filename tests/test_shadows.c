@@ -2,7 +2,7 @@
 // run_tests: sanitize-long-only
 #include "tests/film.h"
 #include "tests/probe.h"
-#include "tests/reference_color.h"
+#include "host/verify/reference_color.h"
 #include "tests/scene_reading.h"
 #include <math.h>
 #include <setjmp.h>

@@ -687,27 +687,35 @@ Object reference_object_from(const Object *object, Vector3 eye)
     return result;
 }
 
+ReferenceHit reference_miss(void)
+{
+    return (ReferenceHit){.object = UINT32_MAX, .margin = UNBOUNDED};
+}
+
 ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
 {
-    ReferenceHit hit = {.object = UINT32_MAX, .margin = UNBOUNDED};
+    ReferenceHit hit = reference_miss();
     shapes[object->kind].hit(object, ray, &hit);
     return hit;
 }
 
+void reference_hit_take(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray)
+{
+    Quad margin = quad_minimum(nearest->margin, hit.margin);
+    if (hit.found && nearest->found)
+        margin = quad_minimum(margin, quad_absolute(hit.t - nearest->t) * quad3_length(ray->direction));
+    if (hit.found && !(nearest->found && hit.t >= nearest->t)) {
+        *nearest = hit;
+        nearest->object = object;
+    }
+    nearest->margin = margin;
+}
+
 ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray)
 {
-    ReferenceHit nearest = {.object = UINT32_MAX, .margin = UNBOUNDED};
-    Quad margin = UNBOUNDED, length = quad3_length(ray->direction);
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        ReferenceHit hit = reference_hit_object(&scene->objects.items[i], ray);
-        margin = quad_minimum(margin, hit.margin);
-        if (!hit.found) continue;
-        if (nearest.found) margin = quad_minimum(margin, quad_absolute(hit.t - nearest.t) * length);
-        if (nearest.found && hit.t >= nearest.t) continue;
-        nearest = hit;
-        nearest.object = (uint32_t)i;
-    }
-    nearest.margin = margin;
+    ReferenceHit nearest = reference_miss();
+    for (size_t i = 0; i < scene->objects.count; i++)
+        reference_hit_take(&nearest, reference_hit_object(&scene->objects.items[i], ray), (uint32_t)i, ray);
     return nearest;
 }
 

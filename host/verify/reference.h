@@ -42,6 +42,10 @@ Object reference_object_from(const Object *object, Vector3 eye);
 
 // The nearest hit of one object (`object` of the hit is 0).
 ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray);
+// Takes the hit of an object if it is the nearest so far, and its margin in any case; equal distances go to
+// the object taken first. Begins with the hit of no object, reference_miss.
+ReferenceHit reference_miss(void);
+void reference_hit_take(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray);
 // The nearest hit of a scene; equal distances go to the lowest index.
 ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray);
 Quad3 reference_point(const ReferenceRay *ray, Quad t);

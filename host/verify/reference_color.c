@@ -1,5 +1,9 @@
-#include "tests/reference_color.h"
+#include "host/verify/reference_color.h"
+
+#include "host/base/memory.h"
 #include "host/compile/random_shape.h"
+#include <math.h>
+#include <stdlib.h>
 
 // A shadow ray leaves out this fraction of its length at either end: far over the rounding of quadruple
 // precision, far under any gap that a scene's doubles can express at its own scale.
@@ -20,6 +24,41 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
     Quad y = -((Quad)2 * row + 1 - height) * half_pixel;
     Quad3 sideways = quad3_add(quad3_scale(right, x), quad3_scale(up, y));
     return (ReferenceRay){quad3(camera->position), quad3_add(forward, sideways), 0, (Quad)FLT_MAX};
+}
+
+// A scene, and its objects' bounding spheres or NULL.
+typedef struct {
+    const Scene *scene;
+    const BoundingSphere *spheres;
+} World;
+
+// Whether the ray certainly misses a sphere, or reaches it only outside its interval. The slack is far over
+// what rounding to double leaves.
+static bool sphere_is_missed(const BoundingSphere *sphere, const ReferenceRay *ray)
+{
+    if (!isfinite(sphere->radius)) return false;
+    const Vector3 from = vector_subtract(sphere->center, quad3_rounded(ray->origin));
+    const Vector3 direction = quad3_rounded(ray->direction);
+    const double length = vector_length(direction), distance = vector_length(from);
+    const double along = vector_dot(from, direction) / length;
+    const double radius = sphere->radius * (1 + 1e-6) + 1e-6 * distance;
+    return distance * distance - along * along > radius * radius ||
+           along + radius < (double)ray->tmin * length || along - radius > (double)ray->tmax * length;
+}
+
+// Of one object of the world; a miss where its bounding sphere is missed.
+static ReferenceHit object_hit(const World *world, size_t index, const ReferenceRay *ray)
+{
+    if (world->spheres && sphere_is_missed(&world->spheres[index], ray)) return reference_miss();
+    return reference_hit_object(&world->scene->objects.items[index], ray);
+}
+
+static ReferenceHit world_hit(const World *world, const ReferenceRay *ray)
+{
+    ReferenceHit nearest = reference_miss();
+    for (size_t i = 0; i < world->scene->objects.count; i++)
+        reference_hit_take(&nearest, object_hit(world, i, ray), (uint32_t)i, ray);
+    return nearest;
 }
 
 // A point of a surface, the unit normal that faces the eye and the unit direction to the eye.
@@ -77,8 +116,10 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
     return x * x * (3 - 2 * x);
 }
 
-static void add_light(const Scene *scene, const Light *light, const Surface *surface, ReferenceColor *sum)
+// Returns whether the light reaches the surface.
+static bool add_light(const World *world, const Light *light, const Surface *surface, ReferenceColor *sum)
 {
+    const Scene *scene = world->scene;
     const Material *material = surface->material;
     Color base = surface->base;
     bool directional = light->kind == LIGHT_DIRECTIONAL;
@@ -87,7 +128,7 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
     Quad3 to_light = quad3_unit(to_light_unnormalized);
     Quad facing = quad3_dot(surface->normal, to_light);
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
-    if (facing <= 0) return;
+    if (facing <= 0) return false;
 
     Quad start = surface->start / quad3_length(to_light_unnormalized);
     ReferenceRay shadow = {surface->point, to_light_unnormalized, start,
@@ -96,10 +137,11 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
         light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        ReferenceHit blocker = reference_hit_object(object, &shadow);
+        const Material *medium = &scene->materials.items[object->material];
+        ReferenceHit blocker = object_hit(world, i, &shadow);
         // The surface itself always has margin 0; `facing` says where it shadows itself.
         if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
-        if (blocker.found) strength *= scene->materials.items[object->material].transmission;
+        if (blocker.found) strength *= medium->full_shadow ? 0 : medium->transmission;
     }
     double diffuse = (double)(strength * facing);
     Quad highlight_part =
@@ -108,6 +150,7 @@ static void add_light(const Scene *scene, const Light *light, const Surface *sur
     sum->color.x += light->color.x * (material->diffuse.x * base.x * diffuse + highlight);
     sum->color.y += light->color.y * (material->diffuse.y * base.y * diffuse + highlight);
     sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight);
+    return strength > 0;
 }
 
 static Quad3 random_offset(Random *random, double size)
@@ -144,13 +187,17 @@ static Surface surface_at(const Scene *scene, const ReferenceRay *ray, Reference
     return surface;
 }
 
-static ReferenceColor surface_color(const Scene *scene, const Surface *surface, double margin)
+// `shadows`: see reference_pixel; or NULL.
+static ReferenceColor surface_color(const World *world, const Surface *surface, double margin, bool *shadows)
 {
+    const Scene *scene = world->scene;
     Color base = surface->base;
     Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
     ReferenceColor sum = {vector_scale(ambient, surface->material->ambient), margin};
-    for (size_t i = 0; i < scene->lights.count; i++)
-        add_light(scene, &scene->lights.items[i], surface, &sum);
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const bool is_lit = add_light(world, &scene->lights.items[i], surface, &sum);
+        if (shadows) shadows[i] = !is_lit;
+    }
     return sum;
 }
 
@@ -159,14 +206,15 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     ReferenceHit hit = reference_hit(scene, ray);
     if (!hit.found) return (ReferenceColor){scene->background, (double)hit.margin};
     Surface surface = surface_at(scene, ray, &hit, 0, NULL);
-    return surface_color(scene, &surface, (double)hit.margin);
+    return surface_color(&(World){scene, NULL}, &surface, (double)hit.margin, NULL);
 }
 
 // Snell's law: with the sine behind the surface eta times that before it. False where that is more than 1.
-static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted)
+static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted, double *margin)
 {
     Quad cosine = -quad3_dot(direction, normal);
     Quad squared = 1 - eta * eta * (1 - cosine * cosine);
+    *margin = fmin(*margin, (double)quad_absolute(squared));
     if (squared < 0) return false;
     *refracted =
         quad3_add(quad3_scale(direction, eta), quad3_scale(normal, eta * cosine - quad_root(squared)));
@@ -176,8 +224,9 @@ static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted)
 // Tie rule: an opaque surface within CONTACT_PART * distance of a transparent one is the visible one.
 #define CONTACT_PART ((Quad)1e-9L)
 
-static void hit_take_opaque(const Scene *scene, const ReferenceRay *ray, ReferenceHit *hit)
+static void hit_take_opaque(const World *world, const ReferenceRay *ray, ReferenceHit *hit)
 {
+    const Scene *scene = world->scene;
     Quad length = quad3_length(ray->direction), reach = CONTACT_PART * hit->t * length;
     const ReferenceHit transparent = *hit;
     const ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
@@ -187,51 +236,160 @@ static void hit_take_opaque(const Scene *scene, const ReferenceRay *ray, Referen
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (scene->materials.items[object->material].transmission > 0) continue;
-        if (!reference_hit_object(object, &inward).found) continue;
-        ReferenceHit opaque = reference_hit_object(object, &around);
+        if (!object_hit(world, i, &inward).found) continue;
+        ReferenceHit opaque = object_hit(world, i, &around);
         if (!opaque.found || (hit->object != transparent.object && opaque.t >= hit->t)) continue;
         *hit = opaque;
         hit->object = (uint32_t)i;
     }
 }
 
-static void add_path(const Scene *scene, const ReferenceRay *ray, double weight, unsigned bounces_left,
-                     double blur, Random *random, Color *sum)
+// What the rays of a tree have in common.
+typedef struct {
+    World world;
+    double blur;
+    Random random;
+    Color sum;
+    bool has_first;
+    uint32_t object;    // of the first hit
+    double distance;    // to it
+    uint32_t signature; // see kernels/types.h
+    double margin;
+    bool has_texture;
+    bool *shadows; // of the first surface; or NULL
+} Tree;
+
+static void signature_add(Tree *tree, uint32_t object, uint32_t events)
 {
-    if (weight == 0) return;
-    ReferenceHit hit = reference_hit(scene, ray);
+    tree->signature = (tree->signature ^ ((object + 1) * PATH_EVENTS + events)) * PATH_FACTOR;
+}
+
+static void add_path(Tree *tree, const ReferenceRay *ray, double weight, unsigned bounces_left)
+{
+    const Scene *scene = tree->world.scene;
+    ReferenceHit hit = world_hit(&tree->world, ray);
     if (!hit.found) {
-        *sum = vector_add(*sum, vector_scale(scene->background, weight));
+        tree->has_first = true;
+        tree->margin = fmin(tree->margin, (double)hit.margin);
+        tree->sum = vector_add(tree->sum, vector_scale(scene->background, weight));
+        signature_add(tree, UINT32_MAX, 0);
         return;
     }
     if (scene->materials.items[scene->objects.items[hit.object].material].transmission > 0)
-        hit_take_opaque(scene, ray, &hit);
-    Surface surface = surface_at(scene, ray, &hit, blur, random);
-    *sum = vector_add(*sum, vector_scale(surface_color(scene, &surface, 0).color, weight));
-    if (bounces_left == 0) return;
+        hit_take_opaque(&tree->world, ray, &hit);
+    if (!tree->has_first) {
+        tree->object = hit.object;
+        tree->distance = (double)(hit.t * quad3_length(ray->direction));
+    }
+    tree->has_first = true;
+    Surface surface = surface_at(scene, ray, &hit, tree->blur, &tree->random);
+    const Material *material = surface.material;
+    const ReferenceColor own = surface_color(&tree->world, &surface, (double)hit.margin, tree->shadows);
+    tree->shadows = NULL;
+    tree->sum = vector_add(tree->sum, vector_scale(own.color, weight));
+    tree->margin = fmin(tree->margin, own.margin);
+    tree->has_texture = tree->has_texture || material->texture > 0;
+    if (bounces_left == 0) {
+        signature_add(tree, hit.object, 0);
+        return;
+    }
 
     Quad3 direction = quad3_scale(surface.to_eye, -1);
-    const Material *material = surface.material;
     double reflection = material->reflection, transmission = material->transmission;
     ReferenceRay refracted = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, reflected = refracted;
     Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
-    if (transmission > 0 && !refract(direction, surface.normal, eta, &refracted.direction)) {
-        reflection += transmission;
-        transmission = 0;
+    bool is_total = false;
+    if (transmission > 0) {
+        is_total = !refract(direction, surface.normal, eta, &refracted.direction, &tree->margin);
+        reflection += is_total ? transmission : 0;
+        transmission = is_total ? 0 : transmission;
     }
+    signature_add(tree, hit.object,
+                  (reflection > 0 ? PATH_REFLECTED : 0u) | (transmission > 0 ? PATH_REFRACTED : 0u) |
+                      (is_total ? PATH_TOTAL_REFLECTION : 0u));
     Quad away = quad3_dot(direction, surface.normal);
     reflected.direction = quad3_subtract(direction, quad3_scale(surface.normal, 2 * away));
-    add_path(scene, &reflected, weight * reflection, bounces_left - 1, blur, random, sum);
-    add_path(scene, &refracted, weight * transmission, bounces_left - 1, blur, random, sum);
+    if (reflection > 0) add_path(tree, &reflected, weight * reflection, bounces_left - 1);
+    if (transmission > 0) add_path(tree, &refracted, weight * transmission, bounces_left - 1);
 }
 
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
 {
-    Random random = {path->seed};
+    Tree tree = {.world = {scene, NULL}, .blur = path->blur, .random = {path->seed}};
     ReferenceRay first = *ray;
-    Quad3 turn = random_offset(&random, path->blur * (double)quad3_length(ray->direction));
+    Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
-    Color sum = {0, 0, 0};
-    add_path(scene, &first, 1, path->bounce_count, path->blur, &random, &sum);
-    return sum;
+    add_path(&tree, &first, 1, path->bounce_count);
+    return tree.sum;
+}
+
+// A normal that is zero is that of the triangle.
+static Object mesh_triangle(const Mesh *mesh, size_t part, uint32_t material)
+{
+    const uint32_t *corners = mesh->triangles[part];
+    Object object = {.kind = SHAPE_TRIANGLE, .material = material};
+    Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
+    for (int i = 0; i < 3; i++)
+        vertices[i] = mesh->vertices[corners[i]];
+    const Vector3 flat =
+        vector_cross(vector_subtract(vertices[1], vertices[0]), vector_subtract(vertices[2], vertices[0]));
+    for (int i = 0; i < 3; i++) {
+        normals[i] = mesh->normals ? mesh->normals[corners[i]] : flat;
+        if (vector_dot(normals[i], normals[i]) == 0) normals[i] = flat;
+    }
+    object.as.triangle.smooth = mesh->normals != NULL;
+    return object;
+}
+
+ReferenceScene reference_scene_open(const Scene *scene)
+{
+    const size_t count = scene_primitive_count(scene);
+    ReferenceScene made = {.scene = *scene,
+                           .spheres = memory_allocate_zeroed(count + 1, sizeof *made.spheres)};
+    Object *objects = memory_allocate_zeroed(count + 1, sizeof *objects);
+    size_t next = 0;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        if (object->kind != SHAPE_MESH) {
+            objects[next++] = *object;
+            continue;
+        }
+        const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+        for (size_t k = 0; k < mesh->triangle_count; k++)
+            objects[next++] = mesh_triangle(mesh, k, mesh->materials ? mesh->materials[k] : object->material);
+    }
+    made.scene.objects.items = objects;
+    made.scene.objects.count = made.scene.objects.capacity = count;
+    for (size_t i = 0; i < count; i++) {
+        Bounds bounds;
+        made.spheres[i].radius = INFINITY;
+        if (!shape_ops[objects[i].kind]->bounds(&made.scene, &objects[i], &bounds)) continue;
+        made.spheres[i].center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+        made.spheres[i].radius = vector_length(vector_subtract(bounds.max, made.spheres[i].center));
+    }
+    return made;
+}
+
+void reference_scene_close(ReferenceScene *scene)
+{
+    free(scene->scene.objects.items);
+    free(scene->spheres);
+    *scene = (ReferenceScene){0};
+}
+
+ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray, unsigned bounce_count,
+                               bool *shadows)
+{
+    Tree tree = {.world = {&scene->scene, scene->spheres},
+                 .object = UINT32_MAX,
+                 .signature = PATH_START,
+                 .margin = INFINITY,
+                 .shadows = shadows};
+    add_path(&tree, ray, 1, bounce_count);
+    const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;
+    return (ReferencePixel){.object = tree.object,
+                            .path = tree.signature,
+                            .color = tree.sum,
+                            .margin = size > 0 ? tree.margin / size : tree.margin,
+                            .has_texture = tree.has_texture};
 }

@@ -1,8 +1,10 @@
 // What an image should show along a ray, in quadruple precision: shading, shadows, reflections and
-// refractions over the closest hits of host/verify/reference.h.
+// refractions over the closest hits of host/verify/reference.h. `glint certify` and tests compare with it.
 #pragma once
 
+#include "host/compile/shapes.h"
 #include "host/verify/reference.h"
+#include <stdbool.h>
 
 // The ray through the center of a pixel, row 0 at the top (docs/scene-format.md).
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
@@ -28,3 +30,25 @@ typedef struct {
     uint64_t seed;
 } ReferencePath;
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);
+
+// A scene made ready for many rays: the triangles of its meshes as objects, so that an object's index is its
+// id, and a bounding sphere of each object, outside of which it is not intersected.
+typedef struct {
+    Scene scene; // its lights, materials and textures are those of the scene it was made of
+    BoundingSphere *spheres;
+} ReferenceScene;
+
+ReferenceScene reference_scene_open(const Scene *scene); // which must outlive it
+void reference_scene_close(ReferenceScene *scene);
+
+// What the AOVs of the same names hold.
+typedef struct {
+    uint32_t object, path;
+    Color color;
+    double margin;    // the least of all decisions, in parts of the distance from the eye
+    bool has_texture; // somewhere on its way, where the color is undefined: textures are filtered, not exact
+} ReferencePixel;
+
+// `shadows`: of each light, true where it does not reach the surface; undefined without one.
+ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray, unsigned bounce_count,
+                               bool *shadows);
