@@ -31,6 +31,7 @@ NOTES = {
     "glint accuracy": "[accuracy.md](accuracy.md) defines the figures. A row has `frame_ms`, `kernel_ms`, `clock`, `rays` and "
                       "`mrays_per_s` of `glint bench`; a reference's ends with `saved`, an unavailable one with `reason`. The "
                       "HTML report embeds the same object.",
+    "glint certify": "[accuracy.md](accuracy.md#the-exact-image) says what is compared.",
     "glint verify": "[verify.md](verify.md) lists the cases.",
 }
 # A path that begins so has no row, since the introduction, a note or a row names the section that has it.
@@ -45,6 +46,7 @@ ELSEWHERE = {
         "scene", "precision", "lanes", "bvh", "size", "samples", "bounces", "comparison", "frame_ms", "frame_samples_ms"))),
     "glint accuracy": ("glint", "device", *(f"scenes[].variants[].{name}" for name in (
         "frame_ms", "kernel_ms", "clock", "rays", "mrays_per_s"))),
+    "glint certify": ("glint", "device"),
     "glint verify": ("glint", "device"),
 }
 MEANINGS = {
@@ -63,6 +65,17 @@ MEANINGS = {
     "bvh": "text; `auto`, `on` or `off`",
     "kernel_hash": "hash; of the kernel's text",
     "parse_ms": "number; reading the scene",
+    "pixels": "count; of the sample",
+    "undecided": "count; of these, within 2^-80 of the distance of another answer: not compared",
+    "reference_ms": "number; computing it",
+    "precisions[].compared": "count; pixels",
+    "precisions[].wrong": "object; pixels, each in the first way that is wrong",
+    "precisions[].wrong.{object,shadow,path}": "count",
+    "precisions[].wrong.margin": "number; how far they are from another answer, the most, in parts of the distance",
+    "precisions[].color": "object; errors of a channel",
+    "precisions[].color.pixels": "count; without textures on their way",
+    "precisions[].color.{max_right,max_wrong}": "number; where nothing is wrong, and where something is",
+    "precisions[].color.{x,y}": "count; the pixel of the larger",
     "pilot": "object; only with `--max-error`, by [these rules](accuracy.md#an-error-budget)",
     "pilot.limit": "number; the budget",
     "pilot.metric": "text; `rmse`, `max` or `flip`",

@@ -28,7 +28,7 @@ in_fish() {
 }
 
 failed=0
-subcommands='render view trace check devices diff bench accuracy verify cache'
+subcommands='render view trace check devices diff bench accuracy certify verify cache'
 for subcommand in $subcommands; do
     help=$(in_help "$subcommand")
     if [ -z "$help" ]; then

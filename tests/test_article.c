@@ -2,8 +2,8 @@
 // shows that the answer is wrong by the reference, and holds glint to the right one on the same `.cfg` scene.
 // run_tests: sanitize-long-only
 #include "host/import/load.h"
-#include "tests/probe.h"
 #include "host/verify/reference_color.h"
+#include "tests/probe.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

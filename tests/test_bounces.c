@@ -1,8 +1,8 @@
 // Reflection, refraction, total reflection and light through glass: small images against the reference.
 // run_tests: sanitize-long-only
+#include "host/verify/reference_color.h"
 #include "tests/film.h"
 #include "tests/probe.h"
-#include "host/verify/reference_color.h"
 #include "tests/scene_reading.h"
 #include <math.h>
 #include <setjmp.h>

@@ -127,6 +127,10 @@ class Json(TestCase):
         self.check_members("glint bench --against", self.json(
             f"bench plain.yaml {SMALL} {QUICK} --json --against {PROGRAM}", status=4))
 
+    def test_certify(self):
+        self.check_members("glint certify", self.json(f"certify plain.yaml {SMALL} --precision single --json"),
+                           self.json(f"certify plain.yaml {SMALL} --precision single --json --perturb 1"))
+
     def test_verify(self):
         """Cases with a measure and without, one of them an image."""
         self.check_members("glint verify", self.json("verify S5 P4 P6 --precision single --json"),

@@ -1,6 +1,6 @@
 // The reference itself, against roots known by hand or from certified interval arithmetic.
-#include "tests/random_ray.h"
 #include "host/verify/reference_color.h"
+#include "tests/random_ray.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

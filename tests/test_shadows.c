@@ -1,8 +1,8 @@
 // Shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
 // run_tests: sanitize-long-only
+#include "host/verify/reference_color.h"
 #include "tests/film.h"
 #include "tests/probe.h"
-#include "host/verify/reference_color.h"
 #include "tests/scene_reading.h"
 #include <math.h>
 #include <setjmp.h>

@@ -9,5 +9,6 @@ int command_devices(int argument_count, char **arguments);
 int command_diff(int argument_count, char **arguments);
 int command_bench(int argument_count, char **arguments);
 int command_accuracy(int argument_count, char **arguments);
+int command_certify(int argument_count, char **arguments);
 int command_verify(int argument_count, char **arguments);
 int command_cache(int argument_count, char **arguments);

@@ -53,11 +53,17 @@ static ReferenceHit object_hit(const World *world, size_t index, const Reference
     return reference_hit_object(&world->scene->objects.items[index], ray);
 }
 
-static ReferenceHit world_hit(const World *world, const ReferenceRay *ray)
+// `left`: the object that the ray leaves, UINT32_MAX for the eye. On its surface a margin is 0 although
+// nothing is open, so that its own does not count.
+static ReferenceHit world_hit(const World *world, const ReferenceRay *ray, uint32_t left)
 {
     ReferenceHit nearest = reference_miss();
-    for (size_t i = 0; i < world->scene->objects.count; i++)
-        reference_hit_take(&nearest, object_hit(world, i, ray), (uint32_t)i, ray);
+    const Quad unbounded = nearest.margin;
+    for (size_t i = 0; i < world->scene->objects.count; i++) {
+        ReferenceHit hit = object_hit(world, i, ray);
+        if (i == left) hit.margin = unbounded;
+        reference_hit_take(&nearest, hit, (uint32_t)i, ray);
+    }
     return nearest;
 }
 
@@ -264,10 +270,10 @@ static void signature_add(Tree *tree, uint32_t object, uint32_t events)
     tree->signature = (tree->signature ^ ((object + 1) * PATH_EVENTS + events)) * PATH_FACTOR;
 }
 
-static void add_path(Tree *tree, const ReferenceRay *ray, double weight, unsigned bounces_left)
+static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double weight, unsigned bounces_left)
 {
     const Scene *scene = tree->world.scene;
-    ReferenceHit hit = world_hit(&tree->world, ray);
+    ReferenceHit hit = world_hit(&tree->world, ray, left);
     if (!hit.found) {
         tree->has_first = true;
         tree->margin = fmin(tree->margin, (double)hit.margin);
@@ -309,8 +315,8 @@ static void add_path(Tree *tree, const ReferenceRay *ray, double weight, unsigne
                       (is_total ? PATH_TOTAL_REFLECTION : 0u));
     Quad away = quad3_dot(direction, surface.normal);
     reflected.direction = quad3_subtract(direction, quad3_scale(surface.normal, 2 * away));
-    if (reflection > 0) add_path(tree, &reflected, weight * reflection, bounces_left - 1);
-    if (transmission > 0) add_path(tree, &refracted, weight * transmission, bounces_left - 1);
+    if (reflection > 0) add_path(tree, &reflected, hit.object, weight * reflection, bounces_left - 1);
+    if (transmission > 0) add_path(tree, &refracted, hit.object, weight * transmission, bounces_left - 1);
 }
 
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
@@ -319,7 +325,7 @@ Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const Re
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
-    add_path(&tree, &first, 1, path->bounce_count);
+    add_path(&tree, &first, UINT32_MAX, 1, path->bounce_count);
     return tree.sum;
 }
 
@@ -383,9 +389,9 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
     Tree tree = {.world = {&scene->scene, scene->spheres},
                  .object = UINT32_MAX,
                  .signature = PATH_START,
-                 .margin = INFINITY,
-                 .shadows = shadows};
-    add_path(&tree, ray, 1, bounce_count);
+                 .margin = INFINITY};
+    tree.shadows = shadows;
+    add_path(&tree, ray, UINT32_MAX, 1, bounce_count);
     const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;
     return (ReferencePixel){.object = tree.object,
                             .path = tree.signature,

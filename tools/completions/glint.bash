@@ -14,6 +14,7 @@ _glint_options() {
         "--tolerance --samples --bounces --device --lenient --max-pixels -h --help" ;;
     accuracy) echo "--reference --budget --precision --lanes --bvh --samples --bounces --size --seconds --save --html --json" \
         "--perturb --device --lenient --max-pixels -h --help" ;;
+    certify) echo "--size --pixels --precision --lanes --bvh --bounces --device --no-cache --lenient --max-pixels --perturb --json -h --help" ;;
     verify) echo "--device --precision --lanes --no-cache --perturb --lean --json -h --help" ;;
     cache) echo "--clear -h --help" ;;
     *) echo "--version --help" ;;
@@ -24,7 +25,7 @@ _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
     if [ "$COMP_CWORD" -eq 1 ]; then
-        mapfile -t COMPREPLY < <(compgen -W "render view trace check devices diff bench accuracy verify cache $(_glint_options)" -- "$word")
+        mapfile -t COMPREPLY < <(compgen -W "render view trace check devices diff bench accuracy certify verify cache $(_glint_options)" -- "$word")
         return
     fi
     # bash splits --option=value into three words.
@@ -38,7 +39,7 @@ _glint() {
     --device) words="cpu gpu all" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
-    --size | --samples | --region | --bounces | --perturb | --seconds | --tolerance | --max-error | --max-pixels) return ;;
+    --size | --pixels | --samples | --region | --bounces | --perturb | --seconds | --tolerance | --max-error | --max-pixels) return ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

@@ -79,6 +79,24 @@ _glint_devices() {
         '(- *)'{-h,--help}'[list the options]'
 }
 
+_glint_certify() {
+    _arguments \
+        '--size[width and height in pixels]:WxH:' \
+        '--pixels[of the sample, about]:number:' \
+        '--precision[arithmetic, separated by commas]:precisions:(fast single strict double)' \
+        '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
+        '--bvh[use a BVH]:choice:(auto on off)' \
+        '--bounces[reflections and refractions at most]:number:' \
+        '--device[device to render on]:device:(cpu gpu)' \
+        '--no-cache[build the kernels anew]' \
+        '--lenient[skip unknown elements of a .rt scene]' \
+        '--max-pixels[largest image that is read]:number:' \
+        '--perturb[inject the rounding error that OpenCL permits]:SEED[\:SCALE]:' \
+        '--json[print JSON]' \
+        '(- *)'{-h,--help}'[list the options]' \
+        '1:scene:_files -g "*.(yaml|yml|rt|cfg|nff)"'
+}
+
 _glint_verify() {
     _arguments \
         '--device[device to verify]:device:(cpu gpu)' \
@@ -161,6 +179,7 @@ _glint() {
         'diff:compare two images'
         'bench:benchmark scenes on this device'
         'accuracy:report time and error of every configuration'
+        'certify:compare an image with exact arithmetic'
         'verify:run the hard cases on a device'
         'cache:list, check or empty the kernel cache'
     )

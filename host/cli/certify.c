@@ -1,0 +1,236 @@
+// glint certify: a scene's image at each precision against the reference, on a sample of its pixels.
+#include "host/verify/certify.h"
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/json.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include "host/cli/progress.h"
+#include "host/cli/report_json.h"
+#include "host/cli/version.h"
+#include <getopt.h>
+#include <stdio.h>
+
+enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES, OPTION_JSON };
+enum { PIXELS_DEFAULT = 2000, PIXELS_MOST = 1 << 24 };
+
+static const struct option long_options[] = {
+    {"size", required_argument, NULL, OPTION_SIZE},
+    {"pixels", required_argument, NULL, OPTION_PIXELS},
+    {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"json", no_argument, NULL, OPTION_JSON},
+    COMMON_LONG_OPTIONS,
+    PERTURB_LONG_OPTION,
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint certify SCENE [OPTIONS]\n\n"
+    "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
+    "pixels: "
+    "objects, shadows, paths, colors.\n\n"
+    "      --size WxH        image size (default: as glint render)\n"
+    "      --pixels N        of the sample, about (default: 2000)\n"
+    "      --precision LIST  of fast, single, strict, double (default: all that the device has)\n" //
+    HELP_BOUNCES HELP_DEVICE HELP_LANES                                                            //
+    "      --bvh B           auto, on or off; does not change the image (default: auto)\n"         //
+    HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_JSON HELP_HELP;
+
+typedef struct {
+    CommonOptions common;
+    const char *scene;
+    uint32_t width, height; // 0: not given
+    uint32_t pixels, bounce_count;
+    unsigned precisions; // a set; empty: not given
+    bool as_json;
+} CertifyOptions;
+
+static bool option_take(CertifyOptions *options, int option, const char *value)
+{
+    bool valid = true;
+    switch (option) {
+    case OPTION_SIZE:
+        return option_size("size", value, &options->width, &options->height);
+    case OPTION_PIXELS:
+        return option_count("pixels", value, 1, PIXELS_MOST, &options->pixels);
+    case OPTION_BOUNCES:
+        return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
+    case OPTION_PRECISION:
+        return option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
+    case OPTION_JSON:
+        options->as_json = true;
+        return true;
+    default:
+        return option_common(&options->common, option, value, &valid) && valid;
+    }
+}
+
+static int options_read(CertifyOptions *options, int argument_count, char **arguments)
+{
+    *options = (CertifyOptions){.pixels = PIXELS_DEFAULT, .bounce_count = BOUNCES_DEFAULT};
+    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
+        if (option == 'h') return option_help(help_text);
+        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
+    }
+    if (!option_only_scene("certify", argument_count, arguments)) return EXIT_USER;
+    options->scene = arguments[optind];
+    return OPTIONS_READ;
+}
+
+typedef struct {
+    const CertifyOptions *options;
+    const Scene *scene;
+    Compute *compute;
+    CertifySample sample;
+    double reference_seconds;
+    struct {
+        bool measured;
+        CertifyErrors errors;
+    } rows[PRECISION_COUNT];
+} Certification;
+
+static void text_print(const Certification *certification)
+{
+    const CertifySample *sample = &certification->sample;
+    const Device *device = certification->compute->device;
+    size_t undecided = 0, textured = 0;
+    for (size_t i = 0; i < sample->count; i++) {
+        undecided += certify_is_undecided(&sample->pixels[i]);
+        textured += sample->pixels[i].has_texture;
+    }
+    printf("%s, %s %s\n%s, %ux%u: %zu pixels, reference of %d bits in %.1f s", device->name,
+           device->platform_name, device->driver, certification->options->scene, sample->width,
+           sample->height, sample->count, (int)QUAD_BITS, certification->reference_seconds);
+    if (undecided > 0) printf("; %zu undecided in it are left out", undecided);
+    if (textured > 0) printf("; of %zu with a texture no color is compared", textured);
+    puts("\n                     wrong             largest error of color        largest margin\n"
+         "  precision   object  shadow    path   right     wrong     at         of a wrong pixel");
+    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+        if (!certification->rows[i].measured) continue;
+        const CertifyErrors *errors = &certification->rows[i].errors;
+        printf("  %-9s  %7zu %7zu %7zu   %-9.2g %-9.2g %u,%u", precision_names[i], errors->object,
+               errors->shadow, errors->path, errors->color, errors->wrong_color, errors->worst[0],
+               errors->worst[1]);
+        if (errors->object + errors->shadow + errors->path > 0)
+            printf("    %.2g of the distance", errors->margin);
+        putchar('\n');
+    }
+}
+
+static void row_json(Json *json, Precision precision, const CertifyErrors *errors)
+{
+    json_begin_object(json, NULL);
+    json_text(json, "precision", precision_names[precision]);
+    json_integer(json, "compared", (int64_t)errors->compared);
+    json_begin_object(json, "wrong");
+    json_integer(json, "object", (int64_t)errors->object);
+    json_integer(json, "shadow", (int64_t)errors->shadow);
+    json_integer(json, "path", (int64_t)errors->path);
+    json_number(json, "margin", errors->margin);
+    json_end(json);
+    json_begin_object(json, "color");
+    json_integer(json, "pixels", (int64_t)errors->colors);
+    json_number(json, "max_right", errors->color);
+    json_number(json, "max_wrong", errors->wrong_color);
+    json_integer(json, "x", errors->worst[0]);
+    json_integer(json, "y", errors->worst[1]);
+    json_end(json);
+    json_end(json);
+}
+
+static void json_report(const Certification *certification)
+{
+    const CertifySample *sample = &certification->sample;
+    Json *json = json_open();
+    json_integer(json, "schema", 1);
+    json_text(json, "glint", glint_version());
+    json_begin_object(json, "device");
+    device_json(json, certification->compute->device);
+    json_end(json);
+    perturb_json(json, certification->options->common.perturb_seed,
+                 certification->options->common.perturb_scale);
+    json_text(json, "scene", certification->options->scene);
+    size_json(json, sample->width, sample->height);
+    json_integer(json, "bounces", certification->options->bounce_count);
+    json_integer(json, "pixels", (int64_t)sample->count);
+    json_integer(json, "reference_bits", QUAD_BITS);
+    json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
+    size_t undecided = 0;
+    for (size_t i = 0; i < sample->count; i++)
+        undecided += certify_is_undecided(&sample->pixels[i]);
+    json_integer(json, "undecided", (int64_t)undecided);
+    json_begin_array(json, "precisions");
+    for (unsigned i = 0; i < PRECISION_COUNT; i++)
+        if (certification->rows[i].measured) row_json(json, (Precision)i, &certification->rows[i].errors);
+    json_end(json);
+    json_print(json, stdout);
+}
+
+// Renders at one precision and compares. EXIT_DONE, or why not, with a message if it is the user's mistake.
+static int precision_compare(Certification *certification, RenderSettings settings, Precision precision)
+{
+    settings.precision = precision;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(certification->compute, certification->scene, &settings, &messages);
+    const bool is_unfit = messages.count > 0;
+    messages_print(&messages, NULL);
+    Film film;
+    const bool whole = renderer && renderer_render_film(renderer, AOV_OBJECT | AOV_SHADOW | AOV_PATH, &film);
+    if (whole) {
+        certification->rows[precision].measured = true;
+        certification->rows[precision].errors = certify_compare(&certification->sample, &film);
+        film_free(&film);
+    }
+    renderer_close(renderer);
+    return whole                    ? EXIT_DONE
+           : is_unfit               ? EXIT_USER
+           : progress_interrupted() ? EXIT_INTERRUPTED
+                                    : EXIT_MACHINE;
+}
+
+static int scene_certify(const CertifyOptions *options, const Scene *scene, Compute *compute)
+{
+    Certification certification = {.options = options, .scene = scene, .compute = compute};
+    uint32_t width = options->width, height = options->height;
+    image_size_choose(scene, &width, &height);
+    const double start = clock_seconds();
+    if (!certify_sample_open(&certification.sample, scene, width, height, options->pixels,
+                             options->bounce_count, progress_interrupted))
+        return EXIT_INTERRUPTED;
+    certification.reference_seconds = clock_seconds() - start;
+    RenderSettings settings = settings_whole(&options->common, width, height);
+    settings.bounce_count = options->bounce_count;
+    settings.shift_to_eye = true;
+    settings.stop = progress_interrupted;
+    int status = EXIT_DONE;
+    for (unsigned i = 0; i < PRECISION_COUNT && status == EXIT_DONE; i++) {
+        const bool is_possible = i != PRECISION_DOUBLE || compute->device->fp64;
+        if (options->precisions ? options->precisions >> i & 1 : is_possible)
+            status = precision_compare(&certification, settings, (Precision)i);
+    }
+    if (status == EXIT_DONE && options->as_json)
+        json_report(&certification);
+    else if (status == EXIT_DONE)
+        text_print(&certification);
+    certify_sample_close(&certification.sample);
+    return status;
+}
+
+int command_certify(int argument_count, char **arguments)
+{
+    CertifyOptions options;
+    int status = options_read(&options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
+    Scene scene = {0};
+    OpenDevice open;
+    status = EXIT_USER;
+    if (scene_open(&scene, options.scene, &options.common) && device_open(&open, options.common.device)) {
+        Progress progress;
+        progress_open(&progress, true); // for the interrupts
+        status = device_close(&open, scene_certify(&options, &scene, &open.compute));
+        progress_close(&progress);
+    }
+    scene_free(&scene);
+    return status;
+}

@@ -1,0 +1,125 @@
+#include "host/verify/certify.h"
+
+#include "host/base/hash.h"
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
+#include <math.h>
+#include <stdlib.h>
+
+bool certify_is_undecided(const ReferencePixel *pixel)
+{
+    return pixel->margin < 0x1p-80;
+}
+
+// A pixel of a cell of the image, which is at least one pixel wide and high.
+static void place_choose(const CertifySample *sample, uint32_t columns, uint32_t rows, size_t index,
+                         uint32_t place[2])
+{
+    const uint32_t cell[2] = {(uint32_t)(index % columns), (uint32_t)(index / columns)};
+    const uint32_t counts[2] = {columns, rows}, sizes[2] = {sample->width, sample->height};
+    const uint64_t hash = hash_bytes(HASH_START, cell, sizeof cell);
+    for (int axis = 0; axis < 2; axis++) {
+        const uint32_t first = (uint32_t)((uint64_t)cell[axis] * sizes[axis] / counts[axis]);
+        const uint32_t end = (uint32_t)((uint64_t)(cell[axis] + 1) * sizes[axis] / counts[axis]);
+        place[axis] = first + (uint32_t)(hash >> (24 * axis) & 0xffffff) % (end - first);
+    }
+}
+
+typedef struct {
+    CertifySample *sample;
+    const ReferenceScene *scene;
+    unsigned bounce_count;
+    bool (*stop)(void);
+} Computation;
+
+static void pixels_compute(void *context, size_t begin, size_t end)
+{
+    const Computation *computation = context;
+    CertifySample *sample = computation->sample;
+    for (size_t i = begin; i < end; i++) {
+        if (computation->stop && computation->stop()) return;
+        const ReferenceRay ray =
+            reference_camera_ray(&computation->scene->scene.camera, sample->width, sample->height,
+                                 sample->places[i][0], sample->places[i][1]);
+        sample->pixels[i] = reference_pixel(computation->scene, &ray, computation->bounce_count,
+                                            sample->shadows + i * sample->light_count);
+    }
+}
+
+bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
+                         size_t count, unsigned bounce_count, bool (*stop)(void))
+{
+    const double side = sqrt((double)width * height / (double)count);
+    const uint32_t columns = (uint32_t)fmin(width, fmax(1, round(width / side)));
+    const uint32_t rows = (uint32_t)fmin(height, fmax(1, round(height / side)));
+    *sample = (CertifySample){.width = width,
+                              .height = height,
+                              .light_count = (uint32_t)scene->lights.count,
+                              .count = (size_t)columns * rows};
+    sample->places = memory_allocate(sample->count, sizeof *sample->places);
+    sample->pixels = memory_allocate(sample->count, sizeof *sample->pixels);
+    sample->shadows = memory_allocate_zeroed(sample->count * sample->light_count + 1, sizeof(bool));
+    for (size_t i = 0; i < sample->count; i++)
+        place_choose(sample, columns, rows, i, sample->places[i]);
+    ReferenceScene reference = reference_scene_open(scene);
+    Computation computation = {sample, &reference, bounce_count, stop};
+    parallel_run(sample->count, 1, pixels_compute, &computation);
+    reference_scene_close(&reference);
+    const bool stopped = stop && stop();
+    if (stopped) certify_sample_close(sample);
+    return !stopped;
+}
+
+void certify_sample_close(CertifySample *sample)
+{
+    free(sample->places);
+    free(sample->pixels);
+    free(sample->shadows);
+    *sample = (CertifySample){0};
+}
+
+// Adds to the first of the counts whose decision is not the reference's; false if all are.
+static bool is_wrong(const CertifySample *sample, size_t index, const Film *film, size_t pixel,
+                     CertifyErrors *errors)
+{
+    const ReferencePixel *expected = &sample->pixels[index];
+    if (film->object[pixel] != expected->object) {
+        errors->object++;
+        return true;
+    }
+    for (size_t i = 0; i < sample->light_count && expected->object != UINT32_MAX; i++)
+        if ((film->shadow[pixel * sample->light_count + i] != 0) !=
+            sample->shadows[index * sample->light_count + i]) {
+            errors->shadow++;
+            return true;
+        }
+    errors->path += film->path[pixel] != expected->path;
+    return film->path[pixel] != expected->path;
+}
+
+CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
+{
+    CertifyErrors errors = {0};
+    for (size_t i = 0; i < sample->count; i++) {
+        const ReferencePixel *expected = &sample->pixels[i];
+        if (certify_is_undecided(expected)) {
+            errors.undecided++;
+            continue;
+        }
+        errors.compared++;
+        const size_t pixel = (size_t)sample->places[i][1] * film->width + sample->places[i][0];
+        const bool wrong = is_wrong(sample, i, film, pixel, &errors);
+        if (wrong) errors.margin = fmax(errors.margin, expected->margin);
+        if (expected->has_texture) continue;
+        errors.colors++;
+        const double *color = film->color + 3 * pixel;
+        const double error =
+            fmax(fabs(color[0] - expected->color.x),
+                 fmax(fabs(color[1] - expected->color.y), fabs(color[2] - expected->color.z)));
+        if (error > fmax(errors.color, errors.wrong_color))
+            errors.worst[0] = sample->places[i][0], errors.worst[1] = sample->places[i][1];
+        double *largest = wrong ? &errors.wrong_color : &errors.color;
+        *largest = fmax(*largest, error);
+    }
+    return errors;
+}

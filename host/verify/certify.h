@@ -1,0 +1,40 @@
+// A scene's image against the reference, on a sample of its pixels: which objects, shadows and paths are not
+// those of exact arithmetic on the scene as its file says it, and how far colors are off.
+#pragma once
+
+#include "host/render/film.h"
+#include "host/verify/reference_color.h"
+
+// What the reference says of a sample of an image's pixels.
+typedef struct {
+    uint32_t width, height, light_count;
+    size_t count;
+    uint32_t (*places)[2]; // x, y
+    ReferencePixel *pixels;
+    bool *shadows; // of each pixel, for each light
+} CertifySample;
+
+// Each decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
+bool certify_is_undecided(const ReferencePixel *pixel);
+
+// One pixel of each of about `count` equal parts of the image, at a place that a hash chooses; all of it if
+// it has no more. Computes on all processors. False if `stop` returned true; there is nothing to close then.
+bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
+                         size_t count, unsigned bounce_count, bool (*stop)(void));
+void certify_sample_close(CertifySample *sample);
+
+// Of an image, all numbers of pixels. A pixel is wrong in one way at most, the first of these.
+typedef struct {
+    size_t compared, undecided; // those compared are decided
+    size_t object, shadow, path;
+    size_t colors;      // of pixels without a texture, right or wrong
+    double color;       // the largest error of a channel where nothing is wrong
+    double wrong_color; // and where something is
+    uint32_t worst[2];  // where the larger of these is
+    // Of wrong pixels: how far the exact ray is from the curve at which its answer changes, the most, in
+    // parts of the distance. What single may see wrong is at most some units of roundoff from it.
+    double margin;
+} CertifyErrors;
+
+// `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH and the color.
+CertifyErrors certify_compare(const CertifySample *sample, const Film *film);

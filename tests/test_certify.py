@@ -1,0 +1,46 @@
+#!/usr/bin/env -S python3 -B
+"""glint certify: double decides as the reference does on every kind of scene, and errors are noticed.
+
+run_tests: sanitize-long-only"""
+from glint import PLANET, ROOT, TestCase, main, need_device, write
+
+SCENES = "demo", "mirror-glass", "paraboloids", "triangles"
+SMALL = "--size 96x64 --pixels 600"
+HAS_DOUBLE = need_device()["fp64"]
+
+
+class Certify(TestCase):
+    def certify(self, scene, options):
+        report = self.json(f"certify {scene} {SMALL} --json {options}")
+        return report, {row["precision"]: row for row in report["precisions"]}
+
+    def test_the_best_precision_is_right(self):
+        """In scenes of every shape, light and kind of bounce. The largest error of double is 3e-12."""
+        best = "double" if HAS_DOUBLE else "strict"
+        for name in SCENES:
+            with self.subTest(name):
+                report, rows = self.certify(f"{ROOT}/scenes/{name}.yaml", f"--precision {best}")
+                self.assertEqual(list(rows), [best])
+                wrong = rows[best]["wrong"]
+                self.assertLessEqual(wrong["object"] + wrong["shadow"] + wrong["path"], 0 if HAS_DOUBLE else 2)
+                self.assertLess(report["undecided"], report["pixels"] / 10)
+                self.assertEqual(rows[best]["compared"], report["pixels"] - report["undecided"])
+                if HAS_DOUBLE:
+                    self.assertLess(rows[best]["color"]["max_right"], 1e-10)
+
+    def test_errors_are_noticed(self):
+        """A planet at fast loses the shadow of a small sphere; a wrong pixel has a wrong color."""
+        write("planet.yaml", PLANET)
+        _, rows = self.certify("planet.yaml", "--precision fast")
+        wrong = rows["fast"]["wrong"]
+        self.assertGreater(wrong["object"] + wrong["shadow"], 5)
+        self.assertGreater(rows["fast"]["color"]["max_wrong"], 0.01)
+        self.assertGreater(wrong["margin"], 0)
+
+    def test_refused(self):
+        for arguments, pattern in ((f"{ROOT}/scenes/demo.yaml --pixels 0", "--pixels"), ("", "no scene"), ("none.yaml", "none.yaml")):
+            self.refuses(f"certify {arguments}", pattern)
+
+
+if __name__ == "__main__":
+    main()
