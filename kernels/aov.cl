@@ -22,7 +22,7 @@ typedef struct {
 
 // light_count: 0 without a shadow layer.
 static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
-                                  uint light_count)
+                                  uint light_count, global int *doubts)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
@@ -33,20 +33,26 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     film_store_color(layers->normal, tile, vector_select(surface.found, surface.shading_normal, zero));
     film_store_color(layers->position, tile, vector_select(surface.found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
+    mask doubt = mask_none();
+    if (IS_CERTIFIED) doubt = hit.doubt | (surface.found & surface.doubt);
     for (uint i = 0; i < light_count; i++) {
-        mask shadowed = surface.found & !light_visibility(scene, &surface, i).lit;
+        LightVisibility light = light_visibility(scene, &surface, i);
+        if (IS_CERTIFIED) doubt = doubt | (surface.found & (light.doubt | light.facing_doubt));
+        mask shadowed = surface.found & !light.lit;
         film_store_integer(layers->shadow, tile, light_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }
+    if (IS_CERTIFIED) film_count_doubts(doubts, tile, doubt, true);
 }
 
-kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint light_count)
+kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint light_count,
+                global int *doubts, global const uint *pixels)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, pixels};
     const HitLayers layers = {HIT_AOV_LIST(LAYER_VALUE)};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &layers, light_count);
+        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &layers, light_count, doubts);
     }
 }

@@ -3,7 +3,7 @@
 #define CAMERA_H
 
 #include "scene.h"
-#include "traversal/ray.h"
+#include "shapes/certain.h"
 
 typedef struct {
     integer x, y; // in the whole image, from the top left
@@ -21,6 +21,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
     const Vector eye = {(real)(0), (real)(0), (real)(0)};
     Ray ray = ray_make_unit(eye, vector_normalize(direction), active);
+    if (IS_CERTIFIED) ray.direction_error = (real)(CAMERA_DIRECTION_ERROR * UNIT_ROUNDOFF);
     ray_set_common_origin(&ray, COMMON_ORIGIN_EYE);
     return ray;
 }

@@ -5,9 +5,13 @@
 #include "camera.h"
 
 typedef struct {
-    uint first_x, first_y, width, height; // in the whole image
+    uint first_x, first_y, width, height; // in the whole image; of a list its length and 1
     uint cell;                            // 1, or the side of the squares that have one pixel each
+    global const uint *pixels;            // the list: x and y of each pixel in the whole image
 } Band;
+
+// Kernels that repeat what `certified` left in doubt render lists of pixels.
+#define IS_PIXEL_LIST (IS_CERTIFIED && IS_DOUBLE)
 
 typedef struct {
     Pixels pixels;
@@ -35,9 +39,28 @@ static inline Pixels pixels_scatter(Pixels corner, uint cell)
     return (Pixels){corner.x + ((across * side) >> 15), corner.y + ((down * side) >> 15)};
 }
 
+// The work-item's tile number `which` of a list, with pixels from anywhere.
+static inline Tile list_tile(const Band *band, uint which)
+{
+    uint first = ((uint)get_global_id(0) * TILES + which) * LANES;
+    if (get_global_id(1) > 0) first = band->width;
+    IntegerLanes index, x, y, inside;
+    for (uint lane = 0; lane < LANES; lane++) {
+        uint at = min(first + lane, band->width - 1);
+        inside.each[lane] = first + lane < band->width ? 1 : 0;
+        index.each[lane] = at;
+        x.each[lane] = band->pixels[2 * at];
+        y.each[lane] = band->pixels[2 * at + 1];
+    }
+    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), index.all, 0};
+    if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
+    return tile;
+}
+
 // The work-item's tile number `which`, from 0 to TILES - 1.
 static inline Tile band_tile(const Band *band, uint which)
 {
+    if (IS_PIXEL_LIST) return list_tile(band, which);
     Tile tile;
     uint column = (uint)get_global_id(0) * MACRO_TILE_COLUMNS + which % MACRO_TILE_COLUMNS;
     uint row = (uint)get_global_id(1) * MACRO_TILE_ROWS + (which >> MACRO_TILE_COLUMNS_LOG2);
@@ -84,7 +107,7 @@ static inline void film_store_row(global scalar *film, scalar4 r, scalar4 g, sca
 static inline void film_store_color(global scalar *film, const Tile *tile, Vector color)
 {
 #if TILE_WIDTH == 4
-    if (lanes_all(tile->inside)) {
+    if (!IS_PIXEL_LIST && lanes_all(tile->inside)) {
         global scalar *row = film + (size_t)tile->index.s0 * 3;
         size_t next = (size_t)tile->width * 3;
 #if LANES == 16
@@ -102,6 +125,18 @@ static inline void film_store_color(global scalar *film, const Tile *tile, Vecto
     film_store(film, tile, 3, 0, color.x);
     film_store(film, tile, 3, 1, color.y);
     film_store(film, tile, 3, 2, color.z);
+}
+
+// Adds the lanes in doubt to their pixels' counts, of which a first launch finds none.
+static inline void film_count_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
+{
+    if (!is_first && !lanes_any(doubt)) return;
+    IntegerLanes counted = {doubt}, inside = {tile->inside}, index = {tile->index};
+    for (uint lane = 0; lane < LANES; lane++) {
+        if (!inside.each[lane]) continue;
+        int before = is_first ? 0 : doubts[index.each[lane]];
+        doubts[index.each[lane]] = before + (counted.each[lane] != 0);
+    }
 }
 
 static inline Vector film_load_color(global const scalar *film, const Tile *tile)

@@ -3,21 +3,25 @@
 #include "film.h"
 #include "shading/path.h"
 
-static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths)
+static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths,
+                                            global int *doubts)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     ShadedHit hit;
     unsigned_integer signature;
-    ray_tree_color(scene, ray, false, &hit, &signature);
+    mask doubt;
+    ray_tree_color(scene, ray, false, &hit, &signature, &doubt);
+    if (IS_CERTIFIED) film_count_doubts(doubts, tile, doubt, true);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 
-kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths)
+kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths, global int *doubts,
+                 global const uint *pixels)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, pixels};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths);
+        if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths, doubts);
     }
 }

@@ -10,7 +10,8 @@
 // million equal samples would be off by 1 %.
 static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
-                                     global scalar *compensation, uint first_sample, uint last_sample)
+                                     global scalar *compensation, uint first_sample, uint last_sample,
+                                     global int *doubts)
 {
     Tile tiles[PACKETS];
     Ray rays[PACKETS];
@@ -34,7 +35,9 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
         for (uint i = 0; i < PACKETS; i++) {
             if (!lanes_any(tiles[i].inside)) continue;
             unsigned_integer path;
-            Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path);
+            mask doubt;
+            Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path, &doubt);
+            if (IS_CERTIFIED) film_count_doubts(doubts, &tiles[i], doubt, sample == 0);
             Color3 color = vector_subtract(traced, lost[i]);
             Color3 next = vector_add(sums[i], color);
             lost[i] = vector_subtract(vector_subtract(next, sums[i]), color);
@@ -55,11 +58,12 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar *film,
                    global scalar *compensation, uint4 band_pixels, uint first_sample, uint last_sample,
-                   global uint *ray_counts, uint cell)
+                   global uint *ray_counts, uint cell, global int *doubts, global const uint *pixels)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, pixels};
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
-        tiles_render(&scene, &band, first_tile, offsets, film, compensation, first_sample, last_sample);
+        tiles_render(&scene, &band, first_tile, offsets, film, compensation, first_sample, last_sample,
+                     doubts);
 }

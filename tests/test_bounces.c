@@ -190,7 +190,7 @@ static void shows_what_the_reference_shows(void **state)
         ReferenceRay ray = reference_camera_ray(&scene.camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
         expected[i] = reference_path_color(&scene, &ray, &path);
     }
-    for (Precision precision = PRECISION_SINGLE; precision < PRECISION_COUNT; precision++)
+    for (Precision precision = PRECISION_SINGLE; precision < ARITHMETIC_COUNT; precision++)
         compare(trial, &scene, expected, precision);
     scene_free(&scene);
 }

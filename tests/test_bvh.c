@@ -536,7 +536,7 @@ static void closed_meshes_do_not_leak(void **state)
     TraceHit *hits = memory_allocate(count, sizeof *hits);
     for (size_t place = 0; place < 2; place++) {
         Scene scene = closed_scene(centers[place], radii[place]);
-        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (!probe_has(precision)) continue;
             rays_at_seams(rays, count, &scene.meshes.items[0], centers[place], precision == PRECISION_DOUBLE);
             for (BvhChoice bvh = BVH_ON; bvh <= BVH_OFF; bvh++) {

@@ -94,7 +94,8 @@ static void trial_make(Trial *trial, bool from_eye)
         (scalar4){trial->common_origin.x, trial->common_origin.y, trial->common_origin.z, 0};
     for (size_t i = 0; i < SPHERES_PER_ORIGIN; i++)
         line_make(trial, i, from_eye);
-    culling_fill(&trial->flat, trial->is_double);
+    const CompileSettings settings = {.precision = trial->is_double ? PRECISION_DOUBLE : PRECISION_SINGLE};
+    culling_fill(&trial->flat, &settings);
 }
 
 // What the device finds, with the arrays in its width.
@@ -181,7 +182,8 @@ static cl_program culling_program(bool is_double)
 {
     Text prelude = {0};
     text_appendf(&prelude,
-                 "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 0\n#define IS_DOUBLE %d\n"
+                 "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 0\n#define IS_CERTIFIED 0\n#define "
+                 "IS_DOUBLE %d\n"
                  "#define REPAIRS_DIVIDE 0\n#define HAS_FMA 1\n#define IS_COUNTING 0\n#define PERTURB "
                  "0\n#define PERTURB_SEED "
                  "0u\n#define PERTURB_SCALE 1\n",

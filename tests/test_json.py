@@ -96,9 +96,12 @@ class Json(TestCase):
             self.assertIn(SECTIONS[heading], read(PAGE))
 
     def test_render(self):
-        budget = "--max-error 0.5 " if need_device()["fp64"] else ""
-        self.check_members("glint render --timing=json", self.json(
-            f"render plain.yaml {SMALL} {budget}--aov t,path --timing=json"))
+        fp64 = need_device()["fp64"]
+        budget = "--max-error 0.5 " if fp64 else ""
+        outputs = [self.json(f"render plain.yaml {SMALL} {budget}--aov t,path --timing=json")]
+        if fp64:
+            outputs.append(self.json(f"render plain.yaml {SMALL} --precision certified --timing=json"))
+        self.check_members("glint render --timing=json", *outputs)
 
     def test_check(self):
         write("warned.yaml", WARNED)

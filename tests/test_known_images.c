@@ -47,7 +47,7 @@ static Film render(const Scene *scene, uint32_t width, uint32_t height, Precisio
 // Runs a check at every precision the device has.
 static void at_each_precision(void (*run)(Precision precision))
 {
-    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         snprintf(place, sizeof place, "%s", precision_names[precision]);
         run(precision);

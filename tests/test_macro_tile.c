@@ -174,7 +174,7 @@ static void no_pixel_depends_on_the_bvh(void **state)
     (void)state;
     static const double scales[] = {1, 0x1p-20, 0x1p20};
     const size_t scene_count = tests_are_long() ? 60 : 12;
-    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision) || (!tests_are_long() && precision > PRECISION_SINGLE)) continue;
         for (size_t i = 0; i < scene_count; i++) {
             random_state.state = i + 1;

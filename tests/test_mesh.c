@@ -585,7 +585,7 @@ static void triangles_without_area_are_never_hit(void **state)
     const char *objects = "  - mesh: {file: a.obj, material: {}}\n";
     static const char degenerate[] = "v 0.1 0.1 1\nv 0.7 0.7 1\nv 0.4 0.4 1\nv 0.25 0.25 1\n"
                                      "f 5 6 5\nf 5 6 7\nf 5 8 6\nf 5 5 5\n";
-    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         file_write("a.obj", square);
         Scene scene = scene_of_objects(objects);

@@ -44,12 +44,12 @@ static void repair(uint32_t seed, const float *a, const float *b, float *quotien
 {
     const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT;
     char prelude[256];
-    snprintf(
-        prelude, sizeof prelude,
-        "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 1\n#define IS_DOUBLE 0\n#define HAS_FMA 1\n"
-        "#define REPAIRS_DIVIDE 1\n#define PERTURB 1\n#define PERTURB_SCALE 1\n"
-        "#define PERTURB_SEED %uu\n",
-        seed);
+    snprintf(prelude, sizeof prelude,
+             "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 1\n#define IS_CERTIFIED 0\n#define "
+             "IS_DOUBLE 0\n#define HAS_FMA 1\n"
+             "#define REPAIRS_DIVIDE 1\n#define PERTURB 1\n#define PERTURB_SCALE 1\n"
+             "#define PERTURB_SEED %uu\n",
+             seed);
     cl_program program = probe_program(repair_text, prelude, "-cl-std=CL1.2");
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "repair");
     cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
@@ -129,7 +129,8 @@ static void multiply_add(unsigned lanes, bool fast, const float *a, const float 
     char prelude[256];
     snprintf(
         prelude, sizeof prelude,
-        "#define LANES %u\n#define IS_FAST %d\n#define IS_STRICT %d\n#define IS_DOUBLE 0\n#define HAS_FMA 0\n"
+        "#define LANES %u\n#define IS_FAST %d\n#define IS_STRICT %d\n#define IS_CERTIFIED 0\n#define "
+        "IS_DOUBLE 0\n#define HAS_FMA 0\n"
         "#define REPAIRS_DIVIDE 0\n#define PERTURB 0\n#define PERTURB_SCALE 1\n#define PERTURB_SEED 0u\n",
         lanes, fast, !fast);
     const char *options = fast ? "-cl-std=CL1.2 -cl-fast-relaxed-math" : "-cl-std=CL1.2";

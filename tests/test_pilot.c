@@ -152,7 +152,7 @@ static void pilot_chooses(void **state)
         pilot_run(&pilot, &(ErrorBudget){1e-6, ERROR_RMSE}, &probe_compute, &scene, &settings, &messages));
     assert_int_equal(pilot.chosen, PRECISION_DOUBLE);
     assert_int_equal(pilot.pixels, (WIDTH / 3) * (HEIGHT / 3));
-    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+    for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         const PilotCandidate *candidate = &pilot.candidates[i];
         assert_int_equal(candidate->status, i == PRECISION_DOUBLE ? PILOT_MEASURED : PILOT_UNTRIED);
         assert_true((candidate->pixel_seconds > 0) == (i == PRECISION_DOUBLE));

@@ -169,7 +169,7 @@ static void check_sides(const char *shape, double reach, bool only_inside)
     Text text = {0};
     text_appendf(&text, LIT MATERIAL "%s\n", shape);
     Scene scene = scene_of_text("s.nff", text_c(&text));
-    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         TraceHit hits[2] = {0};
         assert_true(probe_trace(&scene, precision, 0, rays, 2, hits));

@@ -139,7 +139,7 @@ static void keeps_small_shadows_on(const Ground *ground)
                  ground->shape);
     Scene scene = scene_of_text("ground.yaml", text_c(&text));
     text_free(&text);
-    for (Precision precision = ground->from; precision < PRECISION_COUNT; precision++) {
+    for (Precision precision = ground->from; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         RenderSettings settings = film_settings(128, 96, precision);
         hold_to_reference(&scene, &settings, ground->error, ground->name);

@@ -36,7 +36,7 @@ typedef struct {
 // Those of `single` and `strict` are the tiers B and C of the hard cases, with the slack at every angle,
 // since near a surface no ulp of a small t can be owed after a subtraction of larger numbers; those of `fast`
 // are twice `single`'s.
-static const Tolerance tolerances[PRECISION_COUNT] = {
+static const Tolerance tolerances[ARITHMETIC_COUNT] = {
     [PRECISION_FAST] = {16, 32, 8, 32, false},
     [PRECISION_SINGLE] = {8, 16, 4, 16, false},
     [PRECISION_STRICT] = {4, 4, 16, 16, true},
@@ -176,7 +176,7 @@ static void hold(const RandomShape *shapes, size_t count, Vector3 center, double
         for (size_t i = 0; i < count; i++)
             objects[i] = shapes[i].object;
         prepare(&trial, &scene, shapes, count, is_double, beside, random);
-        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (is_double != (precision == PRECISION_DOUBLE)) continue;
             hold_at(&trial, &scene, precision, 1, what);
             hold_at(&trial, &scene, precision, 0, what);

@@ -44,7 +44,7 @@ static const char help_text[] =
     "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
     "      --save FOLDER     write all compared arrays there, as .npy\n"
     "      --html FILE       self-contained HTML report\n"
-    "      --precision LIST  of fast, single, strict, double (default: all)\n" //
+    "      --precision LIST  of fast, single, strict, double, certified (default: the first four)\n" //
     HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
@@ -112,7 +112,7 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
 {
     *options = (AccuracyOptions){.variants = variant_options_default,
                                  .budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3}};
-    options->variants.precisions = (1u << PRECISION_COUNT) - 1;
+    options->variants.precisions = (1u << ARITHMETIC_COUNT) - 1;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
         if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;

@@ -1,5 +1,6 @@
 #include "host/cli/image_output.h"
 
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
@@ -38,6 +39,12 @@ struct ImageOutput {
     Film band;
     Scratch layers[LAYER_COUNT]; // that it points to
     double seconds;
+
+    // At `certified` all bands, since the files' headers tell what came of all.
+    struct {
+        Film *items;
+        size_t count, capacity;
+    } kept;
 };
 
 char *image_output_default_path(const char *scene_path)
@@ -134,6 +141,11 @@ static void notes_write(Notes *notes, const ImageOutput *output)
         text_free(&value);
         pilot_describe(&value, pilot);
         notes_add(notes, "Pilot", text_c(&value));
+    }
+    if (settings->precision == PRECISION_CERTIFIED) {
+        const RepeatCounts counts = renderers_repeats(output->renderers, output->renderer_count);
+        NOTE("Certified", "%llu samples repeated in double, %llu undecided",
+             (unsigned long long)counts.repeated, (unsigned long long)counts.undecided);
     }
     NOTE_EACH("Lanes", "%u", report->lanes);
     NOTE("Samples", "%u", settings->sample_count);
@@ -310,7 +322,7 @@ double image_output_bytes(const ImageOutput *output)
     return output->bytes;
 }
 
-bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
+static bool band_output(ImageOutput *output, const Film *band, MessageList *messages)
 {
     if (!output->opened && !files_open(output, band, messages)) return false;
     output->opened = true;
@@ -325,8 +337,26 @@ bool image_output_write(ImageOutput *output, const Film *band, MessageList *mess
     return !output->failed;
 }
 
+bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
+{
+    if (output->settings->precision != PRECISION_CERTIFIED) return band_output(output, band, messages);
+    array_push(output->kept, film_copy(band));
+    return true;
+}
+
+static bool kept_write(ImageOutput *output, MessageList *messages)
+{
+    bool written = true;
+    for (size_t i = 0; i < output->kept.count && written; i++)
+        written = band_output(output, &output->kept.items[i], messages);
+    return written;
+}
+
 static void image_output_free(ImageOutput *output)
 {
+    for (size_t i = 0; i < output->kept.count; i++)
+        film_free(&output->kept.items[i]);
+    free(output->kept.items);
     free(output->converted.items);
     for (Layer i = 0; i < LAYER_COUNT; i++)
         free(output->layers[i].items);
@@ -335,7 +365,7 @@ static void image_output_free(ImageOutput *output)
 
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
 {
-    if (!band_written(output)) {
+    if (!kept_write(output, messages) || !band_written(output)) {
         image_output_abandon(output);
         return false;
     }

@@ -71,7 +71,7 @@ enum {
 
 // For COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES.
 #define HELP_COMMON                                                                                          \
-    "      --precision P     fast, single, strict or double (default: single)\n" HELP_LANES                  \
+    "      --precision P     fast, single, strict, double or certified (default: single)\n" HELP_LANES       \
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT HELP_MAX_PIXELS
 

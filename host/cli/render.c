@@ -278,6 +278,11 @@ static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *optio
 {
     *checkpoint = NULL;
     if (!options->checkpoint) return true;
+    if (settings->precision == PRECISION_CERTIFIED) {
+        message_add(messages, MESSAGE_ERROR,
+                    "--checkpoint does not keep what --precision certified counts; use either");
+        return false;
+    }
     Text key = {0};
     checkpoint_key(&key, settings, options->output.aovs, renderers, count, ranks);
     const FilmHeader film = renderer_film_header(renderers[0], options->output.aovs);

@@ -97,7 +97,7 @@ static void pilot_print(const Pilot *pilot)
     line_print("pilot", pilot->seconds, text_c(&line));
     text_free(&line);
     line_print("  builds", pilot->build_seconds, "");
-    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+    for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         const PilotCandidate *candidate = &pilot->candidates[i];
         if (candidate->status != PILOT_MEASURED) continue;
         fprintf(stderr, "    %-9s %9.3g ns a pixel", precision_names[i], 1e9 * candidate->pixel_seconds);
@@ -109,12 +109,22 @@ static void pilot_print(const Pilot *pilot)
     }
 }
 
+// How much of the image `certified` rendered in double, and what that left in doubt.
+static void repeats_print(Renderer *const *renderers, size_t count, const RenderSettings *settings)
+{
+    if (settings->precision != PRECISION_CERTIFIED) return;
+    const RepeatCounts counts = renderers_repeats(renderers, count);
+    fprintf(stderr, "certified: %llu samples repeated in double, %llu undecided\n",
+            (unsigned long long)counts.repeated, (unsigned long long)counts.undecided);
+}
+
 static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,
                        const RenderSettings *settings, const HostTimes *host)
 {
     fprintf(stderr, "%ux%u, %u %s per pixel, precision %s\n", settings->region_width, settings->region_height,
             settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
             precision_names[settings->precision]);
+    repeats_print(renderers, count, settings);
     line_print("parse", host->parse_seconds, "");
     if (host->pilot) pilot_print(host->pilot);
     for (size_t i = 0; i < count; i++) {
@@ -223,7 +233,7 @@ static void pilot_json(Json *json, const Pilot *pilot)
     json_number(json, "total_ms", 1e3 * pilot->seconds);
     json_number(json, "build_ms", 1e3 * pilot->build_seconds);
     json_begin_array(json, "candidates");
-    for (unsigned i = 0; i < PRECISION_COUNT; i++)
+    for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
         candidate_json(json, pilot, (Precision)i);
     json_end(json);
     json_end(json);
@@ -238,6 +248,11 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     size_json(json, settings->region_width, settings->region_height);
     json_integer(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
+    if (settings->precision == PRECISION_CERTIFIED) {
+        const RepeatCounts repeats = renderers_repeats(renderers, count);
+        json_integer(json, "repeated_samples", (int64_t)repeats.repeated);
+        json_integer(json, "undecided_samples", (int64_t)repeats.undecided);
+    }
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);
     json_begin_array(json, "by_device");

@@ -222,6 +222,8 @@ static int options_read(TraceOptions *options, int argument_count, char **argume
             return EXIT_USER;
     }
     if (!option_only_scene("trace", argument_count, arguments)) return EXIT_USER;
+    if (options->common.precision == PRECISION_CERTIFIED)
+        return option_usage_fault("trace", "--precision certified is for images");
     if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
     if (image_format_of(options->output) != IMAGE_UNKNOWN)
         return option_usage_fault("trace", "writes CSV: the output's name must not be an image's or array's");

@@ -233,6 +233,8 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
         else if (option_common(&options->common, option, optarg, &valid) && !valid)
             return EXIT_USER;
     }
+    if (options->common.precision == PRECISION_CERTIFIED)
+        return option_usage_fault("verify", "--precision certified is for images");
     options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
     for (size_t i = 0; i < options->cases.count; i++)
         if (!is_case(options->cases.names[i])) return refuse_case(options->cases.names[i]);

@@ -4,7 +4,7 @@
 #include "host/compile/stages.h"
 #include "host/compile/transform.h"
 
-const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double"};
+const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double", "certified"};
 
 const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
 
@@ -31,7 +31,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     double start = clock_seconds();
     bvh_flatten(compiled, settings);
     compiled->bvh_seconds = clock_seconds() - start;
-    culling_fill(compiled, is_double);
+    culling_fill(compiled, settings);
     if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
     header_write(compiled, scene, settings);
     return true;
@@ -67,7 +67,7 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
     double start = clock_seconds();
     bvh_refit(compiled);
     compiled->bvh_seconds = clock_seconds() - start;
-    culling_fill(compiled, is_double);
+    culling_fill(compiled, settings);
     if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
     compiled->eye = rounding.eye;
     return true;

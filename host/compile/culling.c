@@ -3,24 +3,24 @@
 #include <float.h>
 #include <math.h>
 
-static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, double roundoff)
+// `slack`: of |v|^2.
+static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, double slack)
 {
     Vector3 v = vector_subtract(sphere.center, common_origin);
-    double squared = vector_dot(v, v),
-           power = squared * (1 - CULL_SPHERE_SLACK * roundoff) - sphere.radius * sphere.radius;
+    double squared = vector_dot(v, v), power = squared * (1 - slack) - sphere.radius * sphere.radius;
     if (!(fabs(power) <= CULL_SPHERE_MAX && squared <= CULL_SPHERE_MAX))
         return (CullSphere){{0, 0, 0, -CULL_SPHERE_MAX}};
     return (CullSphere){{v.x, v.y, v.z, power}};
 }
 
 // Where the BVH is empty all rays miss.
-static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, double roundoff)
+static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, double slack)
 {
     uint32_t count = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         count += compiled->bounded_counts[kind];
     if (count == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_MAX}};
-    return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, roundoff);
+    return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, slack);
 }
 
 // The first primitive of a kind outside the BVH, and the end of those that have cull spheres: planes have
@@ -35,14 +35,14 @@ static Outside outside_bvh(const CompiledScene *compiled, size_t kind)
     return (Outside){first, kind == KIND_PLANES ? first : compiled->arrays[FLAT_FIRST_SHAPE + kind].count};
 }
 
-static void row_fill(const CompiledScene *compiled, Vector3 common_origin, double roundoff, CullSphere *row)
+static void row_fill(const CompiledScene *compiled, Vector3 common_origin, double slack, CullSphere *row)
 {
-    *row++ = bvh_cull_sphere(compiled, common_origin, roundoff);
+    *row++ = bvh_cull_sphere(compiled, common_origin, slack);
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         Outside outside = outside_bvh(compiled, kind);
         for (size_t i = outside.first; i < outside.end; i++) {
             const void *primitive = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], i);
-            *row++ = cull_sphere(primitive_bounding_sphere(kind, primitive), common_origin, roundoff);
+            *row++ = cull_sphere(primitive_bounding_sphere(kind, primitive), common_origin, slack);
         }
     }
 }
@@ -50,9 +50,10 @@ static void row_fill(const CompiledScene *compiled, Vector3 common_origin, doubl
 // 16 MiB of floats; a scene that would need more does without.
 enum { CULL_SPHERES_MAX = 1 << 20 };
 
-void culling_fill(CompiledScene *compiled, bool is_double)
+void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
 {
-    double roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2;
+    const double roundoff = (settings->precision == PRECISION_DOUBLE ? DBL_EPSILON : FLT_EPSILON) / 2;
+    const double slack = roundoff * (settings->certifies ? CERTIFIED_CULL_SPHERE_SLACK : CULL_SPHERE_SLACK);
     const FlatArray *lights = &compiled->arrays[FLAT_LIGHTS];
     size_t count = 1;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
@@ -67,8 +68,7 @@ void culling_fill(CompiledScene *compiled, bool is_double)
     compiled->cull_sphere_count = (uint32_t)count;
     flat_array_renew(compiled, FLAT_CULL_SPHERES, count * (1 + lights->count));
     CullSphere *row = compiled->arrays[FLAT_CULL_SPHERES].items;
-    row_fill(compiled, (Vector3){0, 0, 0}, roundoff, row);
+    row_fill(compiled, (Vector3){0, 0, 0}, slack, row);
     for (size_t i = 0; i < lights->count; i++)
-        row_fill(compiled, vector3_of(&((const FlatLight *)lights->items)[i].position), roundoff,
-                 row += count);
+        row_fill(compiled, vector3_of(&((const FlatLight *)lights->items)[i].position), slack, row += count);
 }

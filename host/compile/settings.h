@@ -8,7 +8,10 @@ typedef enum {
     PRECISION_SINGLE, // float, uncontracted; divisions and roots as the device has them
     PRECISION_STRICT, // float, compensated and correctly rounded: the same bits on every device
     PRECISION_DOUBLE, // double
-    PRECISION_COUNT
+    // single, with a bound on the error of each decision; pixels with an undecided one are repeated in double
+    PRECISION_CERTIFIED,
+    PRECISION_COUNT,
+    ARITHMETIC_COUNT = PRECISION_CERTIFIED // those of one arithmetic come first
 } Precision;
 extern const char *const precision_names[PRECISION_COUNT];
 
@@ -21,6 +24,7 @@ typedef struct {
     uint32_t sample_count;  // per pixel, >= 1
     uint32_t bounce_count;  // of a ray, at most
     Precision precision;
+    bool certifies; // at `certified`, and at `double` what that repeats: culls are wider
     uint32_t lanes; // of the kernel: 1, 4, 8, 16
     BvhChoice bvh;
     FeatureSet extra_features; // built in although the scene does not need them

@@ -42,8 +42,8 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
 void bvh_refit(CompiledScene *compiled);
 
 // culling.c: FLAT_CULL_SPHERES, of the BVH and of each primitive outside it; none where they would be more
-// than a million. `is_double`: the kernel's precision is double.
-void culling_fill(CompiledScene *compiled, bool is_double);
+// than a million.
+void culling_fill(CompiledScene *compiled, const CompileSettings *settings);
 
 // contact.c: a box around all places where a transparent primitive may touch an opaque one; an empty one
 // where none does. Only hits in it are tested for an opaque surface in the same place

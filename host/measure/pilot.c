@@ -75,12 +75,12 @@ static bool sample_render(Pilot *pilot, Precision precision, SampleFilm *sample,
 static Precision fastest_choose(const Pilot *pilot)
 {
     double least = INFINITY;
-    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+    for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         const PilotCandidate *candidate = &pilot->candidates[i];
         if (candidate->verdict.keeps) least = fmin(least, candidate->pixel_seconds);
     }
     Precision chosen = PRECISION_DOUBLE;
-    for (unsigned i = PRECISION_COUNT; i-- > 0;) // from the most precise
+    for (unsigned i = ARITHMETIC_COUNT; i-- > 0;) // from the most precise
         if (pilot->candidates[i].verdict.keeps &&
             pilot->candidates[i].pixel_seconds <= time_tolerance * least)
             return (Precision)i;
@@ -91,11 +91,11 @@ static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *com
                                const RenderSettings *settings)
 {
     // all bounds hold together
-    const double risk = (1 - pilot->confidence) / (PRECISION_COUNT - 1);
+    const double risk = (1 - pilot->confidence) / (ARITHMETIC_COUNT - 1);
     const bool is_display = scene->color_meaning == COLORS_DISPLAY;
     if (!sample_judge(&pilot->budget, reference, reference, risk, is_display).keeps) return true;
     bool is_kept = false;
-    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+    for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         if (i == PRECISION_DOUBLE) continue;
         // those beyond single do more work than it, and build another kernel
         if (i > PRECISION_SINGLE && is_kept) break;

@@ -24,7 +24,7 @@ typedef struct {
 typedef struct {
     ErrorBudget budget;
     double confidence; // that every candidate's bound holds
-    PilotCandidate candidates[PRECISION_COUNT];
+    PilotCandidate candidates[ARITHMETIC_COUNT];
     Precision chosen;
     size_t pixels, image_pixels; // rendered at each precision; in the region
     double seconds, build_seconds;

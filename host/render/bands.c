@@ -40,7 +40,16 @@ static size_t group_side(const Renderer *renderer)
 typedef struct {
     uint32_t rows;
     cl_mem ray_counts, compensation, layers[LAYER_COUNT];
+    cl_mem doubts;        // at `certified`: of each pixel's color, how many of its samples are in doubt
+    cl_mem center_doubts; // likewise of its AOVs, 0 or 1
+    cl_mem pixels;        // where a list is rendered: x and y of each
 } BandBuffers;
+
+// The pixels that a launch renders.
+typedef struct {
+    cl_uint4 band; // x, y, width, height; of a list its length and 1
+    size_t items[2], group[2];
+} Place;
 
 // The film of these rows, without its layers.
 static Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count)
@@ -73,12 +82,12 @@ static bool layer_in(unsigned layers, Layer layer)
     return layers >> layer & 1;
 }
 
-static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, uint32_t rows)
+// For as many pixels as the film has.
+static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
 {
-    const Film film = film_of_rows(renderer, 0, rows);
     // a kernel fills all of its layers, but computes shadows only on request
     unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & AOVS_OF_PATH);
-    buffers->rows = rows;
+    buffers->rows = film.height;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         bool empty = layer == LAYER_SHADOW && !(aovs & AOV_SHADOW);
         if (layer_in(filled, layer))
@@ -86,25 +95,23 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
     }
     buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
+    const bool has_doubts = renderer->repeat || renderer->settings.repeats_pixels;
+    const size_t doubts_size = has_doubts ? film_pixel_count(&film) * sizeof(uint32_t) : 0;
+    buffers->doubts = film_buffer(renderer, doubts_size);
+    buffers->center_doubts = film_buffer(renderer, doubts_size);
+    buffers->pixels = film_buffer(renderer, renderer->settings.repeats_pixels ? 2 * doubts_size : 0);
 }
 
 static void buffers_close(BandBuffers *buffers)
 {
     buffer_release(buffers->ray_counts);
     buffer_release(buffers->compensation);
+    buffer_release(buffers->doubts);
+    buffer_release(buffers->center_doubts);
+    buffer_release(buffers->pixels);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         buffer_release(buffers->layers[layer]);
     *buffers = (BandBuffers){0};
-}
-
-static LaunchTime band_launch(Renderer *renderer, KernelKind kind, BandRows rows)
-{
-    TileShape item = item_shape(renderer->report.lanes);
-    size_t side = group_side(renderer);
-    const size_t group[2] = {side, side};
-    const size_t items[2] = {(renderer->settings.region_width + item.width - 1) / item.width,
-                             (rows.row_count + item.height - 1) / item.height};
-    return renderer_launch(renderer, kind, 2, items, group);
 }
 
 static uint32_t settings_cell(const RenderSettings *settings)
@@ -112,12 +119,26 @@ static uint32_t settings_cell(const RenderSettings *settings)
     return settings->cell > 0 ? settings->cell : 1;
 }
 
-static void band_set_place(const Renderer *renderer, cl_kernel kernel, cl_uint argument, BandRows rows)
+static Place band_place(const Renderer *renderer, BandRows rows)
 {
     const RenderSettings *settings = &renderer->settings;
-    const uint32_t first_y = settings->region_y + rows.first_row * settings_cell(settings);
-    cl_uint4 band = {{settings->region_x, first_y, settings->region_width, rows.row_count}};
-    kernel_argument(renderer->compute, kernel, argument, sizeof band, &band);
+    TileShape item = item_shape(renderer->report.lanes);
+    size_t side = group_side(renderer);
+    return (Place){
+        .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
+                  settings->region_width, rows.row_count}},
+        .items = {(settings->region_width + item.width - 1) / item.width,
+                  (rows.row_count + item.height - 1) / item.height},
+        .group = {side, side}};
+}
+
+// The first `count` pixels of a list.
+static Place list_place(const Renderer *renderer, uint32_t count)
+{
+    const uint32_t of_item = renderer->report.lanes * renderer->report.lanes;
+    size_t side = group_side(renderer);
+    return (Place){
+        .band = {{0, 0, count, 1}}, .items = {(count + of_item - 1) / of_item, 1}, .group = {side * side, 1}};
 }
 
 _Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");
@@ -137,39 +158,43 @@ static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
 }
 
 // One launch for samples first..last-1. Returns its seconds: the event's if trusted, else the host's.
-static double band_render(Renderer *renderer, const BandBuffers *buffers, BandRows rows, uint32_t first,
+static double band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
                           uint32_t last)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &renderer->offsets);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->compensation);
-    band_set_place(renderer, kernel, FLAT_COUNT + 3, rows);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 3, sizeof place->band, &place->band);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &buffers->ray_counts);
     const uint32_t cell = settings_cell(&renderer->settings);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 7, sizeof cell, &cell);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 8, sizeof(cl_mem), &buffers->doubts);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 9, sizeof(cl_mem), &buffers->pixels);
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
-    LaunchTime time = band_launch(renderer, KERNEL_RENDER, rows);
+    LaunchTime time = renderer_launch(renderer, KERNEL_RENDER, 2, place->items, place->group);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);
     return time.trusted ? time.event_seconds : time.host_seconds;
 }
 
 // Launches a kernel that fills its layers, whose buffers follow the band in its arguments.
 static void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
-                      unsigned aovs, BandRows rows)
+                      unsigned aovs, const Place *place)
 {
     cl_kernel kernel = renderer_kernel(renderer, kind);
-    band_set_place(renderer, kernel, FLAT_COUNT, rows);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof place->band, &place->band);
     cl_uint argument = FLAT_COUNT + 1;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (layer_in(layers, layer))
             kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->layers[layer]);
     cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
     if (layers & AOV_SHADOW)
-        kernel_argument(renderer->compute, kernel, argument, sizeof shadow_count, &shadow_count);
-    band_launch(renderer, kind, rows);
+        kernel_argument(renderer->compute, kernel, argument++, sizeof shadow_count, &shadow_count);
+    kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->center_doubts);
+    kernel_argument(renderer->compute, kernel, argument, sizeof(cl_mem), &buffers->pixels);
+    renderer_launch(renderer, kind, 2, place->items, place->group);
 }
 
 // Device lengths converted to the scene's unit: `lengths` itself where the unit is 1, as always at `double`;
@@ -181,6 +206,121 @@ static void *lengths_restored(const Renderer *renderer, void *lengths, size_t co
     for (size_t i = 0; i < count; i++)
         restored[i] = ((const float *)lengths)[i] * (float)renderer->compiled.unit;
     return restored;
+}
+
+// A list's pixels in a band, and what a renderer at double made of them.
+typedef struct {
+    uint32_t *pixels; // x and y in the image
+    uint32_t *index;  // in the band
+    uint32_t count;
+} PixelList;
+
+// The pixels of a band that have doubts, block by block, so that neighbors share packets.
+static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint32_t *doubts)
+{
+    enum { BLOCK = 8 };
+    const RenderSettings *settings = &renderer->settings;
+    const uint32_t width = settings->region_width, cell = settings_cell(settings);
+    PixelList list = {0};
+    for (size_t i = 0; i < (size_t)width * rows.row_count; i++)
+        list.count += doubts[i] != 0;
+    if (list.count == 0) return list;
+    list.pixels = memory_allocate(list.count, 2 * sizeof *list.pixels);
+    list.index = memory_allocate(list.count, sizeof *list.index);
+    uint32_t n = 0;
+    for (uint32_t block_y = 0; block_y < rows.row_count; block_y += BLOCK)
+        for (uint32_t block_x = 0; block_x < width; block_x += BLOCK)
+            for (uint32_t y = block_y; y < block_y + BLOCK && y < rows.row_count; y++)
+                for (uint32_t x = block_x; x < block_x + BLOCK && x < width; x++) {
+                    if (doubts[(size_t)y * width + x] == 0) continue;
+                    list.pixels[2 * n] = settings->region_x + x * cell;
+                    list.pixels[2 * n + 1] = settings->region_y + (rows.first_row + y) * cell;
+                    list.index[n++] = y * width + x;
+                }
+    return list;
+}
+
+// Puts a layer of the list's pixels, of doubles, into the band's, of floats.
+static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem of_band,
+                        const PixelList *list, const Film *band)
+{
+    Renderer *repeat = renderer->repeat;
+    const Film film = {.width = list->count,
+                       .height = 1,
+                       .light_count = band->light_count,
+                       .real_size = renderer_scalar_size(repeat)};
+    const size_t components = film_components(band, layer), size = film_layer_size(band, layer);
+    const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
+    void *repeated = memory_allocate(film_layer_size(&film, layer), 1), *values = memory_allocate(size, 1);
+    buffer_read(renderer->compute, of_list, film_layer_size(&film, layer), repeated);
+    buffer_read(renderer->compute, of_band, size, values);
+    for (size_t i = 0; i < list->count; i++)
+        for (size_t k = 0; k < components; k++) {
+            const size_t from = i * components + k, to = list->index[i] * components + k;
+            if (layer_types[layer] == LAYER_TYPE_INTEGER)
+                ((uint32_t *)values)[to] = ((const uint32_t *)repeated)[from];
+            else
+                ((float *)values)[to] =
+                    (float)(((const double *)repeated)[from] / (is_length ? renderer->compiled.unit : 1));
+        }
+    buffer_write(renderer->compute, of_band, size, values);
+    free(repeated);
+    free(values);
+}
+
+static void repeats_note(Renderer *renderer, const PixelList *list, uint32_t samples, cl_mem doubts)
+{
+    RenderReport *report = &renderer->report, *of_repeat = &renderer->repeat->report;
+    uint32_t *undecided = memory_allocate(list->count, sizeof *undecided);
+    buffer_read(renderer->compute, doubts, list->count * sizeof *undecided, undecided);
+    report->repeats.repeated += (uint64_t)list->count * samples;
+    for (uint32_t i = 0; compute_ok(renderer->compute) && i < list->count; i++)
+        report->repeats.undecided += undecided[i];
+    free(undecided);
+    for (size_t i = 0; i < of_repeat->launches.count; i++)
+        array_push(report->launches, ((NamedLaunch){"repeat", of_repeat->launches.items[i].time}));
+    report->build_seconds += of_repeat->build_seconds;
+    report->build_from_cache &= of_repeat->build_from_cache;
+    of_repeat->build_seconds = 0;
+    of_repeat->launches.count = 0;
+}
+
+// Renders again in double what a kernel has left in doubt, and puts it into the band's layers.
+static void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
+                        unsigned aovs, BandRows rows)
+{
+    Renderer *repeat = renderer->repeat;
+    const cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
+    const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
+    const size_t size = film_pixel_count(&band) * sizeof(uint32_t);
+    uint32_t *values = renderer_map(renderer, doubts, size);
+    if (!values) return;
+    PixelList list = doubts_list(renderer, rows, values);
+    renderer_unmap(renderer, doubts, values);
+    const Film film = {.width = list.count,
+                       .height = 1,
+                       .light_count = band.light_count,
+                       .real_size = renderer_scalar_size(repeat)};
+    BandBuffers repeated = {0};
+    if (list.count > 0) {
+        const Place place = list_place(repeat, list.count);
+        const uint32_t samples = kind == KERNEL_RENDER ? renderer->settings.sample_count : 1;
+        buffers_open(&repeated, repeat, aovs, film);
+        buffer_write(repeat->compute, repeated.pixels, list.count * 2 * sizeof *list.pixels, list.pixels);
+        if (kind == KERNEL_RENDER)
+            band_render(repeat, &repeated, &place, 0, samples);
+        else
+            band_fill(repeat, kind, layers, &repeated, aovs, &place);
+        for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+            if (layer_in(layers, layer) && layer_in(aovs | AOV_COLOR, layer) &&
+                film_layer_size(&band, layer) > 0)
+                layer_merge(renderer, layer, repeated.layers[layer], buffers->layers[layer], &list, &band);
+        repeats_note(renderer, &list, samples,
+                     kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts);
+    }
+    buffers_close(&repeated);
+    free(list.pixels);
+    free(list.index);
 }
 
 // Where a band goes: to the queue that has its rows, or to a PassSink with its number of samples.
@@ -269,23 +409,34 @@ static bool band_sample(Renderer *renderer, const BandBuffers *buffers, BandRows
 {
     const RenderSettings *settings = &renderer->settings;
     uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
+    const Place place = band_place(renderer, rows);
     bool go_on = true;
     pace_begin_band(pace);
     while (go_on && first < end) {
         uint32_t samples = pace_launch_samples(pace, pixels, end - first);
-        double seconds = band_render(renderer, buffers, rows, first, first + samples);
+        double seconds = band_render(renderer, buffers, &place, first, first + samples);
         pace_note_launch(pace, pixels, samples, seconds);
         first += samples;
         go_on = compute_ok(renderer->compute) && !is_stopped(renderer, delivery);
     }
-    return go_on;
+    if (go_on && renderer->repeat && end == settings->sample_count)
+        band_repeat(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
+    return go_on && compute_ok(renderer->compute);
 }
 
 // One ray per pixel.
 static void band_fill_aovs(Renderer *renderer, const BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
-    if (aovs & AOVS_OF_HIT) band_fill(renderer, KERNEL_AOV, AOVS_OF_HIT, buffers, aovs, rows);
-    if (aovs & AOVS_OF_PATH) band_fill(renderer, KERNEL_PATH, AOVS_OF_PATH, buffers, aovs, rows);
+    const Place place = band_place(renderer, rows);
+    const struct {
+        KernelKind kind;
+        unsigned layers;
+    } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}};
+    for (size_t i = 0; i < sizeof fills / sizeof *fills; i++) {
+        if (!(aovs & fills[i].layers)) continue;
+        band_fill(renderer, fills[i].kind, fills[i].layers, buffers, aovs, &place);
+        if (renderer->repeat) band_repeat(renderer, fills[i].kind, fills[i].layers, buffers, aovs, rows);
+    }
 }
 
 static Pace pace_start(const RenderSettings *settings)
@@ -300,7 +451,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     const Delivery delivery = {.queue = queue};
     const uint32_t step = settings->band_rows > 0 ? settings->band_rows : rows_step(renderer);
     BandBuffers buffers = {0};
-    buffers_open(&buffers, renderer, aovs, rows_max(renderer, aovs));
+    buffers_open(&buffers, renderer, aovs, film_of_rows(renderer, 0, rows_max(renderer, aovs)));
     renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
     Pace pace = pace_start(settings);
     bool go_on = compute_ok(compute);
@@ -337,7 +488,7 @@ static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Pace
     for (uint32_t row = 0; go_on && row < height;) {
         uint32_t left = height - row;
         PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
-        buffers_open(&band.buffers, renderer, aovs, band.rows.row_count);
+        buffers_open(&band.buffers, renderer, aovs, film_of_rows(renderer, 0, band.rows.row_count));
         array_push(*bands, band);
         go_on = band_sample(renderer, &band.buffers, band.rows, pace, 0, 1, delivery) &&
                 band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);

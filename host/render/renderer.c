@@ -39,6 +39,14 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
                     "precision double: the device \"%s\" has no 64-bit floating point", device->name);
         return false;
     }
+    if (settings->precision == PRECISION_CERTIFIED && !device->fp64) {
+        message_add(
+            messages, MESSAGE_ERROR,
+            "precision certified: the device \"%s\" has no 64-bit floating point, in which pixels are "
+            "repeated that 32 bits leave in doubt",
+            device->name);
+        return false;
+    }
     return true;
 }
 
@@ -136,6 +144,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
         .precision = settings->precision,
+        .certifies = settings->precision == PRECISION_CERTIFIED || settings->repeats_pixels,
         .lanes = lanes,
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
@@ -249,6 +258,8 @@ static void variant_set(Renderer *renderer)
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
+    text_appendf(text, "#define IS_CERTIFIED %d\n",
+                 precision == PRECISION_CERTIFIED || renderer->settings.repeats_pixels);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
     text_appendf(text, "#define HAS_FMA %d\n", has_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
@@ -300,18 +311,46 @@ static Renderer *renderer_finish(Renderer *renderer, bool is_ready)
     return renderer;
 }
 
+// Those of the renderer that repeats pixels in doubt.
+static RenderSettings repeat_settings(const RenderSettings *settings)
+{
+    RenderSettings repeat = *settings;
+    repeat.precision = PRECISION_DOUBLE;
+    repeat.repeats_pixels = true;
+    repeat.counting = repeat.hashes_scene = false;
+    return repeat;
+}
+
+// False as renderer_open returns NULL.
+static bool repeat_open(Renderer *renderer, const Scene *scene, MessageList *messages)
+{
+    const RenderSettings settings = repeat_settings(&renderer->settings);
+    renderer->repeat = renderer_open(renderer->compute, scene, &settings, messages);
+    return renderer->repeat != NULL;
+}
+
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = renderer_make(compute);
-    return renderer_finish(renderer, scene_assign(renderer, scene, settings, messages));
+    bool is_ready = scene_assign(renderer, scene, settings, messages);
+    if (is_ready && settings->precision == PRECISION_CERTIFIED)
+        is_ready = repeat_open(renderer, scene, messages);
+    return renderer_finish(renderer, is_ready);
 }
 
 Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
                                  const RenderSettings *settings, MessageList *messages)
 {
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) {
+        compiled_scene_free(compiled);
+        return NULL;
+    }
+    if (settings->precision == PRECISION_CERTIFIED) {
+        message_add(
+            messages, MESSAGE_ERROR,
+            "precision certified needs the scene in two precisions, which several machines do not get");
         compiled_scene_free(compiled);
         return NULL;
     }
@@ -327,6 +366,10 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
     if (!compute_ok(renderer->compute) || !settings_fit(settings, renderer->compute->device, messages) ||
         !scene_assign(renderer, scene, settings, messages))
         return false;
+    if (renderer->repeat) {
+        const RenderSettings repeat = repeat_settings(settings);
+        if (!renderer_move(renderer->repeat, scene, &repeat, messages)) return false;
+    }
     variant_set(renderer); // another eye may need another feature, or a deeper stack
     return true;
 }
@@ -334,6 +377,7 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
 void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
+    renderer_close(renderer->repeat);
     variant_close(renderer, &renderer->variant);
     variant_close(renderer, &renderer->other_variant);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
@@ -425,9 +469,20 @@ const RenderReport *renderer_report(const Renderer *renderer)
     return &renderer->report;
 }
 
+RepeatCounts renderers_repeats(Renderer *const *renderers, size_t count)
+{
+    RepeatCounts sum = {0};
+    for (size_t i = 0; i < count; i++) {
+        sum.repeated += renderers[i]->report.repeats.repeated;
+        sum.undecided += renderers[i]->report.repeats.undecided;
+    }
+    return sum;
+}
+
 void renderer_report_restart(Renderer *renderer)
 {
     RenderReport *report = &renderer->report;
     report->launches.count = report->reads.count = 0;
     memset(report->rays, 0, sizeof report->rays);
+    report->repeats = (RepeatCounts){0};
 }

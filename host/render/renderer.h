@@ -34,6 +34,8 @@ typedef struct {
     bool (*stop)(void);  // called between launches; true ends the render; NULL: never
     bool hashes_scene;   // for the report
     uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
+    // Within this room, at `double`: renders lists of pixels that `certified` has left in doubt.
+    bool repeats_pixels;
 } RenderSettings;
 
 // 8192 ulp, the largest error (kernels/numerics/perturb.h), times this is below 2^23 ulp: an injected error
@@ -43,8 +45,8 @@ enum { PERTURB_SCALE_MAX = 1000 };
 typedef struct Renderer Renderer;
 
 // Compiles and uploads the scene; kernels are built when first used. NULL with a message: the settings do not
-// fit the device (double without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does not fit the
-// precision. NULL without one: the device failed, see Compute. The compute outlives it.
+// fit the device (double or certified without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does
+// not fit the precision. NULL without one: the device failed, see Compute. The compute outlives it.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
 // The same of a scene that renderer_compile compiled for settings->lanes, perhaps on another machine. Takes
@@ -124,9 +126,14 @@ bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, 
 
 // A kernel launch or a transfer.
 typedef struct {
-    const char *name; // "render", "aov", "path", "trace", "read-back"
+    const char *name; // "render", "aov", "path", "trace", "repeat", "read-back"
     LaunchTime time;
 } NamedLaunch;
+
+// Samples, and rays of AOVs.
+typedef struct {
+    uint64_t repeated, undecided;
+} RepeatCounts;
 
 typedef struct {
     const Device *device;
@@ -140,6 +147,9 @@ typedef struct {
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
     uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting
+    // At `certified`, of the last render's samples and AOVs' rays: those of the pixels that were rendered in
+    // double, and of these the ones that double left in doubt.
+    RepeatCounts repeats;
     struct {
         NamedLaunch *items;
         size_t count, capacity;
@@ -147,6 +157,8 @@ typedef struct {
     WorkerShare share; // of the last render
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
+// Of several renderers of one image.
+RepeatCounts renderers_repeats(Renderer *const *renderers, size_t count);
 
 // The composed text of the kernel that renders, for other compilers. Caller frees.
 char *renderer_kernel_text(const Renderer *renderer);

@@ -30,6 +30,7 @@ struct Renderer {
     size_t light_count;
     // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
     KernelVariant variant, other_variant;
+    Renderer *repeat; // at `certified`: of the same scene at `double`, for the pixels in doubt; else NULL
 };
 
 size_t renderer_scalar_size(const Renderer *renderer);

@@ -11,6 +11,10 @@ typedef struct {
     Color3 weight;
     uint depth;
     real travelled; // distance from the eye along the path
+    // at `certified`: as of a Ray
+    real origin_error, direction_error;
+    integer left;
+    mask leaves_outward;
 } Bounce;
 
 static inline mask bounce_is_active(const Bounce *bounce)
@@ -22,6 +26,12 @@ static inline Ray bounce_ray(const Bounce *bounce)
 {
     Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_is_active(bounce));
     ray.travelled = bounce->travelled;
+    if (IS_CERTIFIED) {
+        ray.origin_error = bounce->origin_error;
+        ray.direction_error = bounce->direction_error;
+        ray.left = bounce->left;
+        ray.leaves_outward = bounce->leaves_outward;
+    }
     return ray;
 }
 
@@ -68,6 +78,64 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
     mask plain_total = vector_refract(direction, surface->normal, surface->entering, surface->ior, &plain);
     *refracted = vector_select(outward, plain, *refracted);
     return lanes_select(outward, plain_total, total);
+}
+
+// The largest error of a bounced ray's direction that is still traced.
+#define BOUNCE_ERROR_MAX ((real)(0x1p-8f))
+
+// The bounds of a surface's reflected and refracted ray. d - 2 (d . N) N is off by the error of d and 4 times
+// that of N; the refracted ray by Snell's law, whose root divides by the refracted cosine. Lanes in doubt are
+// not traced further.
+static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
+                                      Bounce *refracted, mask *doubt)
+{
+    const real zero = (real)(0), one = (real)(1), rounding = (real)(32 * UNIT_ROUNDOFF);
+    real normal_error = surface->normal_error, turn = ray->direction_error + rounding;
+    mask found = surface->found & ray->active, open = mask_none();
+    real reflected_error = real_fma((real)(4), normal_error, turn);
+    reflected->origin_error = refracted->origin_error = surface->place_error;
+    reflected->left = refracted->left = surface->object;
+    reflected->direction_error = reflected_error;
+    reflected->leaves_outward = surface->entering;
+    refracted->leaves_outward = !surface->entering;
+    mask reflects = found & bounce_is_active(reflected);
+    open = reflects & (reflected_error > BOUNCE_ERROR_MAX);
+    if (HAS_TRIANGLES) {
+        // the shading normal's reflection may run through the surface
+        Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
+        real outward = fabs(vector_dot(by_shading, surface->normal));
+        open = open | (reflects & (outward <= reflected_error + normal_error));
+    }
+    if (HAS_TRANSMISSION) {
+        mask transparent = found & (surface->transmission > zero);
+        real scale = lanes_select(surface->entering, one, surface->ior);
+        real cosine = fabs(vector_dot(ray->direction, surface->shading_normal)), scaled = scale * cosine;
+        real scaled_error = scale * (turn + normal_error + rounding);
+        real k =
+            lanes_select(surface->entering, one - surface->ior, surface->ior - one) * (surface->ior + one);
+        real squared = real_fma(scaled, scaled, -k);
+        real squared_error = scaled_error * (scaled + scaled + scaled_error) +
+                             rounding * (scaled * scaled + surface->ior * surface->ior);
+        open = open | (transparent & (fabs(squared) <= squared_error));
+        real root = real_sqrt(real_max(squared, squared_error));
+        real root_error = real_divide(squared_error, lanes_select(root > zero, root, one));
+        // over the length before it is made unit: the index on entering, 1 on leaving
+        real error = scale * turn + (fabs(scaled - root) + root_error) * normal_error + scaled_error +
+                     root_error + rounding * (scale + scaled + root);
+        real length = lanes_select(surface->entering, surface->ior, one);
+        refracted->direction_error = real_divide(error + error, length) + rounding;
+        mask refracts = transparent & !total;
+        open = open | (refracts & (refracted->direction_error > BOUNCE_ERROR_MAX));
+        if (HAS_TRIANGLES)
+            open = open | (refracts & (fabs(vector_dot(refracted->direction, surface->normal)) <=
+                                       refracted->direction_error + normal_error));
+    } else {
+        refracted->direction_error = zero;
+    }
+    *doubt = *doubt | open;
+    const Color3 none = {zero, zero, zero};
+    reflected->weight = vector_select(*doubt, none, reflected->weight);
+    refracted->weight = vector_select(*doubt, none, refracted->weight);
 }
 
 // The reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of total

@@ -11,6 +11,7 @@ typedef struct {
     Hit hit;
     Surface surface; // undefined if no lane hit any
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
+    mask doubt;      // at `certified`: lanes in doubt about any of this
 } ShadedHit;
 
 // Adds each light that reaches the surfaces of `count` packets.
@@ -28,6 +29,14 @@ static inline void surfaces_light(const Scene *scene, uint count, ShadedHit *hit
         }
         scene_traverse(scene, shadow_rays, count, OCCLUSION, traversals);
         for (uint i = 0; i < count; i++) {
+            if (IS_CERTIFIED && lanes_any(hit_found(&hits[i].hit))) {
+                const Surface *surface = &hits[i].surface;
+                mask glossy = surface->specular > (real)(0);
+                light_add_doubt(&lights[i], &traversals[i].hit);
+                mask matters = glossy | !lights[i].facing_doubt;
+                hits[i].doubt =
+                    hits[i].doubt | (lights[i].doubt & matters) | (lights[i].facing_doubt & glossy);
+            }
             if (!lanes_any(lights[i].lit)) continue;
             light_occlude(&lights[i], traversal_transmittance(&traversals[i]));
             if (!lanes_any(lights[i].lit)) continue;
@@ -47,9 +56,11 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
         hits[i].hit = traversals[i].hit;
         mask found = hit_found(&hits[i].hit);
         hits[i].color = background;
+        if (IS_CERTIFIED) hits[i].doubt = hits[i].hit.doubt;
         if (!lanes_any(found)) continue;
         hits[i].surface = visible_surface(scene, &rays[i], &hits[i].hit);
         const Surface *surface = &hits[i].surface;
+        if (IS_CERTIFIED) hits[i].doubt = hits[i].doubt | (found & surface->doubt);
         Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
         hits[i].color = color_multiply(ambient, surface->color);
     }
@@ -77,10 +88,11 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
 // Traces a ray tree depth first, reflected before refracted. `is_shaded`: *shaded is the camera ray's hit,
 // from rays_shade; otherwise the loop traces it, whose traversal is then compiled once. If COMPUTE_SIGNATURE,
 // *path is the tree's signature (types.h), which in each lane is independent of the other lanes, and the
-// color is undefined.
+// color is undefined. At `certified` *doubt are the lanes with any decision in doubt.
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
-                                    unsigned_integer *path)
+                                    unsigned_integer *path, mask *doubt)
 {
+    *doubt = mask_none();
     *path = (unsigned_integer)(PATH_START);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 color = black, weight = white;
@@ -88,6 +100,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     uint pending_count = 0, depth = 0;
     for (;;) {
         if (depth > 0 || !is_shaded) rays_shade(scene, &ray, 1, shaded);
+        if (IS_CERTIFIED) *doubt = *doubt | (ray.active & shaded->doubt);
         if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&shaded->hit));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
@@ -103,6 +116,8 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         if (lanes_any(hit_found(&shaded->hit)) && depth < scene->header->bounces.x)
             total = surface_bounce(&shaded->surface, vector_renormalize(ray.direction), weight, false,
                                    &reflected, &refracted);
+        if (IS_CERTIFIED && lanes_any(hit_found(&shaded->hit)) && depth < scene->header->bounces.x)
+            bounces_set_errors(&shaded->surface, &ray, total, &reflected, &refracted, doubt);
         if (COMPUTE_SIGNATURE)
             *path = path_signature_add(*path, &ray, &shaded->hit, bounce_is_active(&reflected),
                                        bounce_is_active(&refracted), total);

@@ -66,7 +66,70 @@ typedef struct {
     Vector direction; // from the surface to the light, unit
     real facing;      // the cosine between the shading normal and that
     real fraction;    // of the light's color that arrives
+    // At `certified`: lanes where the shadow is in doubt, and others that may or may not face the light,
+    // which matters to highlights and masks of shadows alone: the rest fades to 0.
+    mask doubt, facing_doubt;
 } LightVisibility;
+
+// The largest error of a shadow ray's origin, in u of its length, that cull spheres allow: rays with a larger
+// one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is in doubt.
+enum { SHADOW_ERROR_MAX = 1 << 13 };
+#define SHADOW_DOUBT_MAX ((real)(0x1p-6f))
+
+// Sets the shadow ray's bounds, and what is in doubt before it is traced.
+static inline void light_set_errors(const Light *light, const Surface *surface, LightVisibility *visibility,
+                                    Ray *shadow_ray)
+{
+    const real zero = (real)(0);
+    real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
+    mask far_off = mask_none(), is_loose = far_off;
+    shadow_ray->direction_error = (real)(8 * UNIT_ROUNDOFF);
+    if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
+        place_error = place_error + (real)(4 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
+        real distance = vector_norm(shadow_ray->direction);
+        mask apart = distance > (real)(4) * place_error;
+        real relative = real_divide(place_error, lanes_select(apart, distance, (real)(1)));
+        relative = lanes_select(apart, relative, (real)(1));
+        far_off = relative > SHADOW_DOUBT_MAX;
+        is_loose = relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF);
+        angle_error = angle_error + relative + relative;
+        shadow_ray->ends_at_light = true;
+    }
+    shadow_ray->origin_error = place_error;
+    shadow_ray->left = surface->object;
+    real geometric = vector_dot(surface->normal, visibility->direction);
+    real facing_error = surface->normal_error + angle_error;
+    shadow_ray->leaves_outward = surface->entering & (geometric > facing_error);
+    mask turned = (visibility->facing < -facing_error) | !surface->found;
+    mask open = !turned & (visibility->facing <= facing_error);
+    visibility->facing_doubt = open;
+    // a light in front of the shading normal but behind the surface is occluded by the surface itself
+    mask behind = HAS_TRIANGLES ? !turned & (geometric < -facing_error) : mask_none();
+    mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= facing_error) : mask_none();
+    if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
+    if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {
+        Vector difference =
+            vector_subtract(vector_negate(visibility->direction), vector_of(light->direction));
+        real s = (real)(0.5f) * vector_dot(difference, difference), edge = (real)(light->cone.x);
+        real error = angle_error + (real)(16 * UNIT_ROUNDOFF);
+        real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
+        mask at_edge = !turned & (fabs(s - edge) <= s_error);
+        if (light->cone.z == 0)
+            self_doubt = self_doubt | at_edge;
+        else
+            visibility->facing_doubt = visibility->facing_doubt | at_edge;
+    }
+    visibility->lit = visibility->lit & !behind;
+    visibility->doubt = self_doubt | (visibility->lit & far_off);
+    shadow_ray->active = shadow_ray->active & !visibility->doubt;
+    shadow_ray->is_loose = is_loose;
+}
+
+// Lanes in which what the light does is in doubt, once the shadow ray has been traced.
+static inline void light_add_doubt(LightVisibility *visibility, const Hit *occlusion)
+{
+    visibility->doubt = visibility->doubt | (occlusion->doubt & visibility->lit);
+}
 
 // All of that but occlusion, for which the shadow ray is set, active in the lanes that may be lit.
 static inline LightVisibility light_reach(const Scene *scene, const Surface *surface, uint index,
@@ -81,6 +144,7 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     visibility.lit = surface->found & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
     *shadow_ray = to_light.shadow_ray;
     shadow_ray->active = shadow_ray->active & visibility.lit;
+    if (IS_CERTIFIED) light_set_errors(&light, surface, &visibility, shadow_ray);
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
         ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
     ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
@@ -97,6 +161,13 @@ static inline LightVisibility light_visibility(const Scene *scene, const Surface
 {
     Ray shadow_ray;
     LightVisibility visibility = light_reach(scene, surface, index, &shadow_ray);
+    if (IS_CERTIFIED) {
+        Traversal traversal;
+        scene_traverse(scene, &shadow_ray, 1, OCCLUSION, &traversal);
+        light_add_doubt(&visibility, &traversal.hit);
+        light_occlude(&visibility, traversal_transmittance(&traversal));
+        return visibility;
+    }
     if (lanes_any(visibility.lit)) light_occlude(&visibility, transmittance(scene, &shadow_ray));
     return visibility;
 }

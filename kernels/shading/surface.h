@@ -33,6 +33,11 @@ typedef struct {
     real reflection, transmission, ior;
     mask entering;  // the ray runs into the solid, against its outward normal
     real travelled; // distance from the eye along the path
+    // At `certified`: bounds on the distance of the position from the exact one and of the shading normal
+    // from the exact one's; the object; what is in doubt.
+    real place_error, normal_error;
+    integer object;
+    mask doubt;
 } Surface;
 
 static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, uint index, const Ray *ray,
@@ -96,6 +101,9 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     TriangleWeights weights = triangle_weights(corners, ray);
     hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
     if (smooth) triangle_smooth(normals, weights, &hit.point);
+#if IS_CERTIFIED
+    triangle_set_normal_errors(corners, normals, weights, &hit.point);
+#endif
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, uvs);
         hit.coordinates = (TextureCoordinates){uv.x, uv.y, density};
@@ -103,22 +111,58 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     return hit;
 }
 
+// How far a hit's position may be from the exact one: its ray's and its t's errors, and the roundings of
+// ray_point, with the shapes' own.
+static inline real hit_place_error(const Ray *ray, const Hit *hit)
+{
+    real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
+    real rounding =
+        (real)(8 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
+    return ray_place_error(ray, length * t) +
+           real_fma(length, real_max(hit->high - hit->t, hit->t - hit->low), rounding);
+}
+
+// Of the shading normal.
+static inline real point_normal_error(const SurfacePoint *point, real place_error)
+{
+    return real_fma((real)(4) * point->curvature, place_error, point->normal_error) +
+           (real)(16 * UNIT_ROUNDOFF);
+}
+
+static inline mask floor_is_doubtful(real a, real error)
+{
+    return !(floor(a - error) == floor(a + error));
+}
+
 // Where the checker has its second color. On planes and discs squares lie in the surface; elsewhere they are
 // cubes in space, looked up a 1024th of a cube behind the surface, so that a face on the border between cubes
 // has one color.
 static inline mask checker_odd(const Scene *scene, uint kind, uint index, const SurfacePoint *point,
-                               const Ray *ray, scalar4 grid)
+                               const Ray *ray, scalar4 grid, real place_error, mask *doubt)
 {
     real cells;
     if (kind_has_grid(kind)) {
         GridCoordinates square = grid_coordinates(scene, kind, index, point->position);
         cells = floor(square.u) + floor(square.v);
+        if (IS_CERTIFIED) {
+            real error = grid_error(scene, kind, index, point->position, place_error);
+            *doubt = floor_is_doubtful(square.u, error) | floor_is_doubtful(square.v, error);
+        }
     } else {
         mask along = vector_dot(point->normal, ray->direction) > (real)(0);
         Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
         Vector cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
         cell = vector_fma(inward, (real)(0x1p-10f), cell);
         cells = floor(cell.x) + floor(cell.y) + floor(cell.z);
+        if (IS_CERTIFIED) {
+            const scalar cells_per_unit = fabs(grid.w);
+            real error = (real)(cells_per_unit)*place_error +
+                         (real)(0x1p-9f) * point_normal_error(point, place_error) +
+                         (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
+                                                      vector_norm1(vector_of(grid)) + (real)(1));
+            *doubt = floor_is_doubtful(cell.x, error) | floor_is_doubtful(cell.y, error) |
+                     floor_is_doubtful(cell.z, error);
+        }
     }
     real halved = cells * (real)(0.5f);
     return floor(halved) != halved;
@@ -126,11 +170,13 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
 
 // The object's color at the hit: plain, checkered or textured. `entry` is the object's kind_index_material.
 static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
-                                  const LaneSurfacePoints *hit, const Ray *ray, real travelled)
+                                  const LaneSurfacePoints *hit, const Ray *ray, real travelled,
+                                  real place_error, mask *doubt)
 {
+    *doubt = mask_none();
     Color3 color = vector_of(material->color);
     if (HAS_CHECKERS && material->grid.w != 0) {
-        mask odd = checker_odd(scene, entry.x, entry.y, &hit->point, ray, material->grid);
+        mask odd = checker_odd(scene, entry.x, entry.y, &hit->point, ray, material->grid, place_error, doubt);
         color = vector_select(odd, vector_of(material->other_color), color);
     }
     if (HAS_IMAGES && material->texture.x > 0) {
@@ -155,9 +201,25 @@ static inline void surface_set_material(Surface *surface, mask lanes, const Mate
     surface->ior = lanes_select(lanes, (real)(bounces.z), surface->ior);
 }
 
+// Sets the bounds at a hit, and what is in doubt: the side that the ray comes from, and that of the shading
+// normal.
+static inline void surface_set_errors(Surface *surface, const SurfacePoint *point, const Ray *ray)
+{
+    surface->normal_error = point_normal_error(point, surface->place_error);
+    real geometric_error = point->normal_error + (real)(16 * UNIT_ROUNDOFF);
+    mask flat = vector_dot(point->shading_normal, point->normal) == vector_dot(point->normal, point->normal);
+    geometric_error = lanes_select(flat, surface->normal_error, geometric_error);
+    real cosine = vector_dot(point->normal, ray->direction) * real_sqrt(ray->inverse_squared);
+    real shading_cosine = vector_dot(point->shading_normal, point->normal);
+    mask is_open = fabs(cosine) <= geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+    is_open = is_open | (fabs(shading_cosine) <= geometric_error + surface->normal_error);
+    surface->doubt = surface->doubt | (surface->found & is_open);
+}
+
 // Turns both normals to the side that the ray comes from.
 static inline void surface_set_point(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
+    if (IS_CERTIFIED) surface_set_errors(surface, point, ray);
     surface->position = point->position;
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
     surface->entering = !along;
@@ -184,6 +246,11 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     surface.travelled = ray->travelled + hit->t;
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
+    if (IS_CERTIFIED) {
+        surface.place_error = hit_place_error(ray, hit);
+        surface.object = hit->object;
+        surface.doubt = hit->doubt;
+    }
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
     integer pending = lanes_select(surface.found, hit->object, NO_OBJECT);
     for (;;) {
@@ -198,9 +265,21 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
             found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
         }
         pending = lanes_select(found.lanes, NO_OBJECT, pending);
+        // the exact hit lies as near to the ray's own point as place_error says
+        if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
         surface_point_replace(&point, found.lanes, &found.point);
         Material material = scene->materials[entry.z];
-        Color3 color = object_color(scene, entry, &material, &found, ray, surface.travelled);
+        mask doubt;
+        Color3 color = object_color(scene, entry, &material, &found, ray, surface.travelled,
+                                    surface.place_error, &doubt);
+#if IS_CERTIFIED
+        if (HAS_BOXES && entry.x == KIND_BOXES) {
+            Box box = scene->boxes[entry.y];
+            doubt = doubt | box_edge_is_near(&box, found.point.position, found.point.normal,
+                                             surface.place_error + surface.place_error);
+        }
+        surface.doubt = surface.doubt | (found.lanes & doubt);
+#endif
         surface_set_material(&surface, found.lanes, &material, color);
     }
     surface_set_point(&surface, &point, ray);
@@ -212,6 +291,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
 // test of the surface.
 static inline Vector secondary_ray_origin(const Surface *surface, bool through)
 {
+    if (IS_CERTIFIED) return surface->position; // the ray knows which object it leaves
     return vector_fma(surface->normal, through ? -surface->refracted_offset : surface->error + surface->error,
                       surface->position);
 }
@@ -222,6 +302,25 @@ static inline mask may_be_in_contact(const Scene *scene, Vector position)
     Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
     return (position.x >= low.x) & (position.x <= high.x) & (position.y >= low.y) & (position.y <= high.y) &
            (position.z >= low.z) & (position.z <= high.z);
+}
+
+// Lanes of a transparent surface that an opaque one may touch: one that lies in it would be crossed by a
+// short line along the normal.
+static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
+{
+    mask transparent = surface->found & (surface->transmission > (real)(0));
+    real reach = (real)(16) * surface->place_error;
+    Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
+    Vector p = surface->position;
+    transparent = transparent & (p.x >= low.x - reach) & (p.x <= high.x + reach) & (p.y >= low.y - reach) &
+                  (p.y <= high.y + reach) & (p.z >= low.z - reach) & (p.z <= high.z + reach);
+    if (!lanes_any(transparent)) return mask_none();
+    Ray inward =
+        ray_make_unit(vector_fma(surface->normal, reach, p), vector_negate(surface->normal), transparent);
+    inward.tmax = reach + reach;
+    inward.origin_error = surface->place_error * (real)(1.5f);
+    Hit opaque = closest_opaque_hit(scene, &inward);
+    return transparent & (hit_found(&opaque) | opaque.doubt);
 }
 
 // Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
@@ -257,6 +356,10 @@ static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *h
         Surface surface = surface_interaction(scene, ray, hit);
         surface.error = real_max(surface.error, transparent_error);
         surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
+        if (IS_CERTIFIED) {
+            if (HAS_TRANSMISSION) surface.doubt = surface.doubt | surface_may_touch_opaque(scene, &surface);
+            return surface;
+        }
         if (!HAS_TRANSMISSION || replaced) return surface;
         mask touches = surface_find_opaque(scene, &surface, hit);
         if (!lanes_any(touches)) return surface;

@@ -54,6 +54,26 @@ static inline GridCoordinates grid_coordinates(const Scene *scene, uint kind, ui
                              vector_dot(position, vector_of(grid_v)) + (real)(grid_v.w)};
 }
 
+// How far they are off, for a position that is off by `place_error`.
+static inline real grid_error(const Scene *scene, uint kind, uint index, Vector position, real place_error)
+{
+    scalar4 grid_u = (scalar4)(0), grid_v = (scalar4)(0);
+    if (HAS_PLANES && kind == KIND_PLANES) {
+        grid_u = scene->planes[index].grid_u;
+        grid_v = scene->planes[index].grid_v;
+    } else if (HAS_DISCS && kind == KIND_DISCS) {
+        grid_u = scene->discs[index].grid_u;
+        grid_v = scene->discs[index].grid_v;
+    }
+    grid_u = fabs(grid_u);
+    grid_v = fabs(grid_v);
+    Vector p = {fabs(position.x), fabs(position.y), fabs(position.z)};
+    real moved = real_max(vector_norm1(vector_of(grid_u)), vector_norm1(vector_of(grid_v)));
+    real size = real_max(vector_dot(p, vector_of(grid_u)) + (real)(grid_u.w),
+                         vector_dot(p, vector_of(grid_v)) + (real)(grid_v.w));
+    return real_fma(moved, place_error, (real)(8 * UNIT_ROUNDOFF) * size);
+}
+
 static inline TextureCoordinates texture_coordinates(const Scene *scene, uint kind, uint index,
                                                      const Material *material, const SurfacePoint *point)
 {

@@ -138,6 +138,7 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
     SurfacePoint point =
         surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_norm1(center));
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
+    if (IS_CERTIFIED) point.curvature = real_divide((real)(1), radius);
     return point;
 }
 

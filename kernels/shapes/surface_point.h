@@ -13,11 +13,18 @@ typedef struct {
     Vector normal;         // geometric, unit, to either side
     Vector shading_normal; // unit; differs on smooth triangles
     real rounding_scale;
+    // At `certified`: how fast the shading normal turns along the surface, and a bound on its own error.
+    real curvature, normal_error;
 } SurfacePoint;
 
 static inline SurfacePoint surface_point_make(Vector position, Vector normal, real rounding_scale)
 {
-    return (SurfacePoint){position, normal, normal, rounding_scale};
+    SurfacePoint point;
+    point.position = position;
+    point.normal = point.shading_normal = normal;
+    point.rounding_scale = rounding_scale;
+    if (IS_CERTIFIED) point.curvature = point.normal_error = (real)(0);
+    return point;
 }
 
 // Replaces the position by the ray's own point at t where the ray's origin and its path to the hit are below
@@ -43,6 +50,9 @@ static inline void surface_point_replace(SurfacePoint *point, mask where, const 
     point->normal = vector_select(where, other->normal, point->normal);
     point->shading_normal = vector_select(where, other->shading_normal, point->shading_normal);
     point->rounding_scale = lanes_select(where, other->rounding_scale, point->rounding_scale);
+    if (!IS_CERTIFIED) return;
+    point->curvature = lanes_select(where, other->curvature, point->curvature);
+    point->normal_error = lanes_select(where, other->normal_error, point->normal_error);
 }
 
 #endif

@@ -39,16 +39,33 @@ static inline real bounds_max_norm1(Vector origin, scalar4 bounds)
     return real_fma((real)(2), vector_norm1(vector_of(bounds)), bounds_farthest(origin, bounds));
 }
 
-static inline real box_slack(Vector origin, scalar4 bounds)
+// How far the exact ray is from this one within the bounds: where both end at a light, in proportion to the
+// distance from there, which matters where a floor runs to the horizon.
+static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
 {
-    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(origin, bounds),
-                    (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * bounds_max_norm1(origin, bounds));
+    real origin_error = ray->origin_error;
+    if (ray->ends_at_light) {
+        real reach = (real)(2) * bounds_farthest(vector_add(ray->origin, ray->direction), bounds);
+        real length = vector_norm1(ray->direction);
+        mask far = length > reach;
+        origin_error = lanes_select(
+            far, real_divide(origin_error * reach, lanes_select(far, length, (real)(1))), origin_error);
+    }
+    return real_fma(ray->direction_error, bounds_farthest(ray->origin, bounds), origin_error) *
+           (real)(1 + 16 * UNIT_ROUNDOFF);
+}
+
+static inline real box_slack(const Ray *ray, scalar4 bounds)
+{
+    real slack = real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(ray->origin, bounds),
+                          (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * bounds_max_norm1(ray->origin, bounds));
+    return IS_CERTIFIED ? slack + bounds_place_error(ray, bounds) : slack;
 }
 
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
 {
     real max_norm1 = bounds_max_norm1(ray->origin, bounds);
-    real slack = box_slack(ray->origin, bounds);
+    real slack = box_slack(ray, bounds);
     const real huge = (real)(1 / SMALLEST_RATIO);
     real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);
     Vector inverse = {real_min(real_max(ray->inverse.x, -largest), largest),

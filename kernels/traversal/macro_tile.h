@@ -81,7 +81,8 @@ static inline OriginFrame origin_frame(const Scene *scene, const Ray *ray, mask 
 static inline void macro_tile_set_reach(MacroTile *tile, uint packet, const Traversal *traversal)
 {
     real t = (real)(1 + 16 * UNIT_ROUNDOFF);
-    if (tile->frame.leaving) t = t * real_min(traversal->hit.t, (real)(LARGEST / 2));
+    real limit = IS_CERTIFIED ? traversal->limit : traversal->hit.t;
+    if (tile->frame.leaving) t = t * real_min(limit, (real)(LARGEST / 2));
     real reach = lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
     tile->reach[packet] = reach;
     tile->reach_max.each[packet] = lanes_largest(traversal->active, reach);
@@ -127,7 +128,7 @@ static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint pack
     // the origin counts, too: a shadow ray's line misses the light by u of all of the ray
     real max_norm1 = bounds_max_norm1(ray->origin, scene->header->bounds);
     real slack = real_fma((real)(TILE_POSITION_SLACK * UNIT_ROUNDOFF), max_norm1,
-                          box_slack(ray->origin, scene->header->bounds));
+                          box_slack(ray, scene->header->bounds));
     tile->slack = real_max(tile->slack, lanes_select(active, slack, zero));
     tile->packets |= 1u << packet;
     macro_tile_set_reach(tile, packet, traversal);

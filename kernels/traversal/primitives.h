@@ -2,6 +2,7 @@
 #ifndef PRIMITIVES_H
 #define PRIMITIVES_H
 
+#include "shapes/certain_hits.h"
 #include "shapes/disc.h"
 #include "shapes/paraboloid.h"
 #include "shapes/plane.h"
@@ -23,6 +24,25 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
 // Intersects primitives first .. last - 1 of one kind; `cull_spheres`, if not 0, are theirs. One function per
 // kind: if one function tested all kinds, Mesa, which inlines before it knows the kind asked for, would
 // compile them all at each call.
+#if IS_CERTIFIED
+#define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
+    static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
+                                         uint first, uint last, global const CullSphere *cull_spheres)       \
+    {                                                                                                        \
+        bool found_any = false;                                                                              \
+        for (uint i = first; i < last; i++) {                                                                \
+            if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
+            if (i == last) break;                                                                            \
+            Type shape = scene->names[i];                                                                    \
+            CertainHit hit = name##_certain_hit(&shape, ray);                                                \
+            if (!lanes_any(hit.found | hit.doubt)) continue;                                                 \
+            found_any = true;                                                                                \
+            traversal_record_certain(traversal, scene, &hit, shape.id.x);                                    \
+            if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;                       \
+        }                                                                                                    \
+        return found_any;                                                                                    \
+    }
+#else
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
     static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
                                          uint first, uint last, global const CullSphere *cull_spheres)       \
@@ -44,6 +64,7 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
         }                                                                                                    \
         return found_any;                                                                                    \
     }
+#endif
 SHAPE_LIST(INTERSECT_SHAPES)
 
 // A leaf is count << 8 | kind (BvhNode.child_kind) and its first primitive.

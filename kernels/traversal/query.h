@@ -3,6 +3,7 @@
 #define QUERY_H
 
 #include "scene.h"
+#include "shapes/certain.h"
 #include "traversal/ray.h"
 
 typedef enum {
@@ -16,6 +17,10 @@ typedef struct {
     mask active; // lanes still searching
     Hit hit;
     integer optical_depth; // for OCCLUSION, of the objects hit so far
+    // At `certified`: the exact hit is no farther than `limit`, and none but hit.object's before `rival`;
+    // `doubt`, for OCCLUSION: lanes with a hit in doubt.
+    real limit, rival;
+    mask doubt;
 } Traversal;
 
 // Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_MAX is that of opaque objects.
@@ -77,11 +82,49 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
     hit->object = lanes_select(closer, object, hit->object);
 }
 
+// As traversal_record, for a hit with bounds. Of those found the nearest is kept; all others, and those in
+// doubt, are rivals. So the answer does not depend on the order in which shapes are tested.
+static inline void traversal_record_certain(Traversal *traversal, const Scene *scene, const CertainHit *found,
+                                            uint id)
+{
+    Hit *hit = &traversal->hit;
+    if (traversal->query == OCCLUSION) {
+        traversal->doubt = traversal->doubt | (found->doubt & traversal->active);
+        traversal_occlude(traversal, scene, found->found & traversal->active, id);
+        return;
+    }
+    if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(scene, id)) return;
+    const real none = (real)(LARGEST);
+    integer object = (integer)((scalar_integer)id);
+    mask is_new = (found->found | found->doubt) & (hit->object != object); // it may have been tested before
+    mask tie = (found->t == hit->t) & (object < hit->object);
+    mask closer = found->found & is_new & ((hit->object < (integer)(0)) | (found->t < hit->t) | tie);
+    real displaced = lanes_select(closer & (hit->object >= (integer)(0)), hit->low, none);
+    real other = lanes_select(is_new & !closer, found->low, displaced);
+    traversal->rival = real_min(traversal->rival, other);
+    mask limits = found->found & (found->high < traversal->limit);
+    traversal->limit = lanes_select(limits, found->high, traversal->limit);
+    hit->t = lanes_select(closer, found->t, hit->t);
+    hit->low = lanes_select(closer, found->low, hit->low);
+    hit->high = lanes_select(closer, found->high, hit->high);
+    hit->object = lanes_select(closer, object, hit->object);
+}
+
+// Sets the hit's doubt, once all shapes have been tested.
+static inline void traversal_judge(Traversal *traversal)
+{
+    if (traversal->query == OCCLUSION)
+        traversal->hit.doubt = traversal->doubt & traversal->active;
+    else
+        traversal->hit.doubt = traversal->active & (traversal->rival <= traversal->limit);
+}
+
 // Per-lane tmax, below LARGEST, the entry distance of a child that no ray hits; -LARGEST for lanes that are
 // done.
 static inline real traversal_tmax(const Traversal *traversal)
 {
-    return lanes_select(traversal->active, real_min(traversal->hit.t, (real)(LARGEST / 2)), (real)(-LARGEST));
+    real t = IS_CERTIFIED ? traversal->limit : traversal->hit.t;
+    return lanes_select(traversal->active, real_min(t, (real)(LARGEST / 2)), (real)(-LARGEST));
 }
 
 #endif

@@ -17,6 +17,16 @@ typedef struct {
     // compiler may rearrange how the direction was computed, within u of the origin
     uint common_origin;
     real cull_slack; // enlarges cull spheres by the rounding of the direction
+    // At `certified`: bounds on the distance of the origin from the exact ray's, and of the direction,
+    // relative to its length; the object that the ray leaves, -1: none; whether it leaves it outward for
+    // certain; whether the exact rays end at one point, a light, where their origins' errors have vanished.
+    real origin_error, direction_error;
+    integer left;
+    mask leaves_outward;
+    bool ends_at_light;
+    mask is_loose;               // too far off for cull spheres
+    real length, inverse_length; // of the direction, within 16 u; the latter is not below the exact one
+    real across_length;          // by ray_prepare: a bound on that of across_u and across_v
     // by ray_prepare: 1 / direction, huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, of length O(1) since they are computed from a
@@ -28,6 +38,9 @@ typedef struct {
 typedef struct {
     real t;
     integer object; // its id; -1: nothing hit
+    // At `certified` the exact t lies between; `doubt`: in lanes where any of this is in doubt.
+    real low, high;
+    mask doubt;
 } Hit;
 
 // Compares the mask from memory with 0 anew: LLVM then sees that a lane is all ones or all zeros, and keeps
@@ -80,10 +93,19 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     ray.tmax = tmax;
     ray.travelled = (real)(0);
     ray.common_origin = COMMON_ORIGIN_NONE;
+    if (IS_CERTIFIED) {
+        ray.origin_error = ray.direction_error = (real)(0);
+        ray.left = (integer)(-1);
+        ray.leaves_outward = mask_none();
+        ray.ends_at_light = false;
+        ray.is_loose = mask_none();
+        ray.length = real_sqrt(ray.squared);
+    }
     ray.active = active & (ray.squared > (real)(0));
     // 0 in inactive lanes: only a sphere around the origin still examines them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
+    if (IS_CERTIFIED) ray.inverse_length = real_sqrt(ray.inverse_squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
     return ray;
 }
 
@@ -97,6 +119,7 @@ static inline void ray_prepare(Ray *ray)
     real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
     frame_across(vector_scale(d, real_inverse_power_of_two(largest)), &ray->across_u, &ray->across_v);
     ray->along = vector_scale(d, ray->inverse_squared);
+    if (IS_CERTIFIED) ray->across_length = vector_norm(ray->across_u) * (real)(1 + 32 * UNIT_ROUNDOFF);
 }
 
 // A ray without far end whose direction is unit, or 0. Its square is 1 + e with e of a few u; the reciprocal
@@ -113,8 +136,10 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 static inline void ray_set_common_origin(Ray *ray, uint common_origin)
 {
     ray->common_origin = common_origin;
-    real slack = (real)(CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
+    const scalar units = IS_CERTIFIED ? CERTIFIED_CULL_DIRECTION_SLACK : CULL_DIRECTION_SLACK;
+    real slack = (real)(units * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
     if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // rays start exactly there
+    if (IS_CERTIFIED) slack = lanes_select(ray->is_loose, (real)(LARGEST), slack);
     ray->cull_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
 }
 

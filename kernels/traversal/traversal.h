@@ -10,7 +10,17 @@
 // Starts a packet's traversal with what is outside the BVH. Whether the BVH is left to traverse.
 static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
 {
-    *traversal = (Traversal){query, ray->active, {ray->tmax, (integer)(-1)}, (integer)(0)};
+    traversal->query = query;
+    traversal->active = ray->active;
+    traversal->hit.t = ray->tmax;
+    traversal->hit.object = (integer)(-1);
+    traversal->optical_depth = (integer)(0);
+    if (IS_CERTIFIED) {
+        traversal->hit.low = traversal->hit.high = ray->tmax;
+        traversal->limit = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
+        traversal->rival = (real)(LARGEST);
+        traversal->doubt = traversal->hit.doubt = mask_none();
+    }
     if (!lanes_any(ray->active)) return false;
     intersect_outside_bvh(traversal, scene, ray);
     if (!HAS_BVH || !lanes_any(traversal->active)) return false;
@@ -38,6 +48,8 @@ static OUT_OF_LINE void scene_traverse(const Scene *scene, Ray *rays, uint count
         traverse_bvh(&traversals[i], scene, &rays[i]);
     }
 #endif
+    for (uint i = 0; IS_CERTIFIED && i < count; i++)
+        traversal_judge(&traversals[i]);
 }
 
 static inline Hit closest_hit(const Scene *scene, Ray *ray)

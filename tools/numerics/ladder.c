@@ -63,7 +63,7 @@ typedef struct {
     bool of_size; // else of the distance
 } Tier;
 
-static const Tier tiers[PRECISION_COUNT] = {
+static const Tier tiers[ARITHMETIC_COUNT] = {
     [PRECISION_FAST] = {16, 32, 8, false},
     [PRECISION_SINGLE] = {8, 16, 4, false},
     [PRECISION_STRICT] = {4, 4, 16, true},
@@ -250,7 +250,7 @@ static double test_seconds(Compute *compute, const RandomShape *shape, Precision
 
 typedef struct {
     RandomShape instances[INSTANCES];
-    Renderer *renderers[INSTANCES][PRECISION_COUNT]; // opened when first needed
+    Renderer *renderers[INSTANCES][ARITHMETIC_COUNT]; // opened when first needed
     const char *name;
 } LadderShape;
 
@@ -268,7 +268,7 @@ static LadderShape shape_make(ShapeKind kind)
 static void shape_close(LadderShape *shape)
 {
     for (int i = 0; i < INSTANCES; i++)
-        for (int precision = 0; precision < PRECISION_COUNT; precision++)
+        for (int precision = 0; precision < ARITHMETIC_COUNT; precision++)
             renderer_close(shape->renderers[i][precision]);
 }
 
@@ -286,14 +286,14 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
 
 // Adds one shape's errors on one rung: each precision of the same width on the same rays.
 static void rung_measure(Compute *compute, LadderShape *shape, int rung, bool is_double,
-                         const LadderOptions *options, size_t count, Tally tallies[PRECISION_COUNT])
+                         const LadderOptions *options, size_t count, Tally tallies[ARITHMETIC_COUNT])
 {
     Random random = {3 + (uint64_t)rung};
     for (int which = 0; which < INSTANCES; which++) {
         const RandomShape *instance = &shape->instances[which];
         Object object = is_double ? instance->object : reference_round_object(&instance->object);
         Rays rays = rays_make(&object, instance, rungs[rung], count, is_double, &random);
-        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (!(options->precisions >> precision & 1) || is_double != (precision == PRECISION_DOUBLE))
                 continue;
             shape_trace(shape, which, precision, compute, &object, &rays);
@@ -337,14 +337,14 @@ static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool is_dou
                      const LadderOptions *options, Json *json)
 {
     size_t count = options->ray_count / (RUNG_COUNT * INSTANCES) + 1;
-    Tally tallies[PRECISION_COUNT] = {0};
-    for (int precision = 0; precision < PRECISION_COUNT; precision++) {
+    Tally tallies[ARITHMETIC_COUNT] = {0};
+    for (int precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         tallies[precision].steep.ulps = memory_allocate(count * INSTANCES, sizeof(double));
         tallies[precision].grazing.ulps = memory_allocate(count * INSTANCES, sizeof(double));
     }
     rung_measure(compute, shape, rung, is_double, options, count, tallies);
     bool within_bounds = true;
-    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         Tally *tally = &tallies[precision];
         if (tally->compared > 0) {
             tally_write(tally, shape->name, precision, rungs[rung], json);
@@ -372,11 +372,11 @@ static bool options_read(LadderOptions *options, int argument_count, char **argu
         if (option == 's') options->shape = optarg;
         if (option == 'c') options->check = true;
         if (option == 't') options->time = true;
-        for (int i = 0; option == 'p' && i < PRECISION_COUNT; i++)
+        for (int i = 0; option == 'p' && i < ARITHMETIC_COUNT; i++)
             if (strcmp(optarg, precision_names[i]) == 0) options->precisions |= 1U << i;
         if (option == '?') return false;
     }
-    if (options->precisions == 0) options->precisions = (1U << PRECISION_COUNT) - 1;
+    if (options->precisions == 0) options->precisions = (1U << ARITHMETIC_COUNT) - 1;
     return optind == argument_count;
 }
 
@@ -415,7 +415,7 @@ int main(int argument_count, char **arguments)
     for (int i = 0; options.time && i < SHAPE_MESH; i++) {
         LadderShape shape = shape_make((ShapeKind)i);
         if (options.shape && strcmp(options.shape, shape.name) != 0) continue;
-        for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (!(options.precisions >> precision & 1)) continue;
             json_begin_object(json, NULL);
             json_text(json, "shape", shape.name);

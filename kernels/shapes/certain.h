@@ -1,0 +1,114 @@
+// Hits with proven bounds, for images at `certified`: each shape against the exact ray, which the packet's
+// ray only approximates, and against the exact shape, whose numbers were rounded. docs/numerics.md derives
+// every bound; constants are twice what it needs or more.
+//
+// The exact ray's point at t lies within origin_error + direction_error |d| t of the packet's. So a shape is
+// hit for certain where the packet's ray hits it shrunk by all errors, and missed where it misses it enlarged
+// by them; in between the answer is in doubt.
+#ifndef CERTAIN_H
+#define CERTAIN_H
+
+#include "shapes/interval.h"
+#include "traversal/ray.h"
+
+// A lane's answer: a hit, which is the exact ray's between low and high; or no hit; or in doubt: a hit, if
+// any, is not before low.
+typedef struct {
+    mask found, doubt;
+    real t, low, high;
+} CertainHit;
+
+// Camera rays, of their length: two products and sums of three terms of at most sqrt 3 of the direction, and
+// the roundings of the camera's vectors and of the unit length.
+enum { CAMERA_DIRECTION_ERROR = 12 };
+
+// How far the exact ray is from the packet's, up to a distance.
+static inline real ray_place_error(const Ray *ray, real distance)
+{
+    return real_fma(ray->direction_error, distance, ray->origin_error);
+}
+
+// The ray starts on this shape, and does not meet it again: it is flat, or convex and left outward.
+static inline mask ray_left_for_good(const Ray *ray, uint id, bool is_flat)
+{
+    mask left = ray->left == (integer)((scalar_integer)id);
+    return is_flat ? left : left & ray->leaves_outward;
+}
+
+// Sorts a crossing between low and high, which are known to contain it, by the ray's start and end; `exists`
+// for certain, or only perhaps.
+static inline CertainHit certain_crossing(const Ray *ray, mask exists, mask perhaps, real low, real high)
+{
+    CertainHit hit;
+    // beyond the end: of a ray to a light t = 1, from which tmax differs by rounding
+    mask beyond = low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
+    mask before = high < ray->tmin;
+    perhaps = perhaps & !(beyond | before);
+    hit.found = exists & perhaps & (low > ray->tmin) & (high < ray->tmax);
+    hit.doubt = perhaps & !hit.found;
+    hit.t = (real)(0.5f) * (low + high);
+    hit.low = low;
+    hit.high = high;
+    return hit;
+}
+
+static inline CertainHit certain_select(mask condition, CertainHit yes, CertainHit no)
+{
+    return (CertainHit){lanes_select(condition, yes.found, no.found),
+                        lanes_select(condition, yes.doubt, no.doubt), lanes_select(condition, yes.t, no.t),
+                        lanes_select(condition, yes.low, no.low), lanes_select(condition, yes.high, no.high)};
+}
+
+static inline CertainHit certain_miss(void)
+{
+    return (CertainHit){mask_none(), mask_none(), (real)(0), (real)(0), (real)(0)};
+}
+
+// The first of two crossings: the second where the first lies before the start.
+static inline CertainHit certain_first(const Ray *ray, CertainHit near, real near_high, CertainHit far)
+{
+    return certain_select(near_high < ray->tmin, far, near);
+}
+
+static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
+{
+    hit.found = hit.found & lanes;
+    hit.doubt = hit.doubt & lanes;
+    return hit;
+}
+
+// A ball: with l the line's closest point to the center, r^2 - l^2 is half the chord squared.
+typedef struct {
+    mask active;
+    mask certain, perhaps;       // the line crosses it
+    real near_t, far_t, t_error; // its crossings
+    real middle_t, middle_error; // the closest point
+} CertainBall;
+
+static inline CertainBall certain_ball(Vector center, real radius, const Ray *ray)
+{
+    Vector f = vector_subtract(ray->origin, center);
+    real distance = vector_norm1(f);
+    real place = ray_place_error(ray, distance + radius) +
+                 (real)(UNIT_ROUNDOFF) *
+                     ((real)(32) * distance + (real)(4) * vector_norm1(ray->origin) + (real)(16) * radius);
+    real inverse_length = ray->inverse_length;
+    CertainBall ball;
+    ball.middle_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
+    Vector l = vector_fma(ray->direction, ball.middle_t, f);
+    real squared = real_fma(radius, radius, -vector_dot(l, l));
+    real band = place * (radius + radius + place) * (real)(1 + 8 * UNIT_ROUNDOFF);
+    ball.active = RAY_ACTIVE(ray);
+    ball.certain = ball.active & (squared > band);
+    ball.perhaps = ball.active & !(squared < -band);
+    ball.middle_error = (real)(2) * place * inverse_length;
+    real half_chord = real_sqrt(real_max(squared, (real)(0)));
+    real root = real_sqrt(real_max(squared, band));
+    ball.t_error = inverse_length * real_fma((real)(2) * band, real_divide((real)(1), root), place + place) +
+                   (real)(16 * UNIT_ROUNDOFF) * inverse_length * half_chord;
+    ball.near_t = real_fma(-half_chord, inverse_length, ball.middle_t);
+    ball.far_t = real_fma(half_chord, inverse_length, ball.middle_t);
+    return ball;
+}
+
+#endif

@@ -1,0 +1,296 @@
+// Each shape's hits with bounds (shapes/certain.h): NAME_certain_hit. Left out of other precisions, not
+// tested with a plain `if`: textbook formulas, which tools/numerics builds in place of the shapes, have no
+// bounds.
+#ifndef CERTAIN_HITS_H
+#define CERTAIN_HITS_H
+
+#include "shapes/certain.h"
+#include "shapes/disc.h"
+#include "shapes/paraboloid.h"
+#include "shapes/plane.h"
+#include "shapes/revolution.h"
+#include "shapes/sphere.h"
+#include "shapes/torus.h"
+#include "shapes/triangle.h"
+
+#if IS_CERTIFIED
+
+static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
+{
+    CertainBall ball = certain_ball(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray);
+    if (!lanes_any(ball.perhaps)) return certain_miss();
+    real near_high = ball.near_t + ball.t_error, far_high = ball.far_t + ball.t_error;
+    CertainHit far = certain_crossing(ray, ball.certain, ball.perhaps, ball.far_t - ball.t_error, far_high);
+    CertainHit hit = far;
+    if (!(sphere->id.y & IGNORES_FRONT_FACES)) {
+        CertainHit near =
+            certain_crossing(ray, ball.certain, ball.perhaps, ball.near_t - ball.t_error, near_high);
+        hit = certain_first(ray, near, near_high, far);
+    }
+    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
+    if (lanes_any(left)) {
+        // one crossing is the start; the other lies twice as far as the closest point
+        real t = (real)(2) * ball.middle_t, t_error = (real)(4) * ball.middle_error;
+        mask on = left & ball.active;
+        CertainHit other = certain_crossing(ray, on, on, t - t_error, t + t_error);
+        hit = certain_select(left, other, hit);
+        hit = certain_restrict(hit, !(left & ray->leaves_outward));
+    }
+    return hit;
+}
+
+// Where the line meets a plane, n . (p - o) / n . d; *low <= t <= *high where the result is set. Elsewhere it
+// may meet it at or beyond *low.
+static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const Ray *ray, real *low,
+                                 real *high)
+{
+    Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
+    real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
+    real size = real_divide((real)(1 + 16 * UNIT_ROUNDOFF), (real)(normal_and_inverse.w));
+    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
+    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(8) * vector_norm1_along(unsigned_normal, to_point) +
+                                                 (real)(4) * vector_norm1_along(unsigned_normal, point)) +
+                        size * ray->origin_error;
+    real along_error = (real)(6 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
+                       size * (ray->length * ray->direction_error);
+    mask crosses = fabs(along) > (real)(8) * along_error;
+    real divisor = lanes_select(crosses, along, (real)(1));
+    real t = real_divide(height, divisor);
+    real t_error = real_divide((real)(1.25f) * real_fma(fabs(t), along_error, height_error), fabs(divisor)) +
+                   (real)(16 * UNIT_ROUNDOFF) * fabs(t);
+    // nearly parallel: beyond the least distance over the greatest approach
+    real least = real_max(fabs(height) - height_error, (real)(0));
+    real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    mask moves = least * (real)(SMALLEST_RATIO) < greatest;
+    real parallel_low =
+        lanes_select(moves, real_divide(least, lanes_select(moves, greatest, (real)(1))), (real)(LARGEST)) *
+        (real)(1 - 16 * UNIT_ROUNDOFF);
+    *low = lanes_select(crosses, t - t_error, parallel_low);
+    *high = lanes_select(crosses, t + t_error, (real)(LARGEST));
+    return crosses;
+}
+
+static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
+{
+    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, plane->id.x, true);
+    real low, high;
+    mask crosses = certain_plane(vector_of(plane->point), plane->normal, ray, &low, &high);
+    return certain_crossing(ray, lanes & crosses, lanes, low, high);
+}
+
+// Its ball is missed by most; else the crossing with its plane lies within the rim, or not.
+static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
+{
+    Vector center = vector_of(disc->center_radius);
+    real radius = (real)(disc->center_radius.w);
+    CertainBall ball = certain_ball(center, radius, ray);
+    mask lanes = ball.perhaps & !ray_left_for_good(ray, disc->id.x, true);
+    if (!lanes_any(lanes)) return certain_miss();
+    real low, high;
+    mask crosses = certain_plane(disc_foot(disc), disc->normal, ray, &low, &high);
+    // nearly parallel to it: no nearer than the ball
+    low = lanes_select(crosses, low, real_max(low, ball.near_t - ball.t_error));
+    high = lanes_select(crosses, high, ball.far_t + ball.t_error);
+    CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, low, high);
+    Vector f = vector_subtract(ray->origin, center);
+    Vector across = vector_fma(ray->direction, hit.t, f);
+    real moved = ray->length, path = moved * fabs(hit.t);
+    real place = ray_place_error(ray, path) + moved * ((real)(0.5f) * (hit.high - hit.low)) +
+                 (real)(UNIT_ROUNDOFF) *
+                     ((real)(16) * (vector_norm1(f) + path + radius) + (real)(4) * vector_norm1(ray->origin));
+    real squared = real_fma(radius, radius, -vector_dot(across, across));
+    real band = place * (radius + radius + place);
+    mask within = squared > band, beyond = crosses & (squared < -band);
+    hit = certain_restrict(hit, !beyond);
+    hit.doubt = hit.doubt | (hit.found & !within);
+    hit.found = hit.found & within;
+    return hit;
+}
+
+// Where the ray is between two planes across an axis, of a box larger by `more`.
+static inline Interval certain_slab(real low, real high, real more, real origin, real direction)
+{
+    mask parallel = fabs(direction) <= (real)(SMALLEST_RATIO);
+    real from = (low - more) - origin, to = (high + more) - origin;
+    real inverse = real_divide((real)(1), lanes_select(parallel, (real)(1), direction));
+    real a = from * inverse, b = to * inverse;
+    mask between = (from <= (real)(0)) & (to >= (real)(0));
+    real always = lanes_select(between, (real)(LARGEST / 4), (real)(-LARGEST / 4));
+    mask empty = from > to; // shrunk to nothing
+    Interval slab = {lanes_select(parallel, -always, real_min(a, b)),
+                     lanes_select(parallel, always, real_max(a, b))};
+    slab.near = lanes_select(empty, (real)(LARGEST / 4), slab.near);
+    slab.far = lanes_select(empty, (real)(-LARGEST / 4), slab.far);
+    return slab;
+}
+
+static inline Interval certain_box(const Box *box, const Ray *ray, real more)
+{
+    Vector low = vector_of(box->low), high = vector_of(box->high);
+    Interval x = certain_slab(low.x, high.x, more, ray->origin.x, ray->direction.x);
+    Interval y = certain_slab(low.y, high.y, more, ray->origin.y, ray->direction.y);
+    Interval z = certain_slab(low.z, high.z, more, ray->origin.z, ray->direction.z);
+    return (Interval){real_max(real_max(x.near, y.near), z.near), real_min(real_min(x.far, y.far), z.far)};
+}
+
+// The box enlarged contains the exact crossings' interval, the box shrunk lies within it.
+static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
+{
+    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, box->id.x, false);
+    Vector low = vector_of(box->low), high = vector_of(box->high);
+    Vector to_low = vector_subtract(low, ray->origin), to_high = vector_subtract(high, ray->origin);
+    real distance = vector_norm1(to_low) + vector_norm1(to_high);
+    real place =
+        ray_place_error(ray, distance) + (real)(32 * UNIT_ROUNDOFF) * (distance + vector_norm1(ray->origin));
+    Interval outer = certain_box(box, ray, place);
+    mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
+    if (!lanes_any(perhaps)) return certain_miss();
+    Interval inner = certain_box(box, ray, -place);
+    mask certain = perhaps & (inner.near < inner.far);
+    real never = (real)(LARGEST / 8);
+    real near_high = lanes_select(certain, inner.near, never);
+    CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
+    CertainHit far =
+        certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
+    // where it starts on a face, the other crossing counts
+    mask left = ray->left == (integer)((scalar_integer)box->id.x);
+    return certain_select(left & certain, far, certain_first(ray, near, near_high, far));
+}
+
+// In the ray's frame a vertex is off by `error` along each axis, and so an edge function by twice that times
+// the coordinates it is made of. t is between those of the vertices, weighted by the edge functions.
+static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
+{
+    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, triangle->id.x, true);
+    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
+    TriangleEdges edges = triangle_edges(corners, ray);
+    Vector max_abs = corners_max_abs((Corners){edges.a, edges.b, edges.c});
+    real distance = vector_norm(max_abs);
+    real place = ray_place_error(ray, distance) +
+                 (real)(UNIT_ROUNDOFF) * ((real)(48) * distance + (real)(2) * vector_norm1(ray->origin));
+    Vector u = ray->across_u, v = ray->across_v;
+    real error = place * ray->across_length;
+    real ax = vector_dot(edges.a, u), ay = vector_dot(edges.a, v);
+    real bx = vector_dot(edges.b, u), by = vector_dot(edges.b, v);
+    real cx = vector_dot(edges.c, u), cy = vector_dot(edges.c, v);
+    real sum = fabs(ax) + fabs(ay) + fabs(bx) + fabs(by) + fabs(cx) + fabs(cy);
+    real edge_error = error * (sum + error + error);
+    real least = real_min(real_min(edges.u, edges.v), edges.w);
+    real largest = real_max(real_max(edges.u, edges.v), edges.w);
+    mask misses = ((least < -edge_error) & (largest > edge_error)) |
+                  (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
+                  (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
+    mask perhaps = lanes & !misses;
+    if (!lanes_any(perhaps)) return certain_miss();
+    mask certain = perhaps & ((least > edge_error) | (largest < -edge_error));
+
+    real inverse_length = ray->inverse_length;
+    real a_t = vector_dot(edges.a, ray->along), b_t = vector_dot(edges.b, ray->along),
+         c_t = vector_dot(edges.c, ray->along);
+    real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
+    real vertex_error = place * inverse_length;
+    real divisor = lanes_select(certain, edges.determinant, (real)(1));
+    real inverse = real_divide((real)(1), divisor);
+    real t = real_fma(a_t, edges.u * inverse, real_fma(b_t, edges.v * inverse, c_t * (edges.w * inverse)));
+    real part = (real)(8) * edge_error * fabs(inverse); // of all weights, if it is small
+    real t_error = (high - low) * part + (real)(32 * UNIT_ROUNDOFF) * (fabs(low) + fabs(high)) + vertex_error;
+    mask narrows = certain & (part < (real)(0.5f));
+    low = low - vertex_error;
+    high = high + vertex_error;
+    low = lanes_select(narrows, real_max(low, t - t_error), low);
+    high = lanes_select(narrows, real_min(high, t + t_error), high);
+    return certain_crossing(ray, certain, perhaps, low, high);
+}
+
+// How much longer than high a triangle is at least, over its length: a vertex that moves by e turns the
+// normal by e times this at most, and a point that does moves its weights by as much.
+static inline real triangle_slimness(Corners corners)
+{
+    Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
+           bc = vector_subtract(corners.c, corners.b);
+    real longest = real_max(real_max(vector_norm1(ab), vector_norm1(ac)), vector_norm1(bc));
+    real area = vector_norm(vector_cross(ab, ac));
+    mask flat = area > longest * (real)(SMALLEST_RATIO);
+    return lanes_select(flat, real_divide(longest, lanes_select(flat, area, (real)(1))),
+                        (real)(1 / SMALLEST_RATIO));
+}
+
+// The errors of the normals: each vertex is off by up to 2 u of its 1-norm, and where normals are blended the
+// weights by that and the place's error.
+static inline void triangle_set_normal_errors(Corners corners, Corners normals, TriangleWeights weights,
+                                              SurfacePoint *point)
+{
+    real slimness = triangle_slimness(corners);
+    real vertex_error = (real)(8 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
+    real apart = vector_norm1(vector_subtract(normals.a, normals.b)) +
+                 vector_norm1(vector_subtract(normals.b, normals.c));
+    Vector blend = triangle_blend(weights, normals);
+    real length = vector_norm(blend);
+    mask bends = (apart > (real)(0)) & (length > (real)(SMALLEST_RATIO));
+    point->curvature = lanes_select(
+        bends, (real)(4) * apart * slimness * real_divide((real)(1), lanes_select(bends, length, (real)(1))),
+        (real)(0));
+    point->normal_error = vertex_error * (slimness + point->curvature);
+}
+
+// A box's faces that meet at an edge have normals of their own: whether another one is as near as the error.
+static inline mask box_edge_is_near(const Box *box, Vector position, Vector normal, real error)
+{
+    Vector low = vector_of(box->low), high = vector_of(box->high);
+    const real zero = (real)(0);
+    real x = real_min(fabs(position.x - low.x), fabs(position.x - high.x));
+    real y = real_min(fabs(position.y - low.y), fabs(position.y - high.y));
+    real z = real_min(fabs(position.z - low.z), fabs(position.z - high.z));
+    return ((normal.x == zero) & (x <= error)) | ((normal.y == zero) & (y <= error)) |
+           ((normal.z == zero) & (z <= error));
+}
+
+// Shapes without bounds of their own yet: in doubt wherever a ray meets their bounding sphere.
+static inline CertainHit doubtful_ball(Vector center, real radius, const Ray *ray)
+{
+    CertainBall ball = certain_ball(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray);
+    return certain_crossing(ray, mask_none(), ball.perhaps, ball.near_t - ball.t_error,
+                            ball.far_t + ball.t_error);
+}
+
+static inline CertainHit doubtful_everywhere(const Ray *ray)
+{
+    return (CertainHit){mask_none(), RAY_ACTIVE(ray), ray->tmin, ray->tmin, ray->tmax};
+}
+
+static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
+{
+    return doubtful_ball(vector_of(torus->center_major), (real)(torus->center_major.w + torus->axis_minor.w),
+                         ray);
+}
+
+static inline CertainHit revolution_certain_hit(const Revolution *shape, const Ray *ray)
+{
+    if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return doubtful_everywhere(ray);
+    const scalar length = shape->range.y, height = shape->range.x / length;
+    const scalar base = shape->base_radius.w / length,
+                 top = fma(shape->axis_slope.w, shape->range.x, shape->base_radius.w) / length;
+    Vector middle = vector_fma(vector_of(shape->axis_slope), (real)(0.5f * height / length),
+                               vector_of(shape->base_radius));
+    return doubtful_ball(middle, (real)(fmax(base, top) + 0.5f * height), ray);
+}
+
+static inline CertainHit cylinder_certain_hit(const Cylinder *cylinder, const Ray *ray)
+{
+    return revolution_certain_hit(cylinder, ray);
+}
+
+static inline CertainHit cone_certain_hit(const Cone *cone, const Ray *ray)
+{
+    return revolution_certain_hit(cone, ray);
+}
+
+static inline CertainHit paraboloid_certain_hit(const Paraboloid *shape, const Ray *ray)
+{
+    (void)shape;
+    return doubtful_everywhere(ray);
+}
+
+#endif
+
+#endif
