@@ -163,11 +163,11 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c \
+linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c \
           $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),host/mpi/main.c)
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
-             tests/oracle/*.h) tools/chaos.c $(embree_sources) $(embree_headers)
+             tests/oracle/*.h) $(embree_sources) $(embree_headers)
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)

@@ -128,6 +128,14 @@ for line in worker.stdout:
         write("other", f"#!/bin/sh\nexec {PROGRAM} \"$@\" --device none-such\n")
         self.refuses(f"{command} ./other", "no OpenCL device matches|none-such")
 
+    def test_scene_hash(self):
+        """That of a scene from a pipe is that of its bytes, which are gone once they are read."""
+        os.symlink("/dev/stdin", "pipe.yaml")
+        rows = [self.json(f"bench {scene} --size 8x8 --seconds 0.01 --json", **options)["runs"][0] for scene, options in (
+            ("sphere.yaml", {}), ("pipe.yaml", {"input": SPHERE}), ("pipe.yaml", {"input": SPHERE + "# other\n"}))]
+        self.assertEqual(rows[0]["scene_hash"], rows[1]["scene_hash"])
+        self.assertNotEqual(rows[0]["scene_hash"], rows[2]["scene_hash"])
+
     def test_refused(self):
         for arguments, word in (
             ("", "scene"),

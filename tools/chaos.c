@@ -15,7 +15,9 @@
 //
 // System calls are trapped by seccomp, so that those within libc are seen, too. Only on x86-64 Linux with
 // glibc.
+#ifndef _GNU_SOURCE
 #define _GNU_SOURCE
+#endif
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -37,6 +39,9 @@
 #include <sys/syscall.h>
 #include <ucontext.h>
 #include <unistd.h>
+
+// glibc's parameters have reserved names
+// NOLINTBEGIN(readability-inconsistent-declaration-parameter-name)
 
 static char kind[16], folder[PATH_MAX], log_path[PATH_MAX];
 static unsigned long failing = ULONG_MAX;
@@ -449,7 +454,9 @@ __attribute__((constructor)) static void start(void)
                *log = getenv("GLINT_CHAOS_LOG");
     if (where) snprintf(folder, sizeof folder, "%s", where);
     if (log) snprintf(log_path, sizeof log_path, "%s", log);
-    if (what) sscanf(what, "%15s %lu", kind, &failing);
+    const char *space = what ? strchr(what, ' ') : NULL;
+    if (what) snprintf(kind, sizeof kind, "%.*s", (int)strcspn(what, " "), what);
+    if (space) failing = strtoul(space, NULL, 10);
     dl_iterate_phdr(find_text, NULL);
     // programs that a driver starts are left alone: the filter would end them before they are ready for it
     unsetenv("LD_PRELOAD");
@@ -464,3 +471,5 @@ __attribute__((destructor)) static void end(void)
     log_line("alloc %lu\n", alloc_count);
     log_line("call %lu\n", call_count);
 }
+
+// NOLINTEND(readability-inconsistent-declaration-parameter-name)

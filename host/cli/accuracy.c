@@ -64,23 +64,13 @@ typedef struct {
     MessageList messages;
 } Accuracy;
 
-// Positive numbers, separated by commas.
-static bool budgets_read(const char *value, AccuracyBudgets *budgets)
+static bool budget_read(const char *option, const char *value, void *limit)
 {
-    *budgets = (AccuracyBudgets){.count = 0};
-    for (const char *at = value;; at++) {
-        char *end;
-        const double limit = strtod(at, &end);
-        if (end == at || !(limit > 0 && isfinite(limit)) || (*end != ',' && *end != '\0')) break;
-        if (budgets->count == BUDGETS_MAX) {
-            fprintf(stderr, "glint: --budget: at most %d numbers\n", BUDGETS_MAX);
-            return false;
-        }
-        budgets->limits[budgets->count++] = limit;
-        if (*end == '\0') return true;
-        at = end;
-    }
-    fprintf(stderr, "glint: --budget: expected positive numbers, separated by commas, not \"%s\"\n", value);
+    char *end;
+    const double number = strtod(value, &end);
+    *(double *)limit = number;
+    if (end != value && *end == '\0' && number > 0 && isfinite(number)) return true;
+    fprintf(stderr, "glint: --%s: expected a positive number, not \"%s\"\n", option, value);
     return false;
 }
 
@@ -93,7 +83,8 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
         options->reference_path = value;
         return true;
     case OPTION_BUDGET:
-        return budgets_read(value, &options->budgets);
+        return option_list("budget", value, budget_read, options->budgets.limits,
+                           sizeof *options->budgets.limits, BUDGETS_MAX, &options->budgets.count);
     case OPTION_SAVE:
         options->folder = value;
         return true;

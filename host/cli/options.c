@@ -126,6 +126,25 @@ bool option_choice(const char *option, const char *value, const char *const *nam
     return false;
 }
 
+bool option_list(const char *option, const char *value, OptionItem read, void *items, size_t item_size,
+                 size_t most, size_t *count)
+{
+    *count = 0;
+    for (const char *at = value;; at++) {
+        const size_t length = strcspn(at, ",");
+        char *word = memory_copy_text(at);
+        word[length] = '\0';
+        const bool has_room = *count < most;
+        if (!has_room) fprintf(stderr, "glint: --%s: at most %zu values\n", option, most);
+        const bool is_read = has_room && read(option, word, (char *)items + *count * item_size);
+        free(word);
+        if (!is_read) return false;
+        (*count)++;
+        at += length;
+        if (*at == '\0') return true;
+    }
+}
+
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,
                 unsigned *result)
 {

@@ -96,6 +96,11 @@ bool option_choice(const char *option, const char *value, const char *const *nam
 // E or E:METRIC; without a metric the RMSE.
 bool option_error_budget(const char *option, const char *value, ErrorBudget *budget);
 bool option_max_pixels(const char *value); // and sets the limit
+// Reads one value of a list into `item`; on a mistake prints what `option` expects and returns false.
+typedef bool (*OptionItem)(const char *option, const char *value, void *item);
+// Values separated by commas, at most `most` of them, each into the next `item_size` bytes of `items`.
+bool option_list(const char *option, const char *value, OptionItem read, void *items, size_t item_size,
+                 size_t most, size_t *count);
 // Comma-separated names; the result has one bit per name.
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,
                 unsigned *result);

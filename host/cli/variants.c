@@ -25,26 +25,9 @@ bool option_positive(const char *option, const char *value, double *result)
     return true;
 }
 
-// Comma-separated numbers.
-static bool option_samples(VariantOptions *options, const char *value)
+static bool samples_read(const char *option, const char *value, void *samples)
 {
-    options->sample_choices = 0;
-    for (const char *at = value;; at++) {
-        size_t length = strcspn(at, ",");
-        char *word = memory_copy_text(at);
-        word[length] = '\0';
-        uint32_t samples = 0;
-        bool valid = option_count("samples", word, 1, SAMPLES_MAX, &samples);
-        free(word);
-        if (!valid) return false;
-        if (options->sample_choices == SAMPLE_CHOICES_MAX) {
-            fprintf(stderr, "glint: --samples: at most %d numbers\n", SAMPLE_CHOICES_MAX);
-            return false;
-        }
-        options->samples[options->sample_choices++] = samples;
-        at += length;
-        if (*at == '\0') return true;
-    }
+    return option_count(option, value, 1, SAMPLES_MAX, samples);
 }
 
 bool variant_option(VariantOptions *options, int option, const char *value, bool *valid)
@@ -66,7 +49,8 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
         *valid = option_positive("seconds", value, &options->seconds);
         return true;
     case OPTION_SAMPLES:
-        *valid = option_samples(options, value);
+        *valid = option_list("samples", value, samples_read, options->samples, sizeof *options->samples,
+                             SAMPLE_CHOICES_MAX, &options->sample_choices);
         return true;
     case OPTION_BOUNCES:
         *valid = option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
@@ -105,9 +89,9 @@ static uint64_t file_hash(uint64_t hash, const char *path)
 }
 
 // Of the contents of the scene's file, meshes and textures, whatever their names.
-static uint64_t scene_files_hash(const Scene *scene, const char *path)
+static uint64_t scene_files_hash(const Scene *scene)
 {
-    uint64_t hash = file_hash(HASH_START, path);
+    uint64_t hash = scene->text_hash;
     for (size_t i = 0; i < scene->meshes.count; i++)
         hash = file_hash(hash, scene->meshes.items[i].path);
     for (size_t i = 0; i < scene->textures.count; i++)
@@ -125,7 +109,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
     settings.shift_to_eye = true;
     settings.stop = progress_interrupted;
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
-    const uint64_t hash = scene_files_hash(&set->scenes[scene_index], path);
+    const uint64_t hash = scene_files_hash(&set->scenes[scene_index]);
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
         for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
             for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)

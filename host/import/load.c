@@ -1,5 +1,6 @@
 #include "host/import/load.h"
 
+#include "host/base/hash.h"
 #include "host/base/text.h"
 #include <stdlib.h>
 #include <string.h>
@@ -49,6 +50,7 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
     if (read) {
         Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         read = scene_read(scene, &source, options, messages);
+        scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
     }
     text_free(&text);
     return read;

@@ -174,8 +174,9 @@ typedef struct {
         SceneTexture *items;
         size_t count, capacity;
     } textures;
-    char *file; // of a scene that has textures, and
-    Text text;  // what was read from it: for messages about them, see scene_source
+    char *file;         // of a scene that has textures, and
+    Text text;          // what was read from it: for messages about them, see scene_source
+    uint64_t text_hash; // of the file's bytes; hash_bytes
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;
