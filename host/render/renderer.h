@@ -57,8 +57,9 @@ Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size
 bool renderer_compile(CompiledScene *compiled, const Scene *scene, const RenderSettings *settings,
                       MessageList *messages);
 void renderer_close(Renderer *renderer);
-// Takes another camera, size, region, samples or bounces; all else in `scene` and `settings` is what the
-// renderer was opened with. Textures stay on the device, and kernels where they suit. False as where
+// Takes another camera, size, region, samples or bounces, and without settings->moves other objects,
+// materials, lights and BvhChoice; all else in `scene` and `settings` is what the renderer was opened with.
+// Textures stay on the device, and kernels where they suit. False as where
 // renderer_open returns NULL; the renderer then renders what it did before, unless the device failed.
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);

@@ -10,6 +10,9 @@ typedef struct {
     bool inexact; // quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp
     VerifyResult *result;
     VerifyKernels *kernels;
+    // Of the last scene of verify_trace and of verify_render; NULL: none. The next scene takes it over with
+    // its kernels, as loading them for each scene would take longer than most scenes.
+    Renderer **tracer, **painter;
 } VerifyRun;
 
 // What of a case is not in the tables. Counts what is wrong in the run's result.

@@ -164,8 +164,7 @@ static void hash_hit(VerifyRun *run, const TraceHit *hit)
 
 // With every feature built in, so that one program serves all scenes; lean, with what an image of the scene
 // needs, and, of rays, what becomes of them there. Width 0: for rays.
-static Renderer *scene_open_renderer(const VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
-                                     uint32_t height)
+static RenderSettings scene_settings(const VerifyRun *run, bool bvh, uint32_t width, uint32_t height)
 {
     const bool image = width > 0;
     const FeatureSet lean_features = image ? 0 : FEATURE_REFLECTION | FEATURE_TRANSMISSION;
@@ -176,18 +175,34 @@ static Renderer *scene_open_renderer(const VerifyRun *run, const Scene *scene, b
     if (!image) settings.bounce_count = 0;
     settings.shift_to_eye = image;
     settings.extra_features = run->settings->lean ? lean_features : FEATURE_ALL;
+    return settings;
+}
+
+// Opens *renderer, or gives it another scene; NULL where the device fails.
+static void scene_assign(const VerifyRun *run, Renderer **renderer, const Scene *scene,
+                         const RenderSettings *settings)
+{
     MessageList messages = {0};
-    Renderer *renderer = renderer_open(run->compute, scene, &settings, &messages);
+    if (!*renderer) {
+        *renderer = renderer_open(run->compute, scene, settings, &messages);
+    } else if (renderer_move(*renderer, scene, settings, &messages)) {
+        renderer_report_restart(*renderer);
+    } else {
+        renderer_close(*renderer);
+        *renderer = NULL;
+    }
     message_list_print(&messages, stderr);
     message_list_free(&messages);
-    if (!renderer && compute_ok(run->compute)) fault("a hard case does not fit the device");
-    if (renderer) run->kernels->lanes = renderer_report(renderer)->lanes;
-    return renderer;
+    if (!*renderer && compute_ok(run->compute)) fault("a hard case does not fit the device");
+    if (*renderer) run->kernels->lanes = renderer_report(*renderer)->lanes;
 }
 
 Renderer *verify_open(VerifyRun *run, const Scene *scene, bool bvh)
 {
-    return scene_open_renderer(run, scene, bvh, 0, 0);
+    const RenderSettings settings = scene_settings(run, bvh, 0, 0);
+    Renderer *renderer = NULL;
+    scene_assign(run, &renderer, scene, &settings);
+    return renderer;
 }
 
 void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays, size_t count, TraceHit *hits)
@@ -206,9 +221,9 @@ void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays,
 void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count,
                   TraceHit *hits)
 {
-    Renderer *opened = verify_open(run, scene, bvh);
-    verify_trace_opened(run, opened, rays, count, hits);
-    renderer_close(opened);
+    const RenderSettings settings = scene_settings(run, bvh, 0, 0);
+    scene_assign(run, run->tracer, scene, &settings);
+    verify_trace_opened(run, *run->tracer, rays, count, hits);
 }
 
 static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
@@ -225,12 +240,12 @@ static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
 Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height)
 {
     Film film;
-    Renderer *renderer = scene_open_renderer(run, scene, bvh, width, height);
-    if (renderer && renderer_render_film(renderer, AOVS_ALL, &film))
-        run->kernels->render_hash = renderer_report(renderer)->kernel_hash;
+    const RenderSettings settings = scene_settings(run, bvh, width, height);
+    scene_assign(run, run->painter, scene, &settings);
+    if (*run->painter && renderer_render_film(*run->painter, AOVS_ALL, &film))
+        run->kernels->render_hash = renderer_report(*run->painter)->kernel_hash;
     else
         film = film_allocate(width, height, (uint32_t)scene->lights.count, AOVS_ALL);
-    renderer_close(renderer);
     const size_t pixels = film_pixel_count(&film);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
@@ -337,6 +352,7 @@ VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const
                          VerifySink sink, void *context)
 {
     VerifyKernels kernels = {0};
+    Renderer *tracer = NULL, *painter = NULL;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         if (!is_chosen(choice, cases[i].name)) continue;
         VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
@@ -345,12 +361,16 @@ VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const
                          .tier = verify_tier(&settings->render),
                          .inexact = is_inexact(&settings->render),
                          .result = &result,
-                         .kernels = &kernels};
+                         .kernels = &kernels,
+                         .tracer = &tracer,
+                         .painter = &painter};
         for (size_t k = 0; k < verify_rays_count; k++)
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
         if (!sink(context, &result)) break;
     }
+    renderer_close(tracer);
+    renderer_close(painter);
     return kernels;
 }
