@@ -7,6 +7,7 @@
 #include "host/cli/variants.h"
 #include "host/measure/baseline.h"
 #include <getopt.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -162,7 +163,7 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     bool with_double = (options->precisions >> PRECISION_DOUBLE & 1) && compute->device->fp64;
     Progress progress;
     progress_open(&progress, bench->options.as_json);
-    peak_measure(&bench->peak, compute, with_double);
+    peak_measure(&bench->peak, compute, with_double, options->seconds > 0 ? options->seconds : INFINITY);
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
     if (!whole) {

@@ -3,10 +3,11 @@
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include <math.h>
 #include <stdlib.h>
 
 static const double launch_seconds_wanted = 0.03, calibration_seconds_wanted = 0.001;
-static const double window_seconds = 0.1, total_seconds = 1;
+static const double window_seconds = 0.1, seconds_max = 1;
 static const double stable_ratio = 1.03;
 
 enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of eight chains
@@ -33,12 +34,12 @@ bool peak_windows_stable(const PeakWindows *windows)
 // The rate of one launch.
 typedef double (*RateFunction)(Peak *peak, Compute *compute, void *context);
 
-// The best of many launches, until windows of time repeat it.
+// The best of many launches, until windows of time repeat it or the peak's time is up.
 static double rate_measure(Peak *peak, Compute *compute, RateFunction launch, void *context)
 {
     PeakWindows windows = {0};
     double start = clock_seconds();
-    while (compute_ok(compute) && !peak_windows_stable(&windows) && clock_seconds() - start < total_seconds) {
+    while (compute_ok(compute) && !peak_windows_stable(&windows) && clock_seconds() - start < peak->seconds) {
         double best = 0, window_start = clock_seconds();
         do {
             double rate = launch(peak, compute, context);
@@ -169,9 +170,9 @@ static void copy_measure(Peak *peak, Compute *compute, const Program *program)
     if (copy.kernel) clReleaseKernel(copy.kernel);
 }
 
-void peak_measure(Peak *peak, Compute *compute, bool with_double)
+void peak_measure(Peak *peak, Compute *compute, bool with_double, double seconds)
 {
-    *peak = (Peak){.by_events = true, .is_stable = true};
+    *peak = (Peak){.by_events = true, .is_stable = true, .seconds = fmin(seconds, seconds_max)};
     for (int is_double = 0; is_double < (with_double ? 2 : 1); is_double++) {
         Arithmetic arithmetic;
         arithmetic_open(&arithmetic, compute, is_double);

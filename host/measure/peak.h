@@ -9,11 +9,12 @@ typedef struct {
     double bytes_per_second;    // read and written
     bool by_events;             // whose clock: the device's, else the host's
     bool is_stable;             // every rate was reached again and again
+    double seconds;             // time limit of each rate
 } Peak;
 
-// Takes some 0.3 s for each rate, and up to 1 s until it is stable, after the build of the kernels.
-// `with_double`: also of double, which the device must have.
-void peak_measure(Peak *peak, Compute *compute, bool with_double);
+// Takes some 0.3 s for each rate, and up to 1 s or `seconds` until it is stable, after the build of the
+// kernels. `with_double`: also of double, which the device must have.
+void peak_measure(Peak *peak, Compute *compute, bool with_double, double seconds);
 
 // The best rates of the windows of a measurement; zeroed: none yet.
 typedef struct {
