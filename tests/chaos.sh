@@ -1,6 +1,6 @@
 #!/bin/bash
 # The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/chaos.md). At length:
-# tools/chaos, and tools/chaos --long. A sanitized build has allocators and handlers of its own.
+# GLINT_LONG_TESTS=1, tools/chaos --long. A sanitized build has allocators and handlers of its own.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}
@@ -10,4 +10,6 @@ case $BUILD in *-sanitize)
     ;;
 esac
 unset OCL_ICD_VENDORS GLINT_DEVICE
-exec tools/chaos --seconds 25 --glint "${GLINT:-$BUILD/glint}"
+seconds=10
+[ "${GLINT_LONG_TESTS-}" != 1 ] || seconds=55
+exec tools/chaos --seconds $seconds --glint "${GLINT:-$BUILD/glint}"

@@ -1,6 +1,6 @@
 #!/bin/bash
 # What the documents show a command print is what it prints today: exactly where nothing is timed, else line for line with
-# other numbers, hashes and device names.
+# other numbers, hashes and device names. GLINT_LONG_TESTS=1 runs what measures, too.
 . "$(dirname "$0")/support.bash"
 
 # example DOCUMENT COMMAND: the lines below "$ COMMAND" in the document, without their indentation.
@@ -36,5 +36,6 @@ printf 'objects:\n  # a comment\n  - sphere: {center: [0, 1, 0], radius: 1, mate
 check "$tutorial: its scene renders" "$GLINT" render "$scratch/first.yaml" --size 96x54 --quiet -o "$scratch/first.png"
 exact $tutorial 'glint trace scenes/article.yaml --rays rays.txt'
 exact $tutorial 'glint check scenes/article.yaml'
-is_sanitized || alike README.md 'glint accuracy scenes/far-planet.yaml --size 320x180' '--seconds 0.01'
+# sixteen kernels of its own
+! is_long || is_sanitized || alike README.md 'glint accuracy scenes/far-planet.yaml --size 320x180' '--seconds 0.01'
 finish

@@ -14,9 +14,15 @@ from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 MISS = 0xFFFFFFFF
 SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
 GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
-SPHERES = f"{ROOT}/scenes/spheres16.yaml"
 BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
 Approx = namedtuple("Approx", "value relative absolute", defaults=(0, 0))
+
+
+def plain(name, folder):
+    """A copy of one of scenes/ with the features of BALLS, whose kernels then serve it, too."""
+    others = "plane:", "box:", "cylinder:", "directional:"
+    kept = [line for line in read(ROOT / "scenes" / name).splitlines() if not any(word in line for word in others)]
+    return write(f"{folder}/{name}", "\n".join(kept).replace("specular: 0.4", "specular: 0.4, reflection: 0.25", 1))
 
 
 def arrays_load(prefix, light_count):
@@ -156,10 +162,8 @@ class Accuracy(TestCase):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.saved = f"{folder.name}/saved"
-        kept = [line for line in read(ROOT / "scenes/far.yaml").splitlines() if not any(
-            word in line for word in ("box:", "cylinder:", "directional:"))]  # then its kernels are those of SPHERES
-        far = write(f"{folder.name}/far.yaml", "\n".join(kept))
-        cls.process = run(f"accuracy {GLASS} {SPHERES} {far} {BALLS} {SMALL} --precision single,double --json "
+        cls.spheres, far = (plain(scene, folder.name) for scene in ("spheres16.yaml", "far.yaml"))
+        cls.process = run(f"accuracy {GLASS} {cls.spheres} {far} {BALLS} {SMALL} --precision single,double --json "
                           f"--save {cls.saved}")
         cls.report = json.loads(cls.process.stdout or "null")
         cls.reference = f"{cls.saved}/0-mirror-glass-reference"
@@ -248,25 +252,25 @@ class Accuracy(TestCase):
 
     def test_samples(self):
         """Fewer samples are an error like any other."""
-        scene = self.json(f"accuracy {SPHERES} {SMALL} --precision double --samples 1,8 --json")["scenes"][0]
+        scene = self.json(f"accuracy {self.spheres} {SMALL} --precision double --samples 1,8 --json")["scenes"][0]
         self.assertEqual(scene["reference"]["samples"], 8)
         for variant in scene["variants"]:
             if variant["status"] == "measured":
                 self.assertEqual(variant["errors"]["image"]["rmse"] > 1e-3, variant["samples"] == 1)
 
     def test_table(self):
-        table = self.glint(f"accuracy {SPHERES} {SMALL} --precision double").stdout
+        table = self.glint(f"accuracy {self.spheres} {SMALL} --precision double").stdout
         self.assertRegex(table, "double .* the reference")
         self.assertRegex(table, "(?m)^  .* error of at most 1e-06: double, .* ms, the reference")
 
     def test_budgets(self):
         """Each of the list, in its order: none is kept by all that err, and the largest by the fastest."""
-        scene = self.json(f"accuracy {SPHERES} {SMALL} --precision fast,single --budget 1e-30,1e30,0.5 --json")["scenes"][0]
+        scene = self.json(f"accuracy {self.spheres} {SMALL} --precision fast,single --budget 1e-30,1e30,0.5 --json")["scenes"][0]
         self.assertEqual([pick["budget"] for pick in scene["picks"]], [1e-30, 1e30, 0.5])
         self.assertIsNone(scene["picks"][0]["variant"])
         self.assertEqual(expected_judgement(scene)["picks"], [{"variant": pick["variant"]} for pick in scene["picks"]])
         for wrong in ["", "0", "-1", "1e-3,", "nan", "1;2", ",".join(["1"] * 17)]:
-            self.refuses(f"accuracy {SPHERES} {SMALL} --budget={wrong}", "--budget")
+            self.refuses(f"accuracy {self.spheres} {SMALL} --budget={wrong}", "--budget")
 
     def test_max_error(self):
         """The budget is kept, by the reported choice; image and report name it."""
@@ -325,7 +329,7 @@ class Accuracy(TestCase):
             (f"{GLASS} --size 96x32 --reference {self.reference}.color.npy", "no multiple"),
             (f"{GLASS} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
             (f"{GLASS} --reference {ROOT}/docs/demo.png", r"demo\.png"),
-            (f"{GLASS} {SPHERES} --reference {self.reference}.color.npy", "one scene"),
+            (f"{GLASS} {self.spheres} --reference {self.reference}.color.npy", "one scene"),
             (f"{GLASS} --size 8x8 --save file/folder", "file/folder"),
         ):
             with self.subTest(arguments):

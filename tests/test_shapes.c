@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-enum { SHAPES_OF_A_FORM = 3, RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SCENE_COUNT = 3 };
+enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_BESIDE = 3 };
 
 static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
@@ -184,11 +184,21 @@ static void hold(const RandomShape *shapes, size_t count, Vector3 center, double
     }
 }
 
+static int shapes_of_a_form(void)
+{
+    return tests_are_long() ? 3 : 2;
+}
+
+static int scene_count(void)
+{
+    return tests_are_long() ? 3 : 1;
+}
+
 static void hits_each_shape(void **state)
 {
     const ShapeForm *form = *state;
     Random random = {(uint64_t)(form - forms)};
-    for (int i = 0; i < SHAPES_OF_A_FORM; i++) {
+    for (int i = 0; i < shapes_of_a_form(); i++) {
         RandomShape shape = random_shape(form, &random);
         hold(&shape, 1, shape.center, shape.radius, false, form->name, &random);
     }
@@ -198,7 +208,7 @@ static void hits_the_nearest_of_many(void **state)
 {
     (void)state;
     Random random = {form_count};
-    for (int scene = 0; scene < SCENE_COUNT; scene++) {
+    for (int scene = 0; scene < scene_count(); scene++) {
         RandomShape shapes[SHAPES_IN_SCENE];
         double radius = 0;
         for (size_t i = 0; i < SHAPES_IN_SCENE; i++) {
@@ -223,7 +233,7 @@ static void hits_from_beside_the_side(void **state)
     Random random = {form_count + 2};
     for (const ShapeForm *form = forms; form < forms + form_count; form++) {
         if (form->kind != SHAPE_CYLINDER && form->kind != SHAPE_CONE) continue;
-        for (int i = 0; i < SHAPES_OF_A_FORM; i++) {
+        for (int i = 0; i < SHAPES_BESIDE; i++) {
             RandomShape shape = random_shape(form, &random);
             if (i == 0 && form->kind == SHAPE_CONE) make_steep(&shape);
             hold(&shape, 1, shape.center, shape.radius, true, form->name, &random);
