@@ -33,11 +33,7 @@ VerifyCheck verify_camera_frames;     // R8
 
 VerifyCheck verify_far_fringe;       // S2
 VerifyCheck verify_ground_horizon;   // S4
-VerifyCheck verify_sphere_sizes;     // S7
-VerifyCheck verify_flat_sizes;       // P8
-VerifyCheck verify_revolution_sizes; // C8
-VerifyCheck verify_paraboloid_sizes; // Q4
-VerifyCheck verify_triangle_sizes;   // M7
+VerifyCheck verify_sizes;            // S7, P8, C8, Q4, M7: those of the case
 VerifyCheck verify_plane_horizon;    // P1
 VerifyCheck verify_plane_acne;       // P2
 VerifyCheck verify_thin_plate;       // P6

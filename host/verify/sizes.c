@@ -1,11 +1,13 @@
 // Shapes far larger, or smaller, than their distance from the eye: what rounding moves of them.
 #include "host/verify/checks.h"
 #include <math.h>
+#include <string.h>
 
 // The eye is about this far above the origin, where every shape has a point of its surface.
 static const Vector3 eye = {0.3, 1.75, 0.2};
 
 typedef struct {
+    const char *case_name;
     const char *text; // of the object
     // Sets its numbers for a size. All are exact in double, but not in float.
     void (*resize)(Object *object, double size);
@@ -154,59 +156,27 @@ static void check_sizes(VerifyRun *run, const SizedShape *shape)
 
 #define LIGHT_ABOVE "lights:\n  - directional: {direction: [0, -1, 0]}\nobjects:\n  - "
 
-static void check_all_sizes(VerifyRun *run, const SizedShape *shapes, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        check_sizes(run, &shapes[i]);
-}
+static const SizedShape shapes[] = {
+    {"S7", LIGHT_ABOVE "sphere: {center: [0, 0, 0], radius: 1}\n", sphere_resize, false},
+    {"P8", LIGHT_ABOVE "plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n", plane_resize, true},
+    {"P8", LIGHT_ABOVE "disc: {center: [0, 0, 0], normal: [1, 2, 3], radius: 1}\n", disc_resize, true},
+    {"P8", LIGHT_ABOVE "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}\n", rim_resize, false},
+    {"P8", LIGHT_ABOVE "box: {min: [-1, -1, -1], max: [1, 1, 1]}\n", box_resize, true},
+    {"C8", LIGHT_ABOVE "cylinder: {point: [0, 0, 0], axis: [3, 0, 4], radius: 1}\n", cylinder_resize, false},
+    {"C8", LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [3, 0, 4], radius: 1}\n", tilted_cylinder_resize,
+     false},
+    {"C8", LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", end_resize, true},
+    {"C8", LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", plate_resize, true},
+    {"C8", LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [3, 0, 4], radius: [1, 2]}\n", cone_resize, false},
+    {"C8", LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [0, -1, 0], radius: [0, 1]}\n", flat_cone_resize, true},
+    {"C8", LIGHT_ABOVE "cone: {apex: [0, 0, 0], axis: [1, 0, 0], angle: 1}\n", infinite_cone_resize, false},
+    {"Q4", LIGHT_ABOVE "paraboloid: {apex: [0, 0, 0], axis: [0, 0, 1], focal_length: 1, height: 1}\n",
+     paraboloid_resize, false},
+    {"M7", LIGHT_ABOVE "triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}\n", triangle_resize, true},
+};
 
-void verify_sphere_sizes(VerifyRun *run)
+void verify_sizes(VerifyRun *run)
 {
-    static const SizedShape shapes[] = {
-        {LIGHT_ABOVE "sphere: {center: [0, 0, 0], radius: 1}\n", sphere_resize, false},
-    };
-    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
-}
-
-void verify_flat_sizes(VerifyRun *run)
-{
-    static const SizedShape shapes[] = {
-        {LIGHT_ABOVE "plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n", plane_resize, true},
-        {LIGHT_ABOVE "disc: {center: [0, 0, 0], normal: [1, 2, 3], radius: 1}\n", disc_resize, true},
-        {LIGHT_ABOVE "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}\n", rim_resize, false},
-        {LIGHT_ABOVE "box: {min: [-1, -1, -1], max: [1, 1, 1]}\n", box_resize, true},
-    };
-    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
-}
-
-void verify_revolution_sizes(VerifyRun *run)
-{
-    static const SizedShape shapes[] = {
-        {LIGHT_ABOVE "cylinder: {point: [0, 0, 0], axis: [3, 0, 4], radius: 1}\n", cylinder_resize, false},
-        {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [3, 0, 4], radius: 1}\n", tilted_cylinder_resize,
-         false},
-        {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", end_resize, true},
-        {LIGHT_ABOVE "cylinder: {from: [0, 0, 0], to: [0, -1, 0], radius: 1}\n", plate_resize, true},
-        {LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [3, 0, 4], radius: [1, 2]}\n", cone_resize, false},
-        {LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [0, -1, 0], radius: [0, 1]}\n", flat_cone_resize, true},
-        {LIGHT_ABOVE "cone: {apex: [0, 0, 0], axis: [1, 0, 0], angle: 1}\n", infinite_cone_resize, false},
-    };
-    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
-}
-
-void verify_paraboloid_sizes(VerifyRun *run)
-{
-    static const SizedShape shapes[] = {
-        {LIGHT_ABOVE "paraboloid: {apex: [0, 0, 0], axis: [0, 0, 1], focal_length: 1, height: 1}\n",
-         paraboloid_resize, false},
-    };
-    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
-}
-
-void verify_triangle_sizes(VerifyRun *run)
-{
-    static const SizedShape shapes[] = {
-        {LIGHT_ABOVE "triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}\n", triangle_resize, true},
-    };
-    check_all_sizes(run, shapes, sizeof shapes / sizeof *shapes);
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++)
+        if (strcmp(shapes[i].case_name, run->result->name) == 0) check_sizes(run, &shapes[i]);
 }
