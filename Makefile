@@ -105,6 +105,19 @@ ladder: $(BUILD)/tools/numerics/ladder
 $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/random_ray.o) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
+# Every reader under libFuzzer, for tools/fuzz: make fuzz builds $(BUILD)-fuzz/fuzz with Debian's clang.
+CLANG ?= clang-15
+fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/import/*/*.c host/scene/*.c) \
+                $(addprefix host/,measure/baseline.c measure/series.c opencl/cache.c render/checkpoint.c render/film.c) tests/fuzz/readers.c
+fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
+
+fuzz:
+	+$(MAKE) BUILD=$(BUILD)-fuzz CC='$(CLANG)' CFLAGS='-O1 -g -Wno-error' \
+	    sanitize='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all' $(BUILD)-fuzz/fuzz
+
+$(BUILD)/fuzz: $(fuzz_objects)
+	$(CC) $(OURS) $(CFLAGS) -fsanitize=fuzzer $(LDFLAGS) $^ $(LIBS) -o $@
+
 # What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.
 features: $(BUILD)/tools/features
 
@@ -163,7 +176,7 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c \
+linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
           $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),host/mpi/main.c)
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
@@ -229,7 +242,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all mpi tests test ladder features kernel_text bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(BUILD)/host/mpi/main.d $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(BUILD)/host/mpi/main.d $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)

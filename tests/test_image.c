@@ -459,6 +459,19 @@ static void test_png_that_declares_too_much(void **state)
     assert_true(peak_kibibytes() - before < 64 * 1024);
 }
 
+// Nor is anything made of the size that a note declares, here 1.8 GB.
+static void test_png_with_a_large_note(void **state)
+{
+    (void)state;
+    long before = peak_kibibytes();
+    CHECK_REFUSED("\x89PNG\r\n\x1A\n\0\0\0\x0D"
+                  "IHDR\0\0\0\1\0\0\0\1\x08\x02\0\0\0"
+                  "\x90\x77\x53\xDE"
+                  "\x70\0\0\0tEXtabc",
+                  "PNG: the file ends too early");
+    assert_true(peak_kibibytes() - before < 64 * 1024);
+}
+
 // 2 x 2 pixels are fewer than 5, 3 x 2 are not.
 static void test_pixels_are_limited(void **state)
 {
@@ -512,6 +525,7 @@ int main(void)
         cmocka_unit_test(test_format_by_ending),
         cmocka_unit_test(test_bad_files),
         cmocka_unit_test(test_png_that_declares_too_much),
+        cmocka_unit_test(test_png_with_a_large_note),
         cmocka_unit_test(test_pixels_are_limited),
         cmocka_unit_test(test_text_pixmap),
     };

@@ -144,6 +144,9 @@ static bool png_prepare(PngReader *reader, Image *image)
     png_infop info = reader->state.info;
     png_set_read_fn(png, reader, png_read_bytes);
     png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    // notes, color profiles and the like are skipped: libpng allocates what they declare, up to 2 GB each
+    png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, NULL, -1);
+    png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, (const png_byte *)"sRGB", 1);
     png_read_info(png, info);
     if (png_get_color_type(png, info) == PNG_COLOR_TYPE_PALETTE)
         png_set_palette_to_rgb(png);

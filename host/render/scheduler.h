@@ -24,7 +24,8 @@ typedef struct {
     WorkerDropped dropped;    // likewise, never while the sink runs; NULL: not called
     void *context;            // of both
     Checkpoint *checkpoint;   // has the bands that are done, and gets all others; NULL: none
-    size_t waiting_bytes_max; // of bands that wait for one above them, about; 0: 16 MiB per worker, at least 64 MiB
+    size_t waiting_bytes_max; // of bands that wait for one above them, about; 0: 16 MiB per worker, at least
+                              // 64 MiB
 } SchedulerSettings;
 
 // What a worker did.
