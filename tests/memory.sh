@@ -11,9 +11,11 @@ objects:
   - plane: {point: [0, -1, 0], normal: [0, 1, 0]}
 E2
 
-# peak WIDTHxHEIGHT OPTIONS…: the largest memory of a render, in MiB, with its seconds, on standard output.
+# peak WIDTHxHEIGHT OPTIONS…: the largest memory of a render, of its ranks the largest one's, in MiB, with its seconds, on
+# standard output.
+program=("$GLINT")
 peak() {
-    python3 - "$GLINT" render ball.yaml --quiet --size "$@" <<'E2'
+    python3 - "${program[@]}" render ball.yaml --quiet --size "$@" <<'E2'
 import resource, subprocess, sys, time
 start = time.monotonic()
 subprocess.run(sys.argv[1:], check=True)
@@ -45,4 +47,9 @@ export POCL_DEVICES='pthread pthread'
 bounded 300 8192x2048 --device pthread,1 -o wide.png
 bounded 300 8192x2048 --device pthread,1 --checkpoint saved -o wide.png
 [ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 --device pthread,1 --checkpoint saved -o huge.png
+if [ "${GLINT_LONG_TESTS-}" = 1 ] && command -v mpirun >/dev/null && [ -x "${GLINT%/*}/glint-mpi" ]; then
+    export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+    program=(mpirun -n 4 "${GLINT%/*}/glint-mpi")
+    bounded 1024 32768x32768 -o huge.png
+fi
 finish

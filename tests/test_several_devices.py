@@ -3,15 +3,19 @@
 
 run_tests: sanitize-long-only"""
 import os
+import random
+import re
 import shutil
+import subprocess
 import unittest
 from pathlib import Path
 
-from glint import IS_SANITIZED, SPHERE, TestCase, find_icd, has_device, main, png_read, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, has_device, main, png_read, run, skip_all, write
 
 POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
 TWO = {"env": POCL["env"] | {"POCL_DEVICES": "pthread pthread"}}
 OCLGRIND = Path("/usr/lib/oclgrind/liboclgrind-rt-icd.so")
+FAILURES = 200 if IS_LONG else 5
 SIZE, LARGE = "--size 64x48 --quiet", "--size 64x768 --quiet"
 AOVS = "position", "object", "path"
 
@@ -51,6 +55,31 @@ class SeveralDevices(TestCase):
             self.assertAlmostEqual(sum(device["share"] for device in report["by_device"]), 1)
             for device in report["by_device"]:
                 self.assertEqual(device["bands"], sum(launch["name"] == "aov" for launch in device["launches"]))
+
+    @unittest.skipIf(IS_SANITIZED, "sanitizers have handlers of their own")
+    def test_failing_calls(self):
+        """Any OpenCL call fails, of whichever device: the right image, or an error and none."""
+        subprocess.run(["cc", "-w", "-shared", "-fPIC", "-o", "chaos.so", str(ROOT / "tools/chaos.c"), "-ldl"], check=True)
+        command = f"render sphere.yaml {LARGE} --samples 20 --precision strict"
+        self.glint(f"{command} -o one.npy", **POCL)
+        chaos = {"LD_PRELOAD": os.path.abspath("chaos.so"), "GLINT_CHAOS_LOG": os.path.abspath("calls")}
+        self.glint(f"{command} --device all -o all.npy", env=TWO["env"] | chaos)
+        count = int(re.search(r"^cl (\d+)", Path("calls").read_text(encoding="utf-8"), re.MULTILINE)[1])
+        draw, images = random.Random(20), 0
+        for _ in range(FAILURES):
+            Path("all.npy").unlink(missing_ok=True)
+            call = draw.randrange(count)
+            process = run(f"{command} --device all -o all.npy", env=TWO["env"] | chaos | {"GLINT_CHAOS": f"cl {call}"}, timeout=120)
+            with self.subTest(call=call, errors=process.stderr):
+                self.assertIn(process.returncode, (0, 1, 2))
+                if process.returncode == 0:
+                    self.assertSameBytes("one.npy", "all.npy")
+                    images += 1
+                else:
+                    self.assertIn("glint: ", process.stderr)
+                    self.assertFalse(os.path.exists("all.npy"))
+        self.assertIn("failed ", Path("calls").read_text(encoding="utf-8"))
+        print(f"{FAILURES} failures of {count} calls, {images} images complete")
 
     def test_names(self):
         """The files' notes name both; those of one make round alike."""
