@@ -290,7 +290,7 @@ static void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, co
                         unsigned aovs, BandRows rows)
 {
     Renderer *repeat = renderer->repeat;
-    const cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
+    cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
     const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
     const size_t size = film_pixel_count(&band) * sizeof(uint32_t);
     uint32_t *values = renderer_map(renderer, doubts, size);
