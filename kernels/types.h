@@ -76,8 +76,13 @@ typedef Revolution Cone;
 
 typedef struct {
     scalar4 center_major; // w: radius of the circle
-    scalar4 axis_minor;   // unit; w: radius of the tube
-    uint4 id;
+    scalar4 axis_minor;   // unit; w: radius of the tube, r
+    // With HAS_POWER, seen from the eye: a / r and A / r, where a leads to the eye from the circle's nearest
+    // point and A is its part along `radial`, the unit direction away from the axis; the eye's distance from
+    // that. The power is (|a|^2 - r^2) / (2 r) (kernels/shapes/torus.h).
+    scalar4 gradient; // w: A / r
+    scalar4 radial;   // w: the eye's distance from the axis
+    uint4 id;         // y: HAS_POWER
 } Torus;
 
 typedef struct {

@@ -21,7 +21,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
         !textures_load(compiled, scene, settings, messages))
         return false;
     const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {eye_of(scene, settings), is_double};
+    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye};
     compiled->eye = rounding.eye;
     objects_flatten(compiled, scene, &rounding);
     materials_flatten(compiled, scene, &rounding);
@@ -57,7 +57,7 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
                      MessageList *messages)
 {
     const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {eye_of(scene, settings), is_double};
+    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye};
     compiled->eye = (Vector3){NAN, NAN, NAN}; // equal to no eye, so that the next move sets all
     objects_move(compiled, scene, &rounding);
     compiled->features |= settings->extra_features;

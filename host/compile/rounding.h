@@ -8,6 +8,7 @@
 typedef struct {
     Vector3 eye;
     bool is_double; // the kernel's precision is double: numbers stay
+    bool has_eye;   // rays start there, or where they lead; else anywhere
 } Rounding;
 
 // GCC 12 at -O2 drops a conversion to float and back where it merges stores (-ftree-slp-vectorize); volatile

@@ -33,7 +33,7 @@ VerifyCheck verify_camera_frames;     // R8
 
 VerifyCheck verify_far_fringe;       // S2
 VerifyCheck verify_ground_horizon;   // S4
-VerifyCheck verify_sizes;            // S7, P8, C8, Q4, M7: those of the case
+VerifyCheck verify_sizes;            // S7, P8, C8, T7, Q4, M7: those of the case
 VerifyCheck verify_plane_horizon;    // P1
 VerifyCheck verify_plane_acne;       // P2
 VerifyCheck verify_thin_plate;       // P6

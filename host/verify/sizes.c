@@ -104,6 +104,14 @@ static void paraboloid_resize(Object *object, double size)
     object->as.paraboloid.height = 4 * size;
 }
 
+// The eye is above the outside of the tube.
+static void torus_resize(Object *object, double size)
+{
+    object->as.torus.center = (Vector3){0.1, -3 * size, 0.1};
+    object->as.torus.major = 2 * size;
+    object->as.torus.minor = size;
+}
+
 static void triangle_resize(Object *object, double size)
 {
     object->as.triangle.vertices[0] = (Vector3){2 * size, -size, 0};
@@ -170,6 +178,8 @@ static const SizedShape shapes[] = {
     {"C8", LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [3, 0, 4], radius: [1, 2]}\n", cone_resize, false},
     {"C8", LIGHT_ABOVE "cone: {from: [0, 0, 0], to: [0, -1, 0], radius: [0, 1]}\n", flat_cone_resize, true},
     {"C8", LIGHT_ABOVE "cone: {apex: [0, 0, 0], axis: [1, 0, 0], angle: 1}\n", infinite_cone_resize, false},
+    {"T7", LIGHT_ABOVE "torus: {center: [0, 0, 0], axis: [3, 0, 4], major: 2, minor: 1}\n", torus_resize,
+     false},
     {"Q4", LIGHT_ABOVE "paraboloid: {apex: [0, 0, 0], axis: [0, 0, 1], focal_length: 1, height: 1}\n",
      paraboloid_resize, false},
     {"M7", LIGHT_ABOVE "triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}\n", triangle_resize, true},

@@ -47,6 +47,7 @@ static const struct {
     {"T4", "a torus' circle of tangents", {verify_tangent_circle}},
     {"T5", "thin ring", {verify_thin_ring}},
     {"T6", "torus that failed in production", {0}},
+    {"T7", "tori up to 2^60 times as large as their distance", {verify_sizes}},
     {"Q1", "paraboloid, from 100 to a million sizes away", {0}},
     {"Q2", "along a paraboloid's axis", {0}},
     {"Q3", "inside a capped paraboloid", {0}},

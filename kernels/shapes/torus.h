@@ -9,9 +9,15 @@
 //     sqrt((rho - R)^2 + z^2) - r,
 // which is exact to a few u where the quartic cancels, is solved for its one zero. All by + - * / sqrt and
 // bracketing, so that axis-parallel and equatorial rays need no case of their own.
+//
+// With the eye's power the zeros are those of F / (2 r), F = (rho - R)^2 + z^2 - r^2, from the eye on: for a
+// point x from there, with the parts x_u along `radial`, x_v across it and x_w along the axis,
+//     F = F(0) + 2 a . x + 2 A delta + (x_u + delta)^2 + x_w^2,   delta = rho - rho(0) - x_u,
+// where delta = x_v^2 / (rho + rho(0) + x_u). Nothing is large next to the eye but what cancels exactly.
 #ifndef TORUS_H
 #define TORUS_H
 
+#include "shapes/eye_power.h"
 #include "shapes/surface_point.h"
 
 // The line s -> closest + s direction, |direction| = 1, in the torus' frame.
@@ -131,6 +137,129 @@ static inline void torus_breaks(const TorusLine *line, real squared_distance, re
     breaks[4] = span;
 }
 
+// The tube seen from the eye.
+typedef struct {
+    Vector axis, radial, across, gradient;
+    real radial_gradient, axial_gradient, eye_rho, half_inverse_minor, power;
+} TorusTube;
+
+static inline TorusTube torus_tube(const Torus *torus)
+{
+    TorusTube tube;
+    tube.axis = vector_of(torus->axis_minor);
+    tube.radial = vector_of(torus->radial);
+    tube.across = vector_cross(tube.axis, tube.radial);
+    tube.gradient = vector_of(torus->gradient);
+    tube.radial_gradient = (real)(torus->gradient.w);
+    tube.axial_gradient = vector_dot(tube.gradient, tube.axis);
+    tube.eye_rho = (real)(torus->radial.w);
+    tube.half_inverse_minor = real_divide((real)(0.5f), (real)(torus->axis_minor.w));
+    tube.power = eye_power_of(torus->id);
+    return tube;
+}
+
+// F / (2 r) at a point and its gradient, by which it is also the normal.
+static inline real torus_tube_value(const TorusTube *tube, Vector x, Vector *normal)
+{
+    real off = vector_dot(x, tube->across), z = vector_dot(x, tube->axis),
+         along = vector_dot(x, tube->radial);
+    real y = tube->eye_rho + along;
+    real rho = real_sqrt(real_fma(y, y, off * off)), inverse_rho = real_inverse_or_zero(rho);
+    mask beyond = y <= (real)(0); // of the axis
+    real sum = lanes_select(beyond, (real)(1), rho + y);
+    real delta = lanes_select(beyond, rho - y, off * real_divide(off, sum));
+    real change = along + delta;
+    real half_inverse = tube->half_inverse_minor, inverse = half_inverse + half_inverse;
+    Vector outward = vector_fma(tube->radial, y * inverse_rho, vector_scale(tube->across, off * inverse_rho));
+    *normal = vector_fma(outward, real_fma(change, inverse, tube->radial_gradient),
+                         vector_scale(tube->axis, real_fma(z, inverse, tube->axial_gradient)));
+    real bend = real_fma(half_inverse * change, change, half_inverse * z * z);
+    real rest = real_fma(tube->radial_gradient, delta, bend);
+    return power_sum((Pair){tube->power, rest}, x, pair_vector_of(tube->gradient));
+}
+
+static inline real torus_tube_value_at(const TorusTube *tube, const Ray *ray, real t, real *slope)
+{
+    Vector normal;
+    real value = torus_tube_value(tube, ray_point(ray, t), &normal);
+    *slope = vector_dot(normal, ray->direction);
+    return value;
+}
+
+// As torus_zero, along the ray. The first guess is its start, where that is in the bracket: next to it the
+// bracket's middle is far away.
+static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real low, real high, mask entering)
+{
+    real t = lanes_select(low <= ray->tmin, real_max(low, ray->tmin), (real)(0.5f) * (low + high));
+    for (uint i = 0; i < TORUS_ZERO_STEPS + TORUS_ZERO_STEPS; i++) {
+        real slope;
+        real value = torus_tube_value_at(tube, ray, t, &slope);
+        mask before = (value > (real)(0)) == entering;
+        low = lanes_select(before, t, low);
+        high = lanes_select(before, high, t);
+        // a step below the rounding may leave the bracket, whose middle is far away
+        mask settled = fabs(value) <= (real)(2 * UNIT_ROUNDOFF) * fabs(slope * t);
+        real next = lanes_select(settled, t, bracket_next(low, high, t, value, slope));
+        if (lanes_all(next == t)) break;
+        t = next;
+    }
+    return t;
+}
+
+// Where the slope is 0 in a bracket where its signs differ, by false position and halving in turn.
+static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ray, real low, real high,
+                                            real slope_low, real slope_high)
+{
+    mask rising = slope_low < (real)(0);
+    for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
+        real rise = slope_high - slope_low, slope;
+        real part = real_divide(-slope_low, lanes_select(rise == (real)(0), (real)(1), rise));
+        real t = real_fma(high - low, i % 2 ? (real)(0.5f) : part, low);
+        if (lanes_all((t == low) | (t == high))) break;
+        torus_tube_value_at(tube, ray, t, &slope);
+        mask before = (slope < (real)(0)) == rising;
+        low = lanes_select(before, t, low);
+        slope_low = lanes_select(before, slope, slope_low);
+        high = lanes_select(before, high, t);
+        slope_high = lanes_select(before, slope_high, slope);
+    }
+    return low;
+}
+
+// The first zero beyond the ray's start; the breaks are in s, in parts of `unit`.
+static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
+                                  const real breaks[TORUS_BREAKS], real unit, real closest_t, real *t)
+{
+    const TorusTube tube = torus_tube(torus);
+    mask found = mask_none();
+    real slope_low, slope_high, slope;
+    real low = real_max(real_fma(breaks[0], unit, closest_t), ray->tmin);
+    real before = torus_tube_value_at(&tube, ray, low, &slope_low);
+    for (uint i = 0; i + 1 < TORUS_BREAKS; i++) {
+        real high = real_max(real_fma(breaks[i + 1], unit, closest_t), ray->tmin);
+        real after = torus_tube_value_at(&tube, ray, high, &slope_high);
+        mask entering = before > (real)(0), turns = (slope_low < (real)(0)) != (slope_high < (real)(0));
+        // a break is off by some roundings of the torus' size: two zeros next to it may be on one side
+        mask hides =
+            hit & !found & turns & (entering == (after > (real)(0))) & (entering == (slope_low < (real)(0)));
+        real end = high, value_at_end = after;
+        if (lanes_any(hides)) {
+            real turn = torus_tube_turning_point(&tube, ray, low, high, slope_low, slope_high);
+            end = lanes_select(hides, turn, high);
+            value_at_end = torus_tube_value_at(&tube, ray, end, &slope);
+        }
+        mask first = hit & !found & (entering != (value_at_end > (real)(0)));
+        if (lanes_any(first)) {
+            *t = lanes_select(first, torus_tube_zero(&tube, ray, low, end, entering), *t);
+            found = found | first;
+        }
+        low = high;
+        before = after;
+        slope_low = slope_high;
+    }
+    return found;
+}
+
 static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
 {
     real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
@@ -146,6 +275,15 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     Vector axis = vector_of(torus->axis_minor);
     real inverse_length = real_sqrt(ray->inverse_squared);
     Vector direction = vector_scale(ray->direction, inverse_length);
+    real unit = (real)(1); // a power of two below which nothing overflows
+    if (has_eye_power(torus->id)) {
+        unit = real_inverse_power_of_two(bounding_radius);
+        closest = vector_scale(closest, unit);
+        squared_distance *= unit * unit;
+        half_chord_squared *= unit * unit;
+        major *= unit;
+        minor *= unit;
+    }
     TorusLine line = {vector_cross(closest, axis),
                       vector_cross(direction, axis),
                       vector_dot(closest, axis),
@@ -154,6 +292,9 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
                       minor};
     real breaks[TORUS_BREAKS];
     torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
+
+    if (has_eye_power(torus->id))
+        return torus_tube_hit(torus, ray, hit, breaks, real_divide(inverse_length, unit), closest_t, t);
 
     real start = (ray->tmin - closest_t) * real_sqrt(ray->squared); // of the ray, as s
     real slope, found_s = (real)(LARGEST);
@@ -185,7 +326,15 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
     Vector from_circle = vector_fma(radial, -major, p); // from the nearest point of the circle
     Vector normal = vector_normalize(from_circle);
     Vector position = vector_fma(normal, minor, vector_fma(radial, major, center));
-    return surface_point_make(position, normal, major + minor + vector_norm1(center));
+    const real size = major + minor + vector_norm1(center);
+    if (has_eye_power(torus->id)) {
+        const TorusTube tube = torus_tube(torus);
+        torus_tube_value(&tube, ray_point(ray, t), &normal);
+        normal = vector_normalize(normal);
+    }
+    SurfacePoint point = surface_point_make(position, normal, size);
+    if (!IS_FAST && has_eye_power(torus->id)) surface_point_move_to_ray(&point, ray, t, size);
+    return point;
 }
 
 #endif

@@ -9,13 +9,60 @@ static bool torus_bounds(const Scene *scene, const Object *object, Bounds *bound
     return true;
 }
 
+// A torus relative to the eye: the eye's distance from the axis and the unit direction away from it, and
+// from the circle's nearest point to the eye the parts along that and along the axis.
+typedef struct {
+    Quad3 radial;
+    Quad rho, outward, height;
+} TorusFromEye;
+
+static TorusFromEye torus_from_eye(Quad3 center, Quad3 unit_axis, Quad major)
+{
+    TorusFromEye relative = {.height = -quad3_dot(center, unit_axis)};
+    const Quad3 across = quad3_scale(quad3_add(center, quad3_scale(unit_axis, relative.height)), -1);
+    relative.rho = quad3_length(across);
+    relative.radial =
+        relative.rho > 0 ? quad3_scale(across, 1 / relative.rho) : quad3_perpendicular(unit_axis);
+    relative.outward = relative.rho - major;
+    return relative;
+}
+
+static Quad torus_gap(const TorusFromEye *relative, Quad minor)
+{
+    const Quad squared = relative->outward * relative->outward + relative->height * relative->height;
+    return (squared - minor * minor) / (quad_root(squared) + minor);
+}
+
+// Next to the eye, compared with the torus, the eye's power defines it: the ray's closest approach to the
+// center, from where the other form starts, is off by some roundings of its size, whether or not these move
+// the torus itself.
+static void torus_take_power(Torus *torus, Flattening *flattening, const Object *object)
+{
+    const Rounding *rounding = &flattening->rounding;
+    const Quad minor = object->as.torus.minor;
+    const TorusFromEye exact =
+        torus_from_eye(exact_from_eye(rounding, object->as.torus.center),
+                       quad3_unit(quad3(object->as.torus.axis)), object->as.torus.major);
+    const Quad gap = torus_gap(&exact, minor), size = object->as.torus.major + object->as.torus.minor;
+    if (!rounding->has_eye || !(quad_absolute(gap) < size)) return;
+    const Quad squared = exact.outward * exact.outward + exact.height * exact.height;
+    if (!primitive_take_power(flattening, (double)((squared - minor * minor) / (2 * minor)), &torus->id))
+        return;
+    const Quad3 from_circle = quad3_add(quad3_scale(exact.radial, exact.outward),
+                                        quad3_scale(quad3_unit(quad3(object->as.torus.axis)), exact.height));
+    torus->gradient = scalar4_of(vector_rounded(rounding, quad3_rounded(quad3_scale(from_circle, 1 / minor))),
+                                 (double)(exact.outward / minor));
+    torus->radial = scalar4_of(vector_rounded(rounding, quad3_rounded(exact.radial)), (double)exact.rho);
+}
+
 static void torus_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 center = point_from_eye(&flattening->rounding, object->as.torus.center);
-    const Torus torus = {
+    Torus torus = {
         .center_major = scalar4_of(center, object->as.torus.major),
         .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
     };
+    torus_take_power(&torus, flattening, object);
     primitive_add(flattening, KIND_TORI, &torus, object->material);
 }
 
