@@ -173,16 +173,20 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     real ax = vector_dot(edges.a, u), ay = vector_dot(edges.a, v);
     real bx = vector_dot(edges.b, u), by = vector_dot(edges.b, v);
     real cx = vector_dot(edges.c, u), cy = vector_dot(edges.c, v);
-    real sum = fabs(ax) + fabs(ay) + fabs(bx) + fabs(by) + fabs(cx) + fabs(cy);
-    real edge_error = error * (sum + error + error);
-    real least = real_min(real_min(edges.u, edges.v), edges.w);
-    real largest = real_max(real_max(edges.u, edges.v), edges.w);
-    mask misses = ((least < -edge_error) & (largest > edge_error)) |
-                  (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
-                  (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
+    real a_sum = fabs(ax) + fabs(ay) + error, b_sum = fabs(bx) + fabs(by) + error,
+         c_sum = fabs(cx) + fabs(cy) + error;
+    real u_error = error * (b_sum + c_sum), v_error = error * (c_sum + a_sum),
+         w_error = error * (a_sum + b_sum), edge_error = u_error + v_error + w_error;
+    mask all_above = (edges.u > u_error) & (edges.v > v_error) & (edges.w > w_error);
+    mask all_below = (edges.u < -u_error) & (edges.v < -v_error) & (edges.w < -w_error);
+    mask any_above = (edges.u > u_error) | (edges.v > v_error) | (edges.w > w_error);
+    mask any_below = (edges.u < -u_error) | (edges.v < -v_error) | (edges.w < -w_error);
+    mask misses = (any_above & any_below) | (real_min(real_min(ax, bx), cx) > error) |
+                  (real_max(real_max(ax, bx), cx) < -error) | (real_min(real_min(ay, by), cy) > error) |
+                  (real_max(real_max(ay, by), cy) < -error);
     mask perhaps = lanes & !misses;
     if (!lanes_any(perhaps)) return certain_miss();
-    mask certain = perhaps & ((least > edge_error) | (largest < -edge_error));
+    mask certain = perhaps & (all_above | all_below);
 
     real inverse_length = ray->inverse_length;
     real a_t = vector_dot(edges.a, ray->along), b_t = vector_dot(edges.b, ray->along),
@@ -192,7 +196,7 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     real divisor = lanes_select(certain, edges.determinant, (real)(1));
     real inverse = real_divide((real)(1), divisor);
     real t = real_fma(a_t, edges.u * inverse, real_fma(b_t, edges.v * inverse, c_t * (edges.w * inverse)));
-    real part = (real)(8) * edge_error * fabs(inverse); // of all weights, if it is small
+    real part = (real)(4) * edge_error * fabs(inverse); // of all weights, if it is small
     real t_error = (high - low) * part + (real)(32 * UNIT_ROUNDOFF) * (fabs(low) + fabs(high)) + vertex_error;
     mask narrows = certain & (part < (real)(0.5f));
     low = low - vertex_error;
