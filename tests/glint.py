@@ -33,7 +33,7 @@ lights:
 objects:
   - sphere: {center: [0, 0, 0], radius: 1}
 """
-# At single the ground is off by centimeters, so that a small sphere sinks in and its shadow is wrong.
+# At fast shadow rays start meters off the ground, so that a small sphere has no shadow.
 PLANET = """\
 camera: {position: [0, 6371001.7, 0], look_at: [0, 6371000, 1], fov: 60}
 lights: [{point: {position: [2, 6371001, -1]}}]

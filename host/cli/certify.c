@@ -32,9 +32,9 @@ static const char help_text[] =
     "objects, shadows, paths, colors.\n\n"
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        of the sample, about (default: 2000)\n"
-    "      --precision LIST  of fast, single, strict, double (default: all that the device has)\n" //
-    HELP_BOUNCES HELP_DEVICE HELP_LANES                                                            //
-    "      --bvh B           auto, on or off; does not change the image (default: auto)\n"         //
+    "      --precision LIST  of fast, single, strict, double, certified (default: all)\n"  //
+    HELP_BOUNCES HELP_DEVICE HELP_LANES                                                    //
+    "      --bvh B           auto, on or off; does not change the image (default: auto)\n" //
     HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
