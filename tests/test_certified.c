@@ -127,7 +127,7 @@ static void decisions_are_those_of_exact_arithmetic(void **state)
 {
     (void)state;
     if (!probe_compute.device->fp64) skip();
-    const size_t scene_count = tests_are_long() ? 200 : 8;
+    const size_t scene_count = tests_are_long() ? 200 : 3;
     size_t single_wrong = 0, compared = 0;
     for (size_t i = 0; i < scene_count; i++) {
         random_state.state = i + 1;
