@@ -11,7 +11,6 @@ typedef struct {
 } Band;
 
 // Kernels that repeat what `certified` left in doubt render lists of pixels.
-#define IS_PIXEL_LIST (IS_CERTIFIED && IS_DOUBLE)
 
 typedef struct {
     Pixels pixels;

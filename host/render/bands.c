@@ -95,11 +95,12 @@ static void buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs
     }
     buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
-    const bool has_doubts = renderer->repeat || renderer->settings.repeats_pixels;
-    const size_t doubts_size = has_doubts ? film_pixel_count(&film) * sizeof(uint32_t) : 0;
+    const bool is_list = renderer->settings.repeats != REPEATS_NONE;
+    const size_t pixels_size = renderer->repeat || is_list ? film_pixel_count(&film) * sizeof(uint32_t) : 0;
+    const size_t doubts_size = renderer->repeat ? pixels_size : 0;
     buffers->doubts = film_buffer(renderer, doubts_size);
     buffers->center_doubts = film_buffer(renderer, doubts_size);
-    buffers->pixels = film_buffer(renderer, renderer->settings.repeats_pixels ? 2 * doubts_size : 0);
+    buffers->pixels = film_buffer(renderer, is_list ? 2 * pixels_size : 0);
 }
 
 static void buffers_close(BandBuffers *buffers)
@@ -268,15 +269,8 @@ static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem 
     free(values);
 }
 
-static void repeats_note(Renderer *renderer, const PixelList *list, uint32_t samples, cl_mem doubts)
+static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
 {
-    RenderReport *report = &renderer->report, *of_repeat = &renderer->repeat->report;
-    uint32_t *undecided = memory_allocate(list->count, sizeof *undecided);
-    buffer_read(renderer->compute, doubts, list->count * sizeof *undecided, undecided);
-    report->repeats.repeated += (uint64_t)list->count * samples;
-    for (uint32_t i = 0; compute_ok(renderer->compute) && i < list->count; i++)
-        report->repeats.undecided += undecided[i];
-    free(undecided);
     for (size_t i = 0; i < of_repeat->launches.count; i++)
         array_push(report->launches, ((NamedLaunch){"repeat", of_repeat->launches.items[i].time}));
     report->build_seconds += of_repeat->build_seconds;
@@ -285,40 +279,81 @@ static void repeats_note(Renderer *renderer, const PixelList *list, uint32_t sam
     of_repeat->launches.count = 0;
 }
 
-// Renders again in double what a kernel has left in doubt, and puts it into the band's layers.
+// A band of which pixels are repeated: the kernel, the layers that it fills, and their buffers.
+typedef struct {
+    KernelKind kind;
+    unsigned layers, aovs;
+    const BandBuffers *buffers;
+    Film film;
+} RepeatedBand;
+
+// Renders a list of the band's pixels by `repeat`, and puts them into the band's layers. `undecided`: of each
+// pixel, how many of its samples `repeat` leaves in doubt; NULL: not asked for.
+static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
+                        uint32_t *undecided)
+{
+    const Film film = {.width = list->count,
+                       .height = 1,
+                       .light_count = band->film.light_count,
+                       .real_size = renderer_scalar_size(repeat)};
+    const Place place = list_place(repeat, list->count);
+    BandBuffers repeated = {0};
+    buffers_open(&repeated, repeat, band->aovs, film);
+    buffer_write(repeat->compute, repeated.pixels, list->count * 2 * sizeof *list->pixels, list->pixels);
+    if (band->kind == KERNEL_RENDER)
+        band_render(repeat, &repeated, &place, 0, renderer->settings.sample_count);
+    else
+        band_fill(repeat, band->kind, band->layers, &repeated, band->aovs, &place);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
+            film_layer_size(&band->film, layer) > 0)
+            layer_merge(renderer, layer, repeated.layers[layer], band->buffers->layers[layer], list,
+                        &band->film);
+    if (undecided)
+        buffer_read(renderer->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
+                    list->count * sizeof *undecided, undecided);
+    repeat_launches_take(&renderer->report, &repeat->report);
+    buffers_close(&repeated);
+}
+
+// Leaves those of the list's pixels that are undecided; returns the number of their undecided samples.
+static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
+{
+    uint64_t samples = 0;
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < list->count; i++) {
+        if (undecided[i] == 0) continue;
+        samples += undecided[i];
+        list->pixels[2 * kept] = list->pixels[2 * i];
+        list->pixels[2 * kept + 1] = list->pixels[2 * i + 1];
+        list->index[kept++] = list->index[i];
+    }
+    list->count = kept;
+    return samples;
+}
+
+// Renders again in double what a kernel has left in doubt, and as at `double` what that leaves undecided.
 static void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
                         unsigned aovs, BandRows rows)
 {
-    Renderer *repeat = renderer->repeat;
     cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
-    const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
-    const size_t size = film_pixel_count(&band) * sizeof(uint32_t);
-    uint32_t *values = renderer_map(renderer, doubts, size);
+    const RepeatedBand band = {kind, layers, aovs, buffers,
+                               film_of_rows(renderer, rows.first_row, rows.row_count)};
+    uint32_t *values = renderer_map(renderer, doubts, film_pixel_count(&band.film) * sizeof *values);
     if (!values) return;
     PixelList list = doubts_list(renderer, rows, values);
     renderer_unmap(renderer, doubts, values);
-    const Film film = {.width = list.count,
-                       .height = 1,
-                       .light_count = band.light_count,
-                       .real_size = renderer_scalar_size(repeat)};
-    BandBuffers repeated = {0};
     if (list.count > 0) {
-        const Place place = list_place(repeat, list.count);
-        const uint32_t samples = kind == KERNEL_RENDER ? renderer->settings.sample_count : 1;
-        buffers_open(&repeated, repeat, aovs, film);
-        buffer_write(repeat->compute, repeated.pixels, list.count * 2 * sizeof *list.pixels, list.pixels);
-        if (kind == KERNEL_RENDER)
-            band_render(repeat, &repeated, &place, 0, samples);
-        else
-            band_fill(repeat, kind, layers, &repeated, aovs, &place);
-        for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-            if (layer_in(layers, layer) && layer_in(aovs | AOV_COLOR, layer) &&
-                film_layer_size(&band, layer) > 0)
-                layer_merge(renderer, layer, repeated.layers[layer], buffers->layers[layer], &list, &band);
-        repeats_note(renderer, &list, samples,
-                     kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts);
+        RepeatCounts *counts = &renderer->report.repeats;
+        uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
+        counts->repeated +=
+            (uint64_t)list.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
+        list_repeat(renderer, renderer->repeat, &band, &list, undecided);
+        if (compute_ok(renderer->compute)) counts->undecided += list_keep_undecided(&list, undecided);
+        if (compute_ok(renderer->compute) && list.count > 0)
+            list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
+        free(undecided);
     }
-    buffers_close(&repeated);
     free(list.pixels);
     free(list.index);
 }

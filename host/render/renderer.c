@@ -136,6 +136,11 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
         kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
 }
 
+static bool settings_certify(const RenderSettings *settings)
+{
+    return settings->precision == PRECISION_CERTIFIED || settings->repeats == REPEATS_IN_DOUBT;
+}
+
 static CompileSettings compile_settings(const RenderSettings *settings, uint32_t lanes)
 {
     return (CompileSettings){
@@ -144,7 +149,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
         .precision = settings->precision,
-        .certifies = settings->precision == PRECISION_CERTIFIED || settings->repeats_pixels,
+        .certifies = settings_certify(settings),
         .lanes = lanes,
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
@@ -258,8 +263,8 @@ static void variant_set(Renderer *renderer)
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
-    text_appendf(text, "#define IS_CERTIFIED %d\n",
-                 precision == PRECISION_CERTIFIED || renderer->settings.repeats_pixels);
+    text_appendf(text, "#define IS_CERTIFIED %d\n", settings_certify(&renderer->settings));
+    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->settings.repeats != REPEATS_NONE);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
     text_appendf(text, "#define HAS_FMA %d\n", has_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
@@ -311,12 +316,12 @@ static Renderer *renderer_finish(Renderer *renderer, bool is_ready)
     return renderer;
 }
 
-// Those of the renderer that repeats pixels in doubt.
+// Those of the renderer that repeats pixels for one of `settings`.
 static RenderSettings repeat_settings(const RenderSettings *settings)
 {
     RenderSettings repeat = *settings;
     repeat.precision = PRECISION_DOUBLE;
-    repeat.repeats_pixels = true;
+    repeat.repeats = settings->repeats == REPEATS_NONE ? REPEATS_IN_DOUBT : REPEATS_UNDECIDED;
     repeat.counting = repeat.hashes_scene = false;
     return repeat;
 }
@@ -335,8 +340,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = renderer_make(compute);
     bool is_ready = scene_assign(renderer, scene, settings, messages);
-    if (is_ready && settings->precision == PRECISION_CERTIFIED)
-        is_ready = repeat_open(renderer, scene, messages);
+    if (is_ready && settings_certify(settings)) is_ready = repeat_open(renderer, scene, messages);
     return renderer_finish(renderer, is_ready);
 }
 

@@ -12,6 +12,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+// Of which pixels a renderer at `double` renders lists, for a renderer at `certified`: none; those in doubt,
+// with bounds of its own; those that these leave undecided, which so look as they do at `double`.
+typedef enum { REPEATS_NONE, REPEATS_IN_DOUBT, REPEATS_UNDECIDED } PixelRepeats;
+
 typedef struct {
     uint32_t width, height;                                   // of the whole image
     uint32_t region_x, region_y, region_width, region_height; // the part to render
@@ -30,12 +34,11 @@ typedef struct {
     bool shift_to_eye;         // the eye is the origin, for images; false for explicit rays
     bool moves;                // the flat arrays stay in the host's memory, so that renderer_move is fast
     bool no_cache;
-    double band_seconds; // target duration of a launch; 0: 0.1
-    bool (*stop)(void);  // called between launches; true ends the render; NULL: never
-    bool hashes_scene;   // for the report
-    uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
-    // Within this room, at `double`: renders lists of pixels that `certified` has left in doubt.
-    bool repeats_pixels;
+    double band_seconds;  // target duration of a launch; 0: 0.1
+    bool (*stop)(void);   // called between launches; true ends the render; NULL: never
+    bool hashes_scene;    // for the report
+    uint32_t band_rows;   // fixed rows per band, for tests; 0: by time
+    PixelRepeats repeats; // within this room, at `double`
 } RenderSettings;
 
 // 8192 ulp, the largest error (kernels/numerics/perturb.h), times this is below 2^23 ulp: an injected error

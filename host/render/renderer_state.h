@@ -30,7 +30,9 @@ struct Renderer {
     size_t light_count;
     // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
     KernelVariant variant, other_variant;
-    Renderer *repeat; // at `certified`: of the same scene at `double`, for the pixels in doubt; else NULL
+    // Of the same scene at `double`: at `certified` for the pixels in doubt, and for those for the undecided;
+    // else NULL.
+    Renderer *repeat;
 };
 
 size_t renderer_scalar_size(const Renderer *renderer);

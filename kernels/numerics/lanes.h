@@ -6,7 +6,8 @@
 // The host defines these macros before the text (variant_set in host/render/renderer.c):
 //     LANES            1, 4, 8 or 16
 //     IS_FAST, IS_STRICT, IS_DOUBLE    the precision, one of them 1; all 0 at `single`
-//     IS_CERTIFIED     1: every decision has a bound on its error: certainty.h
+//     IS_CERTIFIED     1: every decision has a bound on its error: shapes/certain.h
+//     IS_PIXEL_LIST    1: renders a list of pixels instead of a band: film.h
 //     REPAIRS_DIVIDE   1 at `strict` where the device's division and square root are inexact: numerics.h
 //     HAS_FMA          0 where the device emulates fma: pair.h
 //     PENDING_MAX      of pending refracted rays: shading/path.h
