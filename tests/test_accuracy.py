@@ -277,7 +277,8 @@ class Accuracy(TestCase):
         for budget, only in ("0.5", None), ("0.2:flip", None), ("1e-3:max", None), ("1e-9", "double"), ("1e-5:flip", "double"):
             limit, _, metric = budget.partition(":")
             with self.subTest(budget):
-                report = self.json(f"render {SPHERES} --size 96x64 --bounces 16 --aov color --max-error {budget} --timing=json --quiet -o chosen.png")
+                report = self.json(f"render {self.spheres} --size 96x64 --bounces 16 --aov color --max-error {budget} "
+                                   "--timing=json --quiet -o chosen.png")
                 pilot, chosen = report["pilot"], report["precision"]
                 candidates = {candidate["precision"]: candidate for candidate in pilot["candidates"]}
                 self.assertTrue(candidates[chosen]["keeps"])
@@ -294,9 +295,9 @@ class Accuracy(TestCase):
 
     def test_max_error_refused(self):
         for wrong in "", "0", "-1", "nan", "inf", "0.1x", "0.1:", "0.1:psnr":
-            self.refuses(f"render {SPHERES} --max-error={wrong}", "--max-error")
+            self.refuses(f"render {self.spheres} --max-error={wrong}", "--max-error")
         for other in "precision", "checkpoint":
-            self.refuses(f"render {SPHERES} --max-error 0.1 --{other} strict", other)
+            self.refuses(f"render {self.spheres} --max-error 0.1 --{other} strict", other)
 
     def test_scene_beyond_fast(self):
         write("planet.yaml", PLANET)
