@@ -21,7 +21,8 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# What a rank does wrong: its device fails, or is slow for so many microseconds, or what it sends with the tag FAULT_TAG has a wrong word.
+# What a rank does wrong: its device fails, or is slow for so many microseconds, or what it sends with the tag FAULT_TAG has a wrong word,
+# is sent FAULT_TIMES, or is replaced by an end without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -39,18 +40,37 @@ int MPI_Send(const void *bytes, int size, MPI_Datatype type, int rank, int tag, 
 {
     const char *fault_tag = getenv("FAULT_TAG");
     unsigned words[64];
-    if (!fault_tag || tag != atoi(fault_tag) || size > (int)sizeof words) return PMPI_Send(bytes, size, type, rank, tag, ranks);
+    if (!fault_tag || tag != atoi(fault_tag)) return PMPI_Send(bytes, size, type, rank, tag, ranks);
+    if (getenv("FAULT_ENDS")) {
+        PMPI_Send(memset(words, 0, sizeof words), sizeof words, type, rank, 5, ranks);
+        MPI_Finalize();
+        _exit(0);
+    }
+    if (getenv("FAULT_TIMES")) {
+        for (int i = 0; i < atoi(getenv("FAULT_TIMES")); i++)
+            PMPI_Send(bytes, size, type, rank, tag, ranks);
+        return 0;
+    }
     memcpy(words, bytes, size);
     words[atoi(getenv("FAULT_WORD"))] = strtoul(getenv("FAULT_VALUE"), NULL, 0);
     return PMPI_Send(words, size - atoi(getenv("FAULT_CUT")), type, rank, tag, ranks);
 }
 """
-TAKE, BAND = 0, 2  # tags
-FAULTY = [  # tag, word, its value, bytes cut off the end
-    (TAKE, 1, 0, 0), (TAKE, 0, 8, 4), (BAND, 1, 1, 0), (BAND, 6, 0xFF, 0), (BAND, 0, 64, 8),
+TAKE, BAND, LAYERS = 0, 2, 3  # tags
+
+
+def wrong_word(tag, word, value, cut=0):
+    """And so many bytes cut off the end."""
+    return {"FAULT_TAG": tag, "FAULT_WORD": word, "FAULT_VALUE": value, "FAULT_CUT": cut}
+
+
+FAULTY = [
+    wrong_word(TAKE, 1, 0), wrong_word(TAKE, 0, 8, 4), wrong_word(BAND, 1, 1), wrong_word(BAND, 6, 0xFF), wrong_word(BAND, 0, 64, 8),
+    {"FAULT_TAG": TAKE, "FAULT_TIMES": 2}, {"FAULT_TAG": LAYERS, "FAULT_TIMES": 0}, {"FAULT_TAG": BAND, "FAULT_ENDS": 1},
 ]
 if IS_LONG:
-    FAULTY += [(TAKE, 0, 0, 0), (BAND, 0, 65, 0), (BAND, 2, 0xFFFFFFFF, 0), (BAND, 4, 8, 0)]
+    FAULTY += [wrong_word(TAKE, 0, 0), wrong_word(BAND, 0, 65), wrong_word(BAND, 2, 0xFFFFFFFF), wrong_word(BAND, 4, 8),
+               {"FAULT_TAG": BAND, "FAULT_TIMES": 2}, {"FAULT_TAG": BAND, "FAULT_TIMES": 0}, {"FAULT_TAG": LAYERS, "FAULT_TIMES": 2}]
 SLOW = {"FAULT_USEC": 200000}  # so that the other rank gets rows
 
 
@@ -125,9 +145,9 @@ class Mpi(TestCase):
     def test_nonsense(self):
         """Nothing that a rank sends is believed."""
         self.faults_build()
-        for tag, word, value, cut in FAULTY:
-            fault = {"FAULT_TAG": tag, "FAULT_WORD": word, "FAULT_VALUE": value, "FAULT_CUT": cut, "FAULT_USEC": 0}
-            self.assertRegex(self.mpirun_faulty(SLOW, fault), "warning: rank 1 on .*: it sent what is not a band")
+        for fault in FAULTY:
+            with self.subTest(fault=fault):
+                self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: it sent what is not a band")
 
     def start(self, command, *options):
         """A job with a checkpoint; returns when that has another band, or the job is done."""
@@ -168,6 +188,7 @@ class Mpi(TestCase):
     def test_a_killed_rank(self):
         command = f"{RENDER.replace('20', '5000')} --precision strict"
         self.glint(f"{command} -o one.npy", env=POCL)
+        killed = 0
         for kill in range(60 if IS_LONG else 3):
             process = self.start(command)
             rank = self.ranks_of(process).get(kill % 3) if process.poll() is None else None

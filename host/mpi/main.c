@@ -147,6 +147,8 @@ static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *
 typedef struct {
     Request request;
     BandRows rows; // handed out, and not received yet
+    Film band;     // of them, while its layers arrive; of no height: its header has not arrived
+    Layer next_layer;
     bool wants_rows, end_sent, is_rejected, is_done;
 } RankState;
 
@@ -163,33 +165,47 @@ static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
     return fits;
 }
 
+// False also for a rank that still owes rows, or an answer to whose last request it did not wait for.
 static bool request_receive(RankState *state, const MPI_Status *status)
 {
+    const bool is_due = !state->wants_rows && state->rows.row_count == 0;
     state->wants_rows = true;
-    return receive_checked(&state->request, sizeof state->request, status) && state->request.rows_max > 0 &&
-           state->request.step > 0;
+    return receive_checked(&state->request, sizeof state->request, status) && is_due &&
+           state->request.rows_max > 0 && state->request.step > 0;
+}
+
+// Gives the scheduler the band once it has all layers.
+static void layers_await(RankState *state, Scheduler *scheduler, size_t worker)
+{
+    while (state->next_layer < LAYER_COUNT && !state->band.layers[state->next_layer])
+        state->next_layer++;
+    if (state->next_layer < LAYER_COUNT) return;
+    state->rows = (BandRows){0};
+    scheduler_give(scheduler, worker, &state->band);
+    film_free(&state->band);
 }
 
 // False: it is not the band of the rows that the rank was given.
-static bool band_receive(const Ranks *ranks, RankState *state, Scheduler *scheduler, size_t worker,
-                         const MPI_Status *status)
+static bool header_receive(const Ranks *ranks, RankState *state, const MPI_Status *status)
 {
     FilmHeader header;
-    if (!receive_checked(&header, sizeof header, status) || !film_header_fits(&header, &ranks->film) ||
-        header.first_row != state->rows.first_row || header.row_count != state->rows.row_count)
+    if (!receive_checked(&header, sizeof header, status) || state->band.height > 0 ||
+        !film_header_fits(&header, &ranks->film) || header.first_row != state->rows.first_row ||
+        header.row_count != state->rows.row_count)
         return false;
-    Film band = film_of_header(&header);
-    bool is_whole = true;
-    for (Layer layer = 0; layer < LAYER_COUNT && is_whole; layer++) {
-        MPI_Status of_layer;
-        if (!band.layers[layer]) continue;
-        MPI_Probe(status->MPI_SOURCE, TAG_LAYERS, MPI_COMM_WORLD, &of_layer);
-        is_whole = receive_checked(band.layers[layer], film_layer_size(&band, layer), &of_layer);
-    }
-    state->rows = (BandRows){0};
-    if (is_whole) scheduler_give(scheduler, worker, &band);
-    film_free(&band);
-    return is_whole;
+    state->band = film_of_header(&header);
+    state->next_layer = 0;
+    return true;
+}
+
+// Its layers are messages like any other: a rank that sends none keeps nobody waiting.
+static bool layer_receive(RankState *state, const MPI_Status *status)
+{
+    void *layer = state->band.height > 0 ? state->band.layers[state->next_layer] : NULL;
+    const size_t size = layer ? film_layer_size(&state->band, state->next_layer) : SIZE_MAX;
+    const bool is_right = receive_checked(layer, size, status);
+    state->next_layer += is_right;
+    return is_right;
 }
 
 // The others render the rows of a rank that cannot.
@@ -210,13 +226,20 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
     if (status->MPI_TAG == TAG_TAKE) {
         is_right = request_receive(state, status);
     } else if (status->MPI_TAG == TAG_BAND && !state->is_rejected) {
-        is_right = band_receive(ranks, state, scheduler, worker, status);
+        is_right = header_receive(ranks, state, status);
+        if (is_right) layers_await(state, scheduler, worker);
+    } else if (status->MPI_TAG == TAG_LAYERS && !state->is_rejected) {
+        is_right = layer_receive(state, status);
+        if (is_right) layers_await(state, scheduler, worker);
     } else if (status->MPI_TAG == TAG_DONE) {
+        const bool owes_rows = state->rows.row_count > 0 && !scheduler_has_ended(scheduler);
         is_right = receive_checked(failure, sizeof failure, status);
         failure[sizeof failure - 1] = '\0';
         state->is_done = true;
         if (is_right && failure[0] != '\0' && !state->is_rejected)
             rank_drop(ranks, scheduler, worker, rank, failure);
+        else
+            is_right &= !owes_rows;
     } else {
         receive_checked(NULL, SIZE_MAX, status);
     }
@@ -264,6 +287,8 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
         }
         if (!is_busy) rest();
     }
+    for (size_t i = 0; i < ranks->count; i++)
+        film_free(&states[i].band);
     free(states);
 }
 
