@@ -197,6 +197,8 @@ class Mpi(TestCase):
             process.communicate(timeout=120)
             if process.returncode == 0:
                 self.assertSameBytes("one.npy", "ranks.npy")
+            killed += process.returncode != 0
+        self.assertGreater(killed, 0, "each job was done before one of its ranks was killed")
         self.mpirun(f"-n 3 {RANKS} {command} -o ranks.npy --checkpoint saved")
         self.assertSameBytes("one.npy", "ranks.npy")
         self.assertFalse(os.path.exists("saved"))
