@@ -1,4 +1,5 @@
 // Shapes far larger, or smaller, than their distance from the eye: what rounding moves of them.
+#include "host/base/fault.h"
 #include "host/verify/checks.h"
 #include <math.h>
 #include <string.h>
@@ -187,6 +188,11 @@ static const SizedShape shapes[] = {
 
 void verify_sizes(VerifyRun *run)
 {
-    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++)
-        if (strcmp(shapes[i].case_name, run->result->name) == 0) check_sizes(run, &shapes[i]);
+    size_t shape_count = 0;
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        if (strcmp(shapes[i].case_name, run->result->name) != 0) continue;
+        check_sizes(run, &shapes[i]);
+        shape_count++;
+    }
+    if (shape_count == 0) fault("case %s has no shape to resize", run->result->name);
 }
