@@ -14,8 +14,8 @@ from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, has_d
 
 POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
 TWO = {"env": POCL["env"] | {"POCL_DEVICES": "pthread pthread"}}
-OCLGRIND = Path("/usr/lib/oclgrind/liboclgrind-rt-icd.so")
-FAILURES = 200 if IS_LONG else 5
+OCLGRIND = Path(shutil.which("oclgrind") or "/none").parent.parent / "lib/oclgrind/liboclgrind-rt-icd.so"
+FAILURES = 200 if IS_LONG else 20
 SIZE, LARGE = "--size 64x48 --quiet", "--size 64x768 --quiet"
 AOVS = "position", "object", "path"
 
@@ -65,7 +65,7 @@ class SeveralDevices(TestCase):
         chaos = {"LD_PRELOAD": os.path.abspath("chaos.so"), "GLINT_CHAOS_LOG": os.path.abspath("calls")}
         self.glint(f"{command} --device all -o all.npy", env=TWO["env"] | chaos)
         count = int(re.search(r"^cl (\d+)", Path("calls").read_text(encoding="utf-8"), re.MULTILINE)[1])
-        draw, images = random.Random(20), 0
+        draw, images, dropped = random.Random(20), 0, 0
         for _ in range(FAILURES):
             Path("all.npy").unlink(missing_ok=True)
             call = draw.randrange(count)
@@ -75,11 +75,15 @@ class SeveralDevices(TestCase):
                 if process.returncode == 0:
                     self.assertSameBytes("one.npy", "all.npy")
                     images += 1
+                    dropped += "glint: warning: the other devices go on without one: " in process.stderr
                 else:
                     self.assertIn("glint: ", process.stderr)
                     self.assertFalse(os.path.exists("all.npy"))
         self.assertIn("failed ", Path("calls").read_text(encoding="utf-8"))
-        print(f"{FAILURES} failures of {count} calls, {images} images complete")
+        # most calls are one device's, which the other replaces; few are made before both are open
+        self.assertGreater(images, FAILURES / 2)
+        self.assertGreater(dropped, FAILURES / 4)
+        print(f"{FAILURES} failures of {count} calls, {images} images complete, {dropped} of them with a device less")
 
     def test_names(self):
         """The files' notes name both; those of one make round alike."""
