@@ -147,7 +147,7 @@ static void decisions_are_those_of_exact_arithmetic(void **state)
             if (certified.wrong > certified.undecided)
                 fail_msg("scene %zu, run %u: %zu pixels are wrong, %llu samples undecided", i, run,
                          certified.wrong, (unsigned long long)certified.undecided);
-            assert_true(certified.undecided <= WIDTH * HEIGHT / 100);
+            assert_true(certified.undecided <= WIDTH * HEIGHT / 50);
         }
         compared += reference.count;
         certify_sample_close(&reference);

@@ -342,6 +342,10 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
         image_output_abandon(output);
     progress_close(&progress);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
+    const RepeatCounts repeats = renderers_repeats(renderers, devices->count);
+    if (whole && repeats.undecided > 0)
+        message_add(messages, MESSAGE_WARNING, "%llu samples are undecided, and are as at precision double",
+                    (unsigned long long)repeats.undecided);
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
     messages_print(messages, NULL);
     int status = whole                    ? EXIT_DONE

@@ -39,12 +39,17 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
                     "precision double: the device \"%s\" has no 64-bit floating point", device->name);
         return false;
     }
-    if (settings->precision == PRECISION_CERTIFIED && !device->fp64) {
+    if (settings->precision == PRECISION_CERTIFIED && settings->perturb_scale > 1) {
         message_add(
             messages, MESSAGE_ERROR,
-            "precision certified: the device \"%s\" has no 64-bit floating point, in which pixels are "
-            "repeated that 32 bits leave in doubt",
-            device->name);
+            "precision certified: its bounds cover errors of the size that devices have, not %u times that",
+            settings->perturb_scale);
+        return false;
+    }
+    if (settings->precision == PRECISION_CERTIFIED && !device->fp64) {
+        message_add(messages, MESSAGE_ERROR,
+                    "precision certified needs 64-bit floating point, which the device \"%s\" lacks",
+                    device->name);
         return false;
     }
     return true;
@@ -352,9 +357,7 @@ Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size
         return NULL;
     }
     if (settings->precision == PRECISION_CERTIFIED) {
-        message_add(
-            messages, MESSAGE_ERROR,
-            "precision certified needs the scene in two precisions, which several machines do not get");
+        message_add(messages, MESSAGE_ERROR, "glint-mpi does not support precision certified");
         compiled_scene_free(compiled);
         return NULL;
     }

@@ -75,6 +75,8 @@ typedef struct {
 // one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is in doubt.
 enum { SHADOW_ERROR_MAX = 1 << 13 };
 #define SHADOW_DOUBT_MAX ((real)(0x1p-6f))
+// Where the facing is open by no more than this, what the light adds is too faint to matter.
+#define FACING_ERROR_MAX ((real)(0x1p-12f))
 
 // Sets the shadow ray's bounds, and what is in doubt before it is traced.
 static inline void light_set_errors(const Light *light, const Surface *surface, LightVisibility *visibility,
@@ -102,10 +104,12 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     shadow_ray->leaves_outward = surface->entering & (geometric > facing_error);
     mask turned = (visibility->facing < -facing_error) | !surface->found;
     mask open = !turned & (visibility->facing <= facing_error);
-    visibility->facing_doubt = open;
+    mask faint = facing_error <= FACING_ERROR_MAX;
+    visibility->facing_doubt = open & faint;
     // a light in front of the shading normal but behind the surface is occluded by the surface itself
     mask behind = HAS_TRIANGLES ? !turned & (geometric < -facing_error) : mask_none();
     mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= facing_error) : mask_none();
+    self_doubt = self_doubt | (open & !faint);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {
         Vector difference =
@@ -114,10 +118,10 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
         real error = angle_error + (real)(16 * UNIT_ROUNDOFF);
         real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
         mask at_edge = !turned & (fabs(s - edge) <= s_error);
-        if (light->cone.z == 0)
-            self_doubt = self_doubt | at_edge;
-        else
-            visibility->facing_doubt = visibility->facing_doubt | at_edge;
+        mask fades = s_error * (real)(light->cone.z) <= FACING_ERROR_MAX;
+        if (light->cone.z == 0) fades = mask_none();
+        self_doubt = self_doubt | (at_edge & !fades);
+        visibility->facing_doubt = visibility->facing_doubt | (at_edge & fades);
     }
     visibility->lit = visibility->lit & !behind;
     visibility->doubt = self_doubt | (visibility->lit & far_off);

@@ -20,7 +20,7 @@ typedef struct {
 
 // Camera rays, of their length: two products and sums of three terms of at most sqrt 3 of the direction, and
 // the roundings of the camera's vectors and of the unit length.
-enum { CAMERA_DIRECTION_ERROR = 12 };
+enum { CAMERA_DIRECTION_ERROR = 20 };
 
 // How far the exact ray is from the packet's, up to a distance.
 static inline real ray_place_error(const Ray *ray, real distance)
@@ -43,6 +43,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask exists, mask perh
     // beyond the end: of a ray to a light t = 1, from which tmax differs by rounding
     mask beyond = low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
     mask before = high < ray->tmin;
+    low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers: anywhere
     perhaps = perhaps & !(beyond | before);
     hit.found = exists & perhaps & (low > ray->tmin) & (high < ray->tmax);
     hit.doubt = perhaps & !hit.found;

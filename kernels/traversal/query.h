@@ -116,7 +116,7 @@ static inline void traversal_judge(Traversal *traversal)
     if (traversal->query == OCCLUSION)
         traversal->hit.doubt = traversal->doubt & traversal->active;
     else
-        traversal->hit.doubt = traversal->active & (traversal->rival <= traversal->limit);
+        traversal->hit.doubt = traversal->active & !(traversal->rival > traversal->limit);
 }
 
 // Per-lane tmax, below LARGEST, the entry distance of a child that no ray hits; -LARGEST for lanes that are
