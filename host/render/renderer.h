@@ -124,8 +124,8 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
 // ended it; there is nothing to free.
 bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 
-// Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders. False: the
-// device failed, and `hits` are undefined.
+// Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders. The
+// report has neither its launches nor its reads. False: the device failed, and `hits` are undefined.
 bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
 
 // A kernel launch or a transfer.

@@ -111,10 +111,15 @@ static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count
 bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
     const Compute *compute = renderer->compute;
+    // the report is of images: a view that asks about its pixels would add to it without end
+    RenderReport *report = &renderer->report;
+    const size_t launch_count = report->launches.count, read_count = report->reads.count;
     for (size_t first = 0; first < ray_count && compute_ok(compute); first += TRACE_RAYS_OF_LAUNCH) {
         size_t left = ray_count - first;
         uint32_t count = left < TRACE_RAYS_OF_LAUNCH ? (uint32_t)left : TRACE_RAYS_OF_LAUNCH;
         trace_batch(renderer, rays + first, count, hits + first);
     }
+    report->launches.count = launch_count;
+    report->reads.count = read_count;
     return compute_ok(compute);
 }
