@@ -1,4 +1,5 @@
 // The reference itself, against roots known by hand or from certified interval arithmetic.
+#include "host/verify/certify.h"
 #include "host/verify/reference_color.h"
 #include "tests/random_ray.h"
 #include <setjmp.h>
@@ -416,16 +417,51 @@ static void knows_highlights(void **state)
     assert_near((double)reference_highlight(normal, (Quad3){0, 0, -1}, to_eye, 0), 0, 0);
 }
 
+// Whichever channel it is, and whether the pixel's decisions are right or wrong.
+static void nonfinite_colors_are_errors(void **state)
+{
+    (void)state;
+    uint32_t places[3][2] = {{0, 0}, {1, 0}, {2, 0}}, objects[3] = {0}, paths[3] = {0};
+    ReferencePixel pixels[3];
+    for (size_t i = 0; i < COUNT(pixels); i++)
+        pixels[i] = (ReferencePixel){.color = {0.5, 0.25, 0.125}, .margin = 1};
+    double colors[9] = {0.5, 0.25, 0.25, 0.5, 0.25, 0.125, 0.5, 0.25, 0.125};
+    CertifySample sample = {.width = 3, .height = 1, .count = 1, .places = places, .pixels = pixels};
+    const Film film = {.width = 3, .height = 1, .object = objects, .path = paths, .color = colors};
+    assert_true(certify_compare(&sample, &film).color == 0.125);
+    sample.count = 3;
+    for (size_t channel = 0; channel < 3; channel++) {
+        double *faulty = colors + 3 + channel;
+        const double right = *faulty;
+        *faulty = channel == 1 ? -INFINITY : NAN;
+        const CertifyErrors errors = certify_compare(&sample, &film);
+        assert_true(isinf(errors.color) && errors.wrong_color == 0);
+        assert_int_equal(errors.worst[0], 1);
+        paths[1] = 1;
+        assert_true(isinf(certify_compare(&sample, &film).wrong_color));
+        paths[1] = 0;
+        *faulty = right;
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(knows_spheres),       cmocka_unit_test(sees_only_insides),
-        cmocka_unit_test(knows_flat_shapes),   cmocka_unit_test(knows_cylinders),
-        cmocka_unit_test(knows_cones),         cmocka_unit_test(knows_tori),
-        cmocka_unit_test(shades_as_phong),     cmocka_unit_test(casts_shadows),
-        cmocka_unit_test(lays_checkers),       cmocka_unit_test(aims_cameras),
-        cmocka_unit_test(rounds_every_number), cmocka_unit_test(finds_the_nearest),
-        cmocka_unit_test(measures_distances),  cmocka_unit_test(knows_highlights),
+        cmocka_unit_test(knows_spheres),
+        cmocka_unit_test(sees_only_insides),
+        cmocka_unit_test(knows_flat_shapes),
+        cmocka_unit_test(knows_cylinders),
+        cmocka_unit_test(knows_cones),
+        cmocka_unit_test(knows_tori),
+        cmocka_unit_test(shades_as_phong),
+        cmocka_unit_test(casts_shadows),
+        cmocka_unit_test(lays_checkers),
+        cmocka_unit_test(aims_cameras),
+        cmocka_unit_test(rounds_every_number),
+        cmocka_unit_test(finds_the_nearest),
+        cmocka_unit_test(measures_distances),
+        cmocka_unit_test(knows_highlights),
+        cmocka_unit_test(nonfinite_colors_are_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

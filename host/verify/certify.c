@@ -78,6 +78,17 @@ void certify_sample_close(CertifySample *sample)
     *sample = (CertifySample){0};
 }
 
+// The largest error of a channel; infinite if one is not finite.
+static double color_error(const double color[3], const Color *expected)
+{
+    const double errors[3] = {fabs(color[0] - expected->x), fabs(color[1] - expected->y),
+                              fabs(color[2] - expected->z)};
+    double largest = 0;
+    for (int i = 0; i < 3; i++)
+        largest = isfinite(errors[i]) ? fmax(largest, errors[i]) : INFINITY; // fmax ignores a NaN
+    return largest;
+}
+
 // Adds to the first of the counts whose decision is not the reference's; false if all are.
 static bool is_wrong(const CertifySample *sample, size_t index, const Film *film, size_t pixel,
                      CertifyErrors *errors)
@@ -112,10 +123,7 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         if (wrong) errors.margin = fmax(errors.margin, expected->margin);
         if (expected->has_texture) continue;
         errors.colors++;
-        const double *color = film->color + 3 * pixel;
-        const double error =
-            fmax(fabs(color[0] - expected->color.x),
-                 fmax(fabs(color[1] - expected->color.y), fabs(color[2] - expected->color.z)));
+        const double error = color_error(film->color + 3 * pixel, &expected->color);
         if (error > fmax(errors.color, errors.wrong_color))
             errors.worst[0] = sample->places[i][0], errors.worst[1] = sample->places[i][1];
         double *largest = wrong ? &errors.wrong_color : &errors.color;
