@@ -31,7 +31,8 @@ NOTES = {
     "glint accuracy": "[accuracy.md](accuracy.md) defines the figures. A row has `frame_ms`, `kernel_ms`, `clock`, `rays` and "
                       "`mrays_per_s` of `glint bench`; a reference's ends with `saved`, an unavailable one with `reason`. The "
                       "HTML report embeds the same object.",
-    "glint certify": "[accuracy.md](accuracy.md#the-exact-image) says what is compared.",
+    "glint certify": "[accuracy.md](accuracy.md#the-exact-image) says what is compared. A precision that does not fit the device "
+                     "or scene has only `precision`, `status` and `reason`; one that `--precision` names is an error.",
     "glint verify": "[verify.md](verify.md) lists the cases.",
 }
 # A path that begins so has no row, since the introduction, a note or a row names the section that has it.

@@ -6,6 +6,11 @@ from glint import PLANET, ROOT, TestCase, main, need_device, write
 
 SCENES = "demo", "mirror-glass", "paraboloids", "triangles"
 SMALL = "--size 96x64 --pixels 600"
+STRONG = """\
+camera: {position: [0, 0, -5], look_at: [0, 0, 0]}
+lights: [{point: {position: [2, 5, -4], intensity: 1e30, color: [1e30, 1, 1]}}]
+objects: [{sphere: {center: [0, 0, 0], radius: 1}}]
+"""  # beyond float
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -36,6 +41,19 @@ class Certify(TestCase):
         self.assertGreater(wrong["object"] + wrong["shadow"], 5)
         self.assertGreater(rows["fast"]["color"]["max_wrong"], 0.01)
         self.assertGreater(wrong["margin"], 0)
+
+    def test_every_precision(self):
+        """What does not fit is a row with its reason, and an error only if it is named: here all but double, or all."""
+        write("strong.yaml", STRONG)
+        _, rows = self.certify("strong.yaml", "")
+        self.assertEqual(list(rows), ["fast", "single", "strict", "double", "certified"])
+        self.assertEqual([name for name, row in rows.items() if "wrong" in row], ["double"] if HAS_DOUBLE else [])
+        for name, row in rows.items():
+            if name != "double":
+                self.assertEqual(row["status"], "unavailable")
+                self.assertIn(name, row["reason"])
+        self.assertEqual(self.glint(f"certify strong.yaml {SMALL}").stdout.count("unavailable: "), 5 - HAS_DOUBLE)
+        self.refuses(f"certify strong.yaml {SMALL} --precision double,single", "single")
 
     def test_refused(self):
         for arguments, pattern in ((f"{ROOT}/scenes/demo.yaml --pixels 0", "--pixels"), ("", "no scene"), ("none.yaml", "none.yaml")):

@@ -3,6 +3,7 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
@@ -10,6 +11,7 @@
 #include "host/cli/version.h"
 #include <getopt.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES, OPTION_JSON };
 enum { PIXELS_DEFAULT = 2000, PIXELS_MOST = 1 << 24 };
@@ -32,9 +34,9 @@ static const char help_text[] =
     "objects, shadows, paths, colors.\n\n"
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        of the sample, about (default: 2000)\n"
-    "      --precision LIST  of fast, single, strict, double, certified (default: all)\n"  //
-    HELP_BOUNCES HELP_DEVICE HELP_LANES                                                    //
-    "      --bvh B           auto, on or off; does not change the image (default: auto)\n" //
+    "      --precision LIST  of fast, single, strict, double, certified (default: all that fit)\n" //
+    HELP_BOUNCES HELP_DEVICE HELP_LANES                                                            //
+    "      --bvh B           auto, on or off; does not change the image (default: auto)\n"         //
     HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
@@ -86,6 +88,7 @@ typedef struct {
     double reference_seconds;
     struct {
         bool measured;
+        char *failure; // why it is not measured where it was to be
         CertifyErrors errors;
     } rows[PRECISION_COUNT];
 } Certification;
@@ -107,6 +110,8 @@ static void text_print(const Certification *certification)
     puts("\n                     wrong             largest error of color        largest margin\n"
          "  precision   object  shadow    path   right     wrong     at         of a wrong pixel");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
+        const char *failure = certification->rows[i].failure;
+        if (failure) printf("  %-9s  unavailable: %s\n", precision_names[i], failure);
         if (!certification->rows[i].measured) continue;
         const CertifyErrors *errors = &certification->rows[i].errors;
         printf("  %-9s  %7zu %7zu %7zu   %-9.2g %-9.2g %u,%u", precision_names[i], errors->object,
@@ -161,19 +166,31 @@ static void json_report(const Certification *certification)
         undecided += certify_is_undecided(&sample->pixels[i]);
     json_integer(json, "undecided", (int64_t)undecided);
     json_begin_array(json, "precisions");
-    for (unsigned i = 0; i < PRECISION_COUNT; i++)
+    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured) row_json(json, (Precision)i, &certification->rows[i].errors);
+        if (!certification->rows[i].failure) continue;
+        json_begin_object(json, NULL);
+        json_text(json, "precision", precision_names[i]);
+        unavailable_json(json, certification->rows[i].failure);
+        json_end(json);
+    }
     json_end(json);
     json_print(json, stdout);
 }
 
-// Renders at one precision and compares. EXIT_DONE, or why not, with a message if it is the user's mistake.
+// Renders at one precision and compares. EXIT_DONE, or why not. What does not fit the device or scene is the
+// user's mistake, with a message, if the user named the precision; else its row says so.
 static int precision_compare(Certification *certification, RenderSettings settings, Precision precision)
 {
     settings.precision = precision;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(certification->compute, certification->scene, &settings, &messages);
-    const bool is_unfit = messages.count > 0;
+    const bool is_unfit = !renderer && messages.count > 0;
+    if (is_unfit && !certification->options->precisions) {
+        certification->rows[precision].failure = memory_copy_text(messages.items[0].text);
+        message_list_free(&messages);
+        return EXIT_DONE;
+    }
     messages_print(&messages, NULL);
     Film film;
     const bool whole = renderer && renderer_render_film(renderer, AOV_OBJECT | AOV_SHADOW | AOV_PATH, &film);
@@ -205,14 +222,15 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Comp
     settings.stop = progress_interrupted;
     int status = EXIT_DONE;
     for (unsigned i = 0; i < PRECISION_COUNT && status == EXIT_DONE; i++) {
-        const bool is_possible = i != PRECISION_DOUBLE || compute->device->fp64;
-        if (options->precisions ? options->precisions >> i & 1 : is_possible)
+        if (!options->precisions || options->precisions >> i & 1)
             status = precision_compare(&certification, settings, (Precision)i);
     }
     if (status == EXIT_DONE && options->as_json)
         json_report(&certification);
     else if (status == EXIT_DONE)
         text_print(&certification);
+    for (unsigned i = 0; i < PRECISION_COUNT; i++)
+        free(certification.rows[i].failure);
     certify_sample_close(&certification.sample);
     return status;
 }

@@ -25,12 +25,11 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] =
-    "usage: glint check SCENE [OPTIONS]\n\n"
-    "Reports a scene's objects, lights, materials, bounds and kernel features, "
-    "and warns of what is ignored.\n\n"
-    "      --object ID       only what object that is, and its line; IDs are those of "
-    "glint trace\n" //
+static const char help_text[] = "usage: glint check SCENE [OPTIONS]\n\n"
+                                "Reports a scene's objects, lights, materials, bounds and kernel features, "
+                                "and warns of what is ignored.\n\n"
+                                "      --object ID       print one object and its line; IDs are those of "
+                                "glint trace\n" //
     HELP_JSON HELP_LENIENT HELP_HELP;
 
 typedef struct {
@@ -202,7 +201,7 @@ int command_check(int argument_count, char **arguments)
         }
     }
     if (!option_only_scene("check", argument_count, arguments)) return EXIT_USER;
-    if (as_json && object != UINT32_MAX) return option_usage_fault("check", "--object and --json");
+    if (as_json && object != UINT32_MAX) return option_usage_fault("check", "--object excludes --json");
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};
