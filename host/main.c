@@ -22,7 +22,7 @@ static const struct {
     {"diff", command_diff, "compare two images"},
     {"bench", command_bench, "measure speed on a device"},
     {"accuracy", command_accuracy, "measure speed against error"},
-    {"certify", command_certify, "compare an image with exact arithmetic"},
+    {"certify", command_certify, "compare an image with a reference of quadruple precision"},
     {"verify", command_verify, "run the hard cases on a device"},
     {"cache", command_cache, "list, check or empty the kernel cache"},
 };

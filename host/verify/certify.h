@@ -1,5 +1,5 @@
 // A scene's image against the reference, on a sample of its pixels: which objects, shadows and paths are not
-// those of exact arithmetic on the scene as its file says it, and how far colors are off.
+// those of quadruple precision (113 bits) on the scene as its file says it, and how far colors are off.
 #pragma once
 
 #include "host/render/film.h"

@@ -31,7 +31,10 @@ _glint() {
     # bash splits --option=value into three words.
     if [ "$word" = = ]; then word=; elif [ "$before" = = ]; then before=${COMP_WORDS[COMP_CWORD - 2]}; fi
     case $before in
-    --precision) words="fast single strict double" ;;
+    --precision)
+        words="fast single strict double"
+        case $subcommand in trace | verify) ;; *) words="$words certified" ;; esac
+        ;;
     --lanes) words="1 4 8 16" ;;
     --bvh) words="auto on off" ;;
     --bits) words="8 16" ;;

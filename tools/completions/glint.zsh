@@ -12,7 +12,7 @@ _glint_render() {
         '--samples[rays for each pixel]:number:' \
         '--region[pixels of the whole image to render]:X,Y,W,H:' \
         '--device[device to render on, or several]:device:(cpu gpu all)' \
-        '--precision[arithmetic]:precision:(fast single strict double)' \
+        '--precision[arithmetic]:precision:(fast single strict double certified)' \
         '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--bvh[use a BVH]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
@@ -37,7 +37,7 @@ _glint_view() {
         '--samples[rays for each pixel at rest]:number:' \
         '--write-camera[C writes the camera into the scene file]' \
         '--device[device to render on]:device:(cpu gpu)' \
-        '--precision[arithmetic]:precision:(fast single strict double)' \
+        '--precision[arithmetic]:precision:(fast single strict double certified)' \
         '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--bvh[use a BVH]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
@@ -83,7 +83,7 @@ _glint_certify() {
     _arguments \
         '--size[width and height in pixels]:WxH:' \
         '--pixels[of the sample, about]:number:' \
-        '--precision[arithmetic, separated by commas]:precisions:(fast single strict double)' \
+        '--precision[arithmetic, separated by commas]:precisions:(fast single strict double certified)' \
         '--lanes[rays per work-item]:lanes:(1 4 8 16)' \
         '--bvh[use a BVH]:choice:(auto on off)' \
         '--bounces[reflections and refractions at most]:number:' \
@@ -127,7 +127,7 @@ _glint_diff() {
 
 _glint_bench() {
     _arguments \
-        '--precision[arithmetic]:list:_sequence compadd - fast single strict double' \
+        '--precision[arithmetic]:list:_sequence compadd - fast single strict double certified' \
         '--lanes[rays per work-item]:list:_sequence compadd - 1 4 8 16' \
         '--bvh[use a BVH]:list:_sequence compadd - auto on off' \
         '--size[width and height in pixels]:WxH:' \
@@ -151,7 +151,7 @@ _glint_accuracy() {
     _arguments \
         '--budget[errors to allow]:list:' \
         '--reference[linear colors to compare with]:image:_files -g "*.(exr|npy)"' \
-        '--precision[arithmetic]:list:_sequence compadd - fast single strict double' \
+        '--precision[arithmetic]:list:_sequence compadd - fast single strict double certified' \
         '--lanes[rays per work-item]:list:_sequence compadd - 1 4 8 16' \
         '--bvh[use a BVH]:list:_sequence compadd - auto on off' \
         '--samples[rays for each pixel]:list:' \
@@ -179,7 +179,7 @@ _glint() {
         'diff:compare two images'
         'bench:benchmark scenes on this device'
         'accuracy:report time and error of every configuration'
-        'certify:compare an image with exact arithmetic'
+        'certify:compare an image with a reference of quadruple precision'
         'verify:run the hard cases on a device'
         'cache:list, check or empty the kernel cache'
     )
