@@ -8,11 +8,12 @@
 #include "host/measure/baseline.h"
 #include "host/opencl/cache.h"
 #include "host/render/checkpoint.h"
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/glint-fuzz-XXXXXX";
+static char folder[PATH_MAX - 16]; // in TMPDIR
 
 static void image_fuzz(const char *path, const Source *source, MessageList *messages)
 {
@@ -135,7 +136,7 @@ static const struct {
 };
 
 static size_t reader;
-static char path[64];
+static char path[PATH_MAX];
 
 static void scratch_remove(void)
 {
@@ -168,7 +169,10 @@ int LLVMFuzzerInitialize(int *argument_count, char ***arguments)
         fputs("\n", stderr);
         exit(EXIT_USER);
     }
-    if (!mkdtemp(folder)) exit(EXIT_MACHINE);
+    const char *parent = getenv("TMPDIR");
+    const int length =
+        snprintf(folder, sizeof folder, "%s/glint-fuzz-XXXXXX", parent && *parent ? parent : "/tmp");
+    if (length >= (int)sizeof folder || !mkdtemp(folder)) exit(EXIT_MACHINE);
     snprintf(path, sizeof path, "%s/%s", folder, readers[reader].file);
     setenv("XDG_CACHE_HOME", folder, 1);
     image_limit_pixels(1 << 16);
