@@ -375,7 +375,7 @@ static int precision_choose(Pilot *pilot, const RenderOptions *options, RenderSe
     if (options->quiet) return EXIT_DONE;
     Text line = {0};
     pilot_describe(&line, pilot);
-    fprintf(stderr, "glint: --max-error: %s\n", text_c(&line));
+    fprintf(stderr, "glint: --max-error: %s, %.0f ms\n", text_c(&line), 1e3 * pilot->seconds);
     text_free(&line);
     return EXIT_DONE;
 }

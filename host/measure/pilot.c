@@ -146,14 +146,21 @@ void pilot_describe(Text *text, const Pilot *pilot)
     const double percent = 100 * pilot->confidence;
     text_appendf(text, "%s: ", precision_names[pilot->chosen]);
     if (pilot->chosen == PRECISION_DOUBLE) {
-        text_appendf(text, "no faster precision is known to keep %s within %g",
+        bool is_kept = false; // by another, which was no faster here
+        for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
+            is_kept = is_kept || (i != PRECISION_DOUBLE && pilot->candidates[i].verdict.keeps);
+        text_appendf(text,
+                     is_kept ? "none that keeps %s within %g is faster"
+                             : "no faster precision is known to keep %s within %g",
                      error_metric_names[budget->metric], budget->limit);
     } else if (budget->metric == ERROR_MAX) {
-        text_appendf(text, "max %.2g of these pixels, at most %.2g %% of all beyond %g", verdict->error,
-                     100 * verdict->bound, budget->limit);
+        text_appendf(
+            text,
+            "largest error in the sample %.2g; with %g %% confidence at most %.2g %% of pixels exceed %g",
+            verdict->error, percent, 100 * verdict->bound, budget->limit);
     } else {
-        text_appendf(text, "%s at most %.2g", error_metric_names[budget->metric], verdict->bound);
+        text_appendf(text, "%s at most %.2g with %g %% confidence", error_metric_names[budget->metric],
+                     verdict->bound, percent);
     }
-    text_appendf(text, " with %g %% confidence; %zu of %zu pixels, %.0f ms", percent, pilot->pixels,
-                 pilot->image_pixels, 1e3 * pilot->seconds);
+    text_appendf(text, "; %zu of %zu pixels", pilot->pixels, pilot->image_pixels);
 }

@@ -36,5 +36,6 @@ typedef struct {
 bool pilot_run(Pilot *pilot, const ErrorBudget *budget, Compute *compute, const Scene *scene,
                const RenderSettings *settings, MessageList *messages);
 
-// One line: the choice, what is known of its error, and the cost.
+// One line: the choice, what is known of its error, and the pixels it took. No time: it
+// stands in images, and equal renders are equal bytes.
 void pilot_describe(Text *text, const Pilot *pilot);
