@@ -19,23 +19,27 @@ typedef struct {
     uint width;    // of the band
 } Tile;
 
-// A hash of 15 bits; the same in both widths of integer.
-static inline integer bits_scramble(integer bits)
+// Mixes 32 bits one to one: as alike as two numbers are, their results are unlike.
+static inline uint bits_scramble(uint bits)
 {
-    bits = (bits ^ (bits >> 7)) & 0x7fff;
-    bits = (bits * 25693) & 0x7fff;
-    bits = ((bits ^ (bits >> 8)) * 11821) & 0x7fff;
-    return bits ^ (bits >> 7);
+    bits = (bits ^ (bits >> 16)) * 0x45d9f3bu;
+    bits = (bits ^ (bits >> 15)) * 0x2c1b3c6du;
+    return bits ^ (bits >> 16);
 }
 
 // Of each square of cell x cell pixels, whose corner is given, one at a place that a hash chooses: a
-// stratified sample of the image (host/measure/pilot.h).
+// stratified sample of the image (host/measure/pilot.h). `down` is hashed of all 32 bits, of which `across`
+// shows the first few.
 static inline Pixels pixels_scatter(Pixels corner, uint cell)
 {
-    integer side = (integer)((scalar_integer)cell);
-    integer across = bits_scramble(bits_scramble(corner.x) + corner.y);
-    integer down = bits_scramble(across + 23505);
-    return (Pixels){corner.x + ((across * side) >> 15), corner.y + ((down * side) >> 15)};
+    IntegerLanes x = {corner.x}, y = {corner.y};
+    for (uint lane = 0; lane < LANES; lane++) {
+        uint across = bits_scramble(bits_scramble((uint)x.each[lane] + 1) + (uint)y.each[lane]);
+        uint down = bits_scramble(across + 0x9e3779b9u);
+        x.each[lane] += mul_hi(across, cell);
+        y.each[lane] += mul_hi(down, cell);
+    }
+    return (Pixels){x.all, y.all};
 }
 
 // The work-item's tile number `which` of a list, with pixels from anywhere.
