@@ -271,12 +271,12 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
 static inline CertainHit revolution_certain_hit(const Revolution *shape, const Ray *ray)
 {
     if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return doubtful_everywhere(ray);
-    const scalar length = shape->range.y, height = shape->range.x / length;
-    const scalar base = shape->base_radius.w / length,
-                 top = fma(shape->axis_slope.w, shape->range.x, shape->base_radius.w) / length;
-    Vector middle = vector_fma(vector_of(shape->axis_slope), (real)(0.5f * height / length),
-                               vector_of(shape->base_radius));
-    return doubtful_ball(middle, (real)(fmax(base, top) + 0.5f * height), ray);
+    const scalar base = shape->base_radius.w, top = fma(shape->axis_slope.w, shape->range.x, base);
+    real inverse = real_divide((real)(1), (real)(shape->range.y));
+    real half_height = (real)(0.5f * shape->range.x) * inverse;
+    Vector middle =
+        vector_fma(vector_of(shape->axis_slope), half_height * inverse, vector_of(shape->base_radius));
+    return doubtful_ball(middle, real_fma((real)(fmax(base, top)), inverse, half_height), ray);
 }
 
 static inline CertainHit cylinder_certain_hit(const Cylinder *cylinder, const Ray *ray)
