@@ -65,11 +65,11 @@ def wrong_word(tag, word, value, cut=0):
 
 
 FAULTY = [
-    wrong_word(TAKE, 1, 0), wrong_word(TAKE, 0, 8, 4), wrong_word(BAND, 1, 1), wrong_word(BAND, 6, 0xFF), wrong_word(BAND, 0, 64, 8),
+    wrong_word(TAKE, 1, 0), wrong_word(BAND, 0, 64, 8),
     {"FAULT_TAG": TAKE, "FAULT_TIMES": 2}, {"FAULT_TAG": LAYERS, "FAULT_TIMES": 0}, {"FAULT_TAG": BAND, "FAULT_ENDS": 1},
 ]
 if IS_LONG:
-    FAULTY += [wrong_word(TAKE, 0, 0), wrong_word(BAND, 0, 65), wrong_word(BAND, 2, 0xFFFFFFFF), wrong_word(BAND, 4, 8),
+    FAULTY += [wrong_word(TAKE, 0, 8, 4), wrong_word(BAND, 1, 1), wrong_word(BAND, 6, 0xFF), wrong_word(TAKE, 0, 0), wrong_word(BAND, 0, 65), wrong_word(BAND, 2, 0xFFFFFFFF), wrong_word(BAND, 4, 8),
                {"FAULT_TAG": BAND, "FAULT_TIMES": 2}, {"FAULT_TAG": BAND, "FAULT_TIMES": 0}, {"FAULT_TAG": LAYERS, "FAULT_TIMES": 2}]
 SLOW = {"FAULT_USEC": 200000}  # so that the other rank gets rows
 

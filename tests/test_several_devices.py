@@ -15,7 +15,7 @@ from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, has_d
 POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
 TWO = {"env": POCL["env"] | {"POCL_DEVICES": "pthread pthread"}}
 OCLGRIND = Path(shutil.which("oclgrind") or "/none").parent.parent / "lib/oclgrind/liboclgrind-rt-icd.so"
-FAILURES = 200 if IS_LONG else 20
+FAILURES = 200 if IS_LONG else 10
 SIZE, LARGE = "--size 64x48 --quiet", "--size 64x768 --quiet"
 AOVS = "position", "object", "path"
 
