@@ -10,8 +10,6 @@ typedef struct {
     global const uint *pixels;            // the list: x and y of each pixel in the whole image
 } Band;
 
-// Kernels that repeat what `certified` left in doubt render lists of pixels.
-
 typedef struct {
     Pixels pixels;
     mask inside;
@@ -42,7 +40,8 @@ static inline Pixels pixels_scatter(Pixels corner, uint cell)
     return (Pixels){x.all, y.all};
 }
 
-// The work-item's tile number `which` of a list, with pixels from anywhere.
+// The work-item's tile number `which` of a list, with pixels from anywhere: of those that `certified` left in
+// doubt.
 static inline Tile list_tile(const Band *band, uint which)
 {
     uint first = ((uint)get_global_id(0) * TILES + which) * LANES;

@@ -111,7 +111,7 @@ static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count
 bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
     const Compute *compute = renderer->compute;
-    // the report is of images: a view that asks about its pixels would add to it without end
+    // the report is of images: a view asks about pixel after pixel
     RenderReport *report = &renderer->report;
     const size_t launch_count = report->launches.count, read_count = report->reads.count;
     for (size_t first = 0; first < ray_count && compute_ok(compute); first += TRACE_RAYS_OF_LAUNCH) {

@@ -35,38 +35,38 @@ static inline bool kind_has_grid(uint kind)
     return HAS_DISCS && kind == KIND_DISCS;
 }
 
+// The axes of that grid; w: where it begins.
+typedef struct {
+    scalar4 u, v;
+} GridAxes;
+
+// All 0 on other kinds, which take no image.
+static inline GridAxes grid_axes(const Scene *scene, uint kind, uint index)
+{
+    if (HAS_PLANES && kind == KIND_PLANES)
+        return (GridAxes){scene->planes[index].grid_u, scene->planes[index].grid_v};
+    if (HAS_DISCS && kind == KIND_DISCS)
+        return (GridAxes){scene->discs[index].grid_u, scene->discs[index].grid_v};
+    return (GridAxes){(scalar4)(0), (scalar4)(0)};
+}
+
 typedef struct {
     real u, v; // in checker squares, or texture repeats
 } GridCoordinates;
 
-// The grid coordinates of a point of a plane or disc; (0, 0) on other kinds, which take no image.
+// The grid coordinates of a point of a plane or disc; (0, 0) on other kinds.
 static inline GridCoordinates grid_coordinates(const Scene *scene, uint kind, uint index, Vector position)
 {
-    scalar4 grid_u = (scalar4)(0), grid_v = (scalar4)(0);
-    if (HAS_PLANES && kind == KIND_PLANES) {
-        grid_u = scene->planes[index].grid_u;
-        grid_v = scene->planes[index].grid_v;
-    } else if (HAS_DISCS && kind == KIND_DISCS) {
-        grid_u = scene->discs[index].grid_u;
-        grid_v = scene->discs[index].grid_v;
-    }
-    return (GridCoordinates){vector_dot(position, vector_of(grid_u)) + (real)(grid_u.w),
-                             vector_dot(position, vector_of(grid_v)) + (real)(grid_v.w)};
+    GridAxes axes = grid_axes(scene, kind, index);
+    return (GridCoordinates){vector_dot(position, vector_of(axes.u)) + (real)(axes.u.w),
+                             vector_dot(position, vector_of(axes.v)) + (real)(axes.v.w)};
 }
 
 // How far they are off, for a position that is off by `place_error`.
 static inline real grid_error(const Scene *scene, uint kind, uint index, Vector position, real place_error)
 {
-    scalar4 grid_u = (scalar4)(0), grid_v = (scalar4)(0);
-    if (HAS_PLANES && kind == KIND_PLANES) {
-        grid_u = scene->planes[index].grid_u;
-        grid_v = scene->planes[index].grid_v;
-    } else if (HAS_DISCS && kind == KIND_DISCS) {
-        grid_u = scene->discs[index].grid_u;
-        grid_v = scene->discs[index].grid_v;
-    }
-    grid_u = fabs(grid_u);
-    grid_v = fabs(grid_v);
+    GridAxes axes = grid_axes(scene, kind, index);
+    scalar4 grid_u = fabs(axes.u), grid_v = fabs(axes.v);
     Vector p = {fabs(position.x), fabs(position.y), fabs(position.z)};
     real moved = real_max(vector_norm1(vector_of(grid_u)), vector_norm1(vector_of(grid_v)));
     real size = real_max(vector_dot(p, vector_of(grid_u)) + (real)(grid_u.w),

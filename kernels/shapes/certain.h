@@ -1,6 +1,6 @@
 // Hits with proven bounds, for images at `certified`: each shape against the exact ray, which the packet's
 // ray only approximates, and against the exact shape, whose numbers were rounded. docs/numerics.md derives
-// every bound; constants are twice what it needs or more.
+// every bound; constants leave room beyond what it needs.
 //
 // The exact ray's point at t lies within origin_error + direction_error |d| t of the packet's. So a shape is
 // hit for certain where the packet's ray hits it shrunk by all errors, and missed where it misses it enlarged
@@ -78,15 +78,15 @@ static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
     return hit;
 }
 
-// A ball: with l the line's closest point to the center, r^2 - l^2 is half the chord squared.
+// A sphere: with l the line's closest point to the center, r^2 - l^2 is half the chord squared.
 typedef struct {
     mask active;
     mask certain, perhaps;       // the line crosses it
     real near_t, far_t, t_error; // its crossings
     real middle_t, middle_error; // the closest point
-} CertainBall;
+} CertainSphere;
 
-static inline CertainBall certain_ball(Vector center, real radius, const Ray *ray)
+static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray)
 {
     Vector f = vector_subtract(ray->origin, center);
     real distance = vector_norm1(f);
@@ -94,22 +94,23 @@ static inline CertainBall certain_ball(Vector center, real radius, const Ray *ra
                  (real)(UNIT_ROUNDOFF) *
                      ((real)(32) * distance + (real)(4) * vector_norm1(ray->origin) + (real)(16) * radius);
     real inverse_length = ray->inverse_length;
-    CertainBall ball;
-    ball.middle_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
-    Vector l = vector_fma(ray->direction, ball.middle_t, f);
+    CertainSphere crossed;
+    crossed.middle_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
+    Vector l = vector_fma(ray->direction, crossed.middle_t, f);
     real squared = real_fma(radius, radius, -vector_dot(l, l));
     real band = place * (radius + radius + place) * (real)(1 + 8 * UNIT_ROUNDOFF);
-    ball.active = RAY_ACTIVE(ray);
-    ball.certain = ball.active & (squared > band);
-    ball.perhaps = ball.active & !(squared < -band);
-    ball.middle_error = (real)(2) * place * inverse_length;
+    crossed.active = RAY_ACTIVE(ray);
+    crossed.certain = crossed.active & (squared > band);
+    crossed.perhaps = crossed.active & !(squared < -band);
+    crossed.middle_error = (real)(2) * place * inverse_length;
     real half_chord = real_sqrt(real_max(squared, (real)(0)));
     real root = real_sqrt(real_max(squared, band));
-    ball.t_error = inverse_length * real_fma((real)(2) * band, real_divide((real)(1), root), place + place) +
-                   (real)(16 * UNIT_ROUNDOFF) * inverse_length * half_chord;
-    ball.near_t = real_fma(-half_chord, inverse_length, ball.middle_t);
-    ball.far_t = real_fma(half_chord, inverse_length, ball.middle_t);
-    return ball;
+    crossed.t_error =
+        inverse_length * real_fma((real)(2) * band, real_divide((real)(1), root), place + place) +
+        (real)(16 * UNIT_ROUNDOFF) * inverse_length * half_chord;
+    crossed.near_t = real_fma(-half_chord, inverse_length, crossed.middle_t);
+    crossed.far_t = real_fma(half_chord, inverse_length, crossed.middle_t);
+    return crossed;
 }
 
 #endif

@@ -17,21 +17,23 @@
 
 static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
 {
-    CertainBall ball = certain_ball(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray);
-    if (!lanes_any(ball.perhaps)) return certain_miss();
-    real near_high = ball.near_t + ball.t_error, far_high = ball.far_t + ball.t_error;
-    CertainHit far = certain_crossing(ray, ball.certain, ball.perhaps, ball.far_t - ball.t_error, far_high);
+    CertainSphere crossed =
+        certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray);
+    if (!lanes_any(crossed.perhaps)) return certain_miss();
+    real near_high = crossed.near_t + crossed.t_error, far_high = crossed.far_t + crossed.t_error;
+    CertainHit far =
+        certain_crossing(ray, crossed.certain, crossed.perhaps, crossed.far_t - crossed.t_error, far_high);
     CertainHit hit = far;
     if (!(sphere->id.y & IGNORES_FRONT_FACES)) {
-        CertainHit near =
-            certain_crossing(ray, ball.certain, ball.perhaps, ball.near_t - ball.t_error, near_high);
+        CertainHit near = certain_crossing(ray, crossed.certain, crossed.perhaps,
+                                           crossed.near_t - crossed.t_error, near_high);
         hit = certain_first(ray, near, near_high, far);
     }
     mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
     if (lanes_any(left)) {
         // one crossing is the start; the other lies twice as far as the closest point
-        real t = (real)(2) * ball.middle_t, t_error = (real)(4) * ball.middle_error;
-        mask on = left & ball.active;
+        real t = (real)(2) * crossed.middle_t, t_error = (real)(4) * crossed.middle_error;
+        mask on = left & crossed.active;
         CertainHit other = certain_crossing(ray, on, on, t - t_error, t + t_error);
         hit = certain_select(left, other, hit);
         hit = certain_restrict(hit, !(left & ray->leaves_outward));
@@ -78,19 +80,19 @@ static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
     return certain_crossing(ray, lanes & crosses, lanes, low, high);
 }
 
-// Its ball is missed by most; else the crossing with its plane lies within the rim, or not.
+// Its bounding sphere is missed by most; else the crossing with its plane lies within the rim, or not.
 static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 {
     Vector center = vector_of(disc->center_radius);
     real radius = (real)(disc->center_radius.w);
-    CertainBall ball = certain_ball(center, radius, ray);
-    mask lanes = ball.perhaps & !ray_left_for_good(ray, disc->id.x, true);
+    CertainSphere bounding = certain_sphere(center, radius, ray);
+    mask lanes = bounding.perhaps & !ray_left_for_good(ray, disc->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
     mask crosses = certain_plane(disc_foot(disc), disc->normal, ray, &low, &high);
-    // nearly parallel to it: no nearer than the ball
-    low = lanes_select(crosses, low, real_max(low, ball.near_t - ball.t_error));
-    high = lanes_select(crosses, high, ball.far_t + ball.t_error);
+    // nearly parallel to it: no nearer than the sphere
+    low = lanes_select(crosses, low, real_max(low, bounding.near_t - bounding.t_error));
+    high = lanes_select(crosses, high, bounding.far_t + bounding.t_error);
     CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, low, high);
     Vector f = vector_subtract(ray->origin, center);
     Vector across = vector_fma(ray->direction, hit.t, f);
@@ -250,11 +252,11 @@ static inline mask box_edge_is_near(const Box *box, Vector position, Vector norm
 }
 
 // Shapes without bounds of their own yet: in doubt wherever a ray meets their bounding sphere.
-static inline CertainHit doubtful_ball(Vector center, real radius, const Ray *ray)
+static inline CertainHit doubtful_in_sphere(Vector center, real radius, const Ray *ray)
 {
-    CertainBall ball = certain_ball(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray);
-    return certain_crossing(ray, mask_none(), ball.perhaps, ball.near_t - ball.t_error,
-                            ball.far_t + ball.t_error);
+    CertainSphere bounding = certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray);
+    return certain_crossing(ray, mask_none(), bounding.perhaps, bounding.near_t - bounding.t_error,
+                            bounding.far_t + bounding.t_error);
 }
 
 static inline CertainHit doubtful_everywhere(const Ray *ray)
@@ -264,8 +266,8 @@ static inline CertainHit doubtful_everywhere(const Ray *ray)
 
 static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
 {
-    return doubtful_ball(vector_of(torus->center_major), (real)(torus->center_major.w + torus->axis_minor.w),
-                         ray);
+    return doubtful_in_sphere(vector_of(torus->center_major),
+                              (real)(torus->center_major.w + torus->axis_minor.w), ray);
 }
 
 static inline CertainHit revolution_certain_hit(const Revolution *shape, const Ray *ray)
@@ -276,7 +278,7 @@ static inline CertainHit revolution_certain_hit(const Revolution *shape, const R
     real half_height = (real)(0.5f * shape->range.x) * inverse;
     Vector middle =
         vector_fma(vector_of(shape->axis_slope), half_height * inverse, vector_of(shape->base_radius));
-    return doubtful_ball(middle, real_fma((real)(fmax(base, top)), inverse, half_height), ray);
+    return doubtful_in_sphere(middle, real_fma((real)(fmax(base, top)), inverse, half_height), ray);
 }
 
 static inline CertainHit cylinder_certain_hit(const Cylinder *cylinder, const Ray *ray)
