@@ -80,7 +80,7 @@ static void test_descriptions(void **state)
                                           "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
     const size_t triangles = scene.meshes.items[0].triangle_count;
     assert_described(&scene, 0, "sphere 0, a.yaml:5, material red");
-    assert_described(&scene, 3, "triangle 2 of mesh 1, bunny.obj, a.yaml:6, material DefaultMaterial");
+    assert_described(&scene, 3, "triangle 2 of mesh 1, bunny.obj, a.yaml:6");
     char plane[40];
     snprintf(plane, sizeof plane, "plane %zu, a.yaml:7", triangles + 1);
     assert_described(&scene, triangles + 1, plane);

@@ -174,23 +174,39 @@ bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_
     return true;
 }
 
+static const struct {
+    const char *start;
+    bool (*decode)(Image *image, const ImageFile *file);
+} decoders[] = {
+    {"\x89PNG", png_decode},   {"P2", ppm_decode},
+    {"P3", ppm_decode},        {"P5", ppm_decode},
+    {"P6", ppm_decode},        {"\x76\x2F\x31\x01", exr_decode},
+    {"\x93NUMPY", npy_decode}, {"\xFF\xD8\xFF", jpeg_decode},
+};
+
+static bool (*decoder_of(const void *bytes, size_t length))(Image *image, const ImageFile *file)
+{
+    for (size_t i = 0; i < sizeof decoders / sizeof *decoders; i++) {
+        const size_t start_length = strlen(decoders[i].start);
+        if (length >= start_length && memcmp(bytes, decoders[i].start, start_length) == 0)
+            return decoders[i].decode;
+    }
+    return NULL;
+}
+
 static bool image_decode(Image *image, const ImageFile *file)
 {
-    static const struct {
-        const char *start;
-        bool (*decode)(Image *image, const ImageFile *file);
-    } known[] = {
-        {"\x89PNG", png_decode},   {"P2", ppm_decode},
-        {"P3", ppm_decode},        {"P5", ppm_decode},
-        {"P6", ppm_decode},        {"\x76\x2F\x31\x01", exr_decode},
-        {"\x93NUMPY", npy_decode}, {"\xFF\xD8\xFF", jpeg_decode},
-    };
-    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
-        size_t length = strlen(known[i].start);
-        if (file->length >= length && memcmp(file->bytes, known[i].start, length) == 0)
-            return known[i].decode(image, file);
-    }
-    return image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
+    bool (*decode)(Image *, const ImageFile *) = decoder_of(file->bytes, file->length);
+    return decode ? decode(image, file) : image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
+}
+
+bool image_is_known(const char *path)
+{
+    char bytes[8];
+    FILE *file = fopen(path, "rbe");
+    const size_t length = file ? fread(bytes, 1, sizeof bytes, file) : 0;
+    if (file) fclose(file);
+    return decoder_of(bytes, length) != NULL;
 }
 
 bool image_read(Image *image, const char *path, MessageList *messages)

@@ -2,8 +2,11 @@
 
 #include <locale.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { NUMBER_LENGTH_MAX = 511 };
 
 const Range range_positive = {0, INFINITY, true, "greater than 0"};
 const Range range_not_negative = {0, INFINITY, false, "0 or more"};
@@ -12,50 +15,94 @@ const Range range_byte = {0, 255, false, "from 0 to 255"};
 const Range range_field_of_view = {0, 180, true, "greater than 0 and less than 180"};
 const Range range_pixels = {1, 65536, false, "from 1 to 65536"};
 
-static size_t digits_skip(const char *text, size_t length, size_t *at)
+static double decimal_by_library(const char *text, size_t length)
 {
-    size_t start = *at;
-    while (*at < length && text[*at] >= '0' && text[*at] <= '9')
-        ++*at;
-    return *at - start;
+    char copy[NUMBER_LENGTH_MAX + 1];
+    memcpy(copy, text, length);
+    copy[length] = '\0';
+    static locale_t c_locale;
+    if (!c_locale) c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    return strtod_l(copy, NULL, c_locale);
 }
 
-static void sign_skip(const char *text, size_t length, size_t *at)
+typedef struct {
+    uint64_t digits; // as one integer, modulo 2^64
+    size_t digit_count;
+    long exponent; // of ten
+} Decimal;
+
+static const char *digits_read(const char *at, const char *end, Decimal *decimal)
 {
-    if (*at < length && (text[*at] == '+' || text[*at] == '-')) ++*at;
+    for (; at < end && (unsigned char)(*at - '0') < 10; at++, decimal->digit_count++)
+        decimal->digits = 10 * decimal->digits + (uint64_t)(*at - '0');
+    return at;
 }
 
-static bool number_is_well_formed(const char *text, size_t length)
+// Skips `e` and an integer, if the text starts with them.
+static const char *exponent_read(const char *at, const char *end, Decimal *decimal)
 {
-    size_t at = 0;
-    sign_skip(text, length, &at);
-    size_t digit_count = digits_skip(text, length, &at);
-    if (at < length && text[at] == '.') {
-        at++;
-        digit_count += digits_skip(text, length, &at);
+    enum { EXPONENT_MAX = 100000 }; // any larger one is as good
+    const char *start = at;
+    if (at == end || (*at != 'e' && *at != 'E')) return at;
+    at++;
+    const bool is_negative = at < end && *at == '-';
+    if (at < end && (*at == '-' || *at == '+')) at++;
+    if (at == end || (unsigned char)(*at - '0') >= 10) return start;
+    long exponent = 0;
+    for (; at < end && (unsigned char)(*at - '0') < 10; at++)
+        exponent = exponent < EXPONENT_MAX ? 10 * exponent + (*at - '0') : exponent;
+    decimal->exponent += is_negative ? -exponent : exponent;
+    return at;
+}
+
+// An integer below 2^53 and a power of ten up to 10^22 are doubles, and the one product or quotient of them
+// is rounded once (Clinger, How to read floating point numbers accurately, PLDI 1990).
+static bool decimal_is_short(const Decimal *decimal)
+{
+    enum { DIGITS_MAX = 19 };
+    return decimal->digit_count <= DIGITS_MAX && decimal->digits <= (uint64_t)1 << 53 &&
+           labs(decimal->exponent) <= 22;
+}
+
+static double decimal_value(const Decimal *decimal)
+{
+    static const double powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
+                                    1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    const double digits = (double)decimal->digits;
+    return decimal->exponent < 0 ? digits / powers[-decimal->exponent] : digits * powers[decimal->exponent];
+}
+
+NumberStatus number_scan(const char **text, const char *end, double *value)
+{
+    Decimal decimal = {0};
+    const char *at = *text;
+    const bool is_negative = at < end && *at == '-';
+    if (at < end && (*at == '-' || *at == '+')) at++;
+    at = digits_read(at, end, &decimal);
+    if (at < end && *at == '.') {
+        const size_t whole_count = decimal.digit_count;
+        at = digits_read(at + 1, end, &decimal);
+        decimal.exponent = -(long)(decimal.digit_count - whole_count);
     }
-    if (!digit_count) return false;
-    if (at < length && (text[at] == 'e' || text[at] == 'E')) {
-        at++;
-        sign_skip(text, length, &at);
-        if (!digits_skip(text, length, &at)) return false;
-    }
-    return at == length;
+    if (decimal.digit_count == 0 || at - *text > NUMBER_LENGTH_MAX) return NUMBER_MALFORMED;
+    at = exponent_read(at, end, &decimal);
+    if (at - *text > NUMBER_LENGTH_MAX) return NUMBER_MALFORMED;
+    double read = decimal_is_short(&decimal) ? decimal_value(&decimal)
+                                             : fabs(decimal_by_library(*text, (size_t)(at - *text)));
+    *text = at;
+    if (read > NUMBER_MAX) return NUMBER_TOO_LARGE;
+    *value = read < NUMBER_MIN ? 0 : is_negative ? -read : read;
+    return NUMBER_READ;
 }
 
 NumberStatus number_read(const char *text, size_t length, double *value)
 {
-    char copy[512];
-    if (length >= sizeof copy || !number_is_well_formed(text, length)) return NUMBER_MALFORMED;
-    memcpy(copy, text, length);
-    copy[length] = '\0';
-
-    static locale_t c_locale;
-    if (!c_locale) c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    double read = strtod_l(copy, NULL, c_locale);
-    if (fabs(read) > NUMBER_MAX) return NUMBER_TOO_LARGE;
-    *value = fabs(read) < NUMBER_MIN ? 0 : read;
-    return NUMBER_READ;
+    const char *end = text + length;
+    double read;
+    const NumberStatus status = number_scan(&text, end, &read);
+    if (status == NUMBER_MALFORMED || text < end) return NUMBER_MALFORMED;
+    if (status == NUMBER_READ) *value = read;
+    return status;
 }
 
 static bool range_holds(const Range *range, double value)

@@ -11,9 +11,11 @@
 
 typedef enum { NUMBER_READ, NUMBER_MALFORMED, NUMBER_TOO_LARGE } NumberStatus;
 
-// Reads exactly `length` bytes: sign, digits with an optional point, exponent; nothing else (no hex, inf,
-// nan). `value` is set on NUMBER_READ only.
+// The nearest double. Reads exactly `length` bytes: sign, digits with an optional point, exponent; nothing
+// else (no hex, inf, nan). `value` is set on NUMBER_READ only.
 NumberStatus number_read(const char *text, size_t length, double *value);
+// The same for the longest number that starts at `*text`, which moves behind it unless it is malformed.
+NumberStatus number_scan(const char **text, const char *end, double *value);
 
 typedef struct {
     double low, high;

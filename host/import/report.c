@@ -1,4 +1,5 @@
 #include "host/import/report.h"
+#include "host/base/array.h"
 #include "host/base/fault.h"
 
 #include <stdarg.h>
@@ -56,10 +57,34 @@ static bool message_is_among(const Message *message, const MessageList *list, si
     for (size_t i = first; i < end; i++) {
         const Message *other = &list->items[i];
         if (other->line == message->line && other->column == message->column &&
-            !strcmp(other->text, message->text))
+            !strcmp(other->text, message->text) &&
+            !strcmp(other->file ? other->file : "", message->file ? message->file : ""))
             return true;
     }
     return false;
+}
+
+static void message_drop(Message message)
+{
+    free(message.file);
+    free(message.text);
+    free(message.source_line);
+}
+
+void report_include(Report *report, Report *included)
+{
+    report_close(included);
+    MessageList *from = included->messages, *to = &report->included;
+    for (size_t i = 0; i < from->count; i++) {
+        const Message *message = &from->items[i];
+        size_t *count = message->severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
+        if (message_is_among(message, to, 0, to->count) || (*count)++ >= MESSAGES_MAX)
+            message_drop(*message);
+        else
+            array_push(*to, *message);
+    }
+    free(from->items);
+    *from = (MessageList){0};
 }
 
 bool report_close(Report *report)
@@ -69,10 +94,7 @@ bool report_close(Report *report)
     for (size_t i = report->first; i < list->count; i++) {
         Message message = list->items[i];
         if (message_is_among(&message, list, report->first, kept)) {
-            // a repeat
-            free(message.file);
-            free(message.text);
-            free(message.source_line);
+            message_drop(message); // a repeat
             continue;
         }
         size_t place = kept++;
@@ -81,6 +103,7 @@ bool report_close(Report *report)
         list->items[place] = message;
     }
     list->count = kept;
+    message_list_move(list, &report->included);
     if (report_is_full(report))
         message_add(list, MESSAGE_ERROR, "%s: many errors: reading stopped", report->source->file);
     if (report->warning_count > MESSAGES_MAX)

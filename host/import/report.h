@@ -11,6 +11,7 @@ typedef struct {
     MessageList *messages;
     size_t first;                      // of this report in `messages`
     size_t error_count, warning_count; // including those beyond the limit
+    MessageList included;              // of other files that the source names
 } Report;
 
 Report report_open(const Source *source, MessageList *messages);
@@ -22,6 +23,10 @@ void report_warning(Report *report, size_t offset, const char *format, ...)
 
 // Whether the error limit is reached: a reader stops there, which bounds the time for a hostile file.
 bool report_is_full(const Report *report);
+
+// Closes the report of a file that the source names: its messages, which must be a list of their own, follow
+// those of the source and count as its.
+void report_include(Report *report, Report *included);
 
 // Sorts the messages into source order, drops repeats and adds a count of those beyond the limit. True if
 // there was no error.

@@ -29,6 +29,17 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
     return (uint32_t)(scene->materials.count - 1);
 }
 
+uint32_t scene_add_texture(Scene *scene, const char *path, size_t offset)
+{
+    size_t index = 0;
+    while (index < scene->textures.count && strcmp(scene->textures.items[index].path, path) != 0)
+        index++;
+    if (index == SCENE_TEXTURES_MAX) return 0;
+    if (index == scene->textures.count)
+        array_push(scene->textures, ((SceneTexture){memory_copy_text(path), offset}));
+    return (uint32_t)index + 1;
+}
+
 void scene_add_object(Scene *scene, Object object, const Material *material)
 {
     object.material = scene_add_material(scene, material, "");

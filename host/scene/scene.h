@@ -186,6 +186,13 @@ void scene_free(Scene *scene); // and zeroes
 // Returns the material's index.
 uint32_t scene_add_material(Scene *scene, const Material *material, const char *name);
 
+// Bounds the cost of a hostile file.
+enum { SCENE_TEXTURES_MAX = 1000 };
+
+// Returns what a material's `texture` is for the image; materials with the same image share it. 0: the scene
+// has too many.
+uint32_t scene_add_texture(Scene *scene, const char *path, size_t offset);
+
 // Adds an object with a material of its own.
 void scene_add_object(Scene *scene, Object object, const Material *material);
 

@@ -25,12 +25,13 @@ static void image_fuzz(const char *path, const Source *source, MessageList *mess
 static void mesh_fuzz(const char *path, const Source *source, MessageList *messages)
 {
     (void)source;
-    const MeshImport import = {.path = path, .transform.scale = {1, 1, 1}, .own_materials = true};
     const Source scene_source = {.file = "scene.yaml", .bytes = "", .length = 0};
     Report report = report_open(&scene_source, messages);
+    const MeshImport import = {
+        .path = path, .transform.scale = {1, 1, 1}, .own_materials = true, .report = &report};
     Scene scene = {0};
     uint32_t index;
-    mesh_import(&scene, &import, &report, 0, &index);
+    mesh_import(&scene, &import, &index);
     report_close(&report);
     scene_free(&scene);
 }

@@ -4,6 +4,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/import/mesh/mesh_import.h"
+#include "host/import/mesh/ply.h"
 
 #include <stdint.h>
 #include <stdio.h>

@@ -79,3 +79,6 @@ bool ply_fails(PlyReading *reading, const char *format, ...) __attribute__((form
 // Reads up to the first byte of the body. False with an error if there is no valid header.
 bool ply_header_read(PlyHeader *header, PlyReading *reading);
 void ply_header_free(PlyHeader *header);
+
+bool ply_rewrite(Text *clean, const char *path, char *fault, size_t size);
+bool gltf_find_fault(const char *path, char *fault, size_t size);

@@ -410,7 +410,7 @@ static bool file_rewrite(PlyRewriter *rewriter)
     return true;
 }
 
-bool ply_read(Text *clean, const char *path, char *fault, size_t size)
+bool ply_rewrite(Text *clean, const char *path, char *fault, size_t size)
 {
     MessageList messages = {0};
     Text file = {0};

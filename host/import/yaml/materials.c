@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Bounds the cost of wrong names and many textures in a hostile file.
-enum { NAMES_COMPARED = 1000, TEXTURES_MAX = 1000 };
+// Bounds the cost of wrong names in a hostile file.
+enum { NAMES_COMPARED = 1000 };
 
 typedef struct {
     Color colors[2];
@@ -49,28 +49,16 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     return path.items;
 }
 
-// Materials with the same texture share it.
 static bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    Scene *scene = reader->scene;
     char *path = yaml_read_path(reader, field->name, node);
     if (!path) return false;
-    size_t index = 0;
-    while (index < scene->textures.count && strcmp(scene->textures.items[index].path, path) != 0)
-        index++;
-    if (index == TEXTURES_MAX) {
-        report_error(&reader->report, node->offset, "more than %d textures", TEXTURES_MAX);
-        free(path);
-        return false;
-    }
-    if (index == scene->textures.count) {
-        SceneTexture texture = {path, node->offset};
-        array_push(scene->textures, texture);
-    } else {
-        free(path);
-    }
-    *(uint32_t *)target = (uint32_t)index + 1;
-    return true;
+    const uint32_t texture = scene_add_texture(reader->scene, path, node->offset);
+    free(path);
+    if (texture == 0)
+        report_error(&reader->report, node->offset, "more than %d textures", SCENE_TEXTURES_MAX);
+    *(uint32_t *)target = texture;
+    return texture > 0;
 }
 
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)

@@ -57,9 +57,12 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
         .transform = read.transform,
         .smoothing = smoothing,
         .own_materials = read.material == UINT32_MAX,
+        .options = reader->options,
+        .report = &reader->report,
+        .offset = read.file->offset,
     };
     Object object = {.kind = SHAPE_MESH, .material = read.material};
-    if (mesh_import(reader->scene, &import, &reader->report, read.file->offset, &object.as.mesh.index)) {
+    if (mesh_import(reader->scene, &import, &object.as.mesh.index)) {
         reader->scene->meshes.items[object.as.mesh.index].path = path;
         path = NULL;
         if (object.material == UINT32_MAX) object.material = material_default_index(reader);

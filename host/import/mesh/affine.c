@@ -1,0 +1,83 @@
+#include "host/import/mesh/affine.h"
+
+#include <string.h>
+
+Affine affine_multiply(const Affine *a, const Affine *b)
+{
+    Affine product;
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 4; column++) {
+            double sum = column == 3 ? a->rows[row][3] : 0;
+            for (int k = 0; k < 3; k++)
+                sum += a->rows[row][k] * b->rows[k][column];
+            product.rows[row][column] = sum;
+        }
+    }
+    return product;
+}
+
+Vector3 affine_direction(const Affine *affine, Vector3 v)
+{
+    const double(*m)[4] = affine->rows;
+    return (Vector3){m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z,
+                     m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+                     m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+}
+
+Vector3 affine_point(const Affine *affine, Vector3 p)
+{
+    Vector3 moved = affine_direction(affine, p);
+    return (Vector3){moved.x + affine->rows[0][3], moved.y + affine->rows[1][3],
+                     moved.z + affine->rows[2][3]};
+}
+
+static Vector3 affine_row(const Affine *affine, int row)
+{
+    const double *numbers = affine->rows[row];
+    return (Vector3){numbers[0], numbers[1], numbers[2]};
+}
+
+double affine_determinant(const Affine *affine)
+{
+    return vector_dot(affine_row(affine, 0), vector_cross(affine_row(affine, 1), affine_row(affine, 2)));
+}
+
+// Transforms normals: the transposed inverse times |determinant|, whose rows are cross products of rows.
+Affine affine_for_normals(const Affine *affine)
+{
+    double side = affine_determinant(affine) < 0 ? -1 : 1;
+    Affine cofactors = {0};
+    for (int row = 0; row < 3; row++) {
+        Vector3 cross = vector_scale(
+            vector_cross(affine_row(affine, (row + 1) % 3), affine_row(affine, (row + 2) % 3)), side);
+        memcpy(cofactors.rows[row], (const double[3]){cross.x, cross.y, cross.z}, 3 * sizeof(double));
+    }
+    return cofactors;
+}
+
+// Sine and cosine of degrees, exact at quarter turns.
+static void turn_of(double degrees, double *sine, double *cosine)
+{
+    int quarters;
+    double rest = remquo(degrees, 90, &quarters) * (M_PI / 180);
+    const double s = sin(rest), c = cos(rest);
+    const double turned[4] = {s, c, -s, -c};
+    *sine = turned[quarters & 3];
+    *cosine = turned[(quarters + 1) & 3];
+}
+
+Affine affine_of_transform(const MeshTransform *transform)
+{
+    double sx, cx, sy, cy, sz, cz;
+    turn_of(transform->rotate.x, &sx, &cx);
+    turn_of(transform->rotate.y, &sy, &cy);
+    turn_of(transform->rotate.z, &sz, &cz);
+    Vector3 move = transform->translate, scale = transform->scale;
+    const Affine scaled = {{{scale.x, 0, 0, 0}, {0, scale.y, 0, 0}, {0, 0, scale.z, 0}}};
+    const Affine about_x = {{{1, 0, 0, 0}, {0, cx, -sx, 0}, {0, sx, cx, 0}}};
+    const Affine about_y = {{{cy, 0, sy, 0}, {0, 1, 0, 0}, {-sy, 0, cy, 0}}};
+    const Affine about_z = {{{cz, -sz, 0, move.x}, {sz, cz, 0, move.y}, {0, 0, 1, move.z}}};
+    Affine turned = affine_multiply(&about_x, &scaled);
+    turned = affine_multiply(&about_y, &turned);
+    return affine_multiply(&about_z, &turned);
+}

@@ -1,0 +1,93 @@
+#include "host/import/mesh/draft.h"
+
+#include <stdarg.h>
+#include <stdlib.h>
+
+enum { POLYGON_MAX = 1 << 14 };
+
+const char *const draft_part_names[DRAFT_PART_COUNT] = {
+    [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
+
+static void draft_report(const MeshDraft *draft, bool is_error, const char *format, va_list arguments)
+{
+    char text[512];
+    vsnprintf(text, sizeof text, format, arguments);
+    const MeshImport *import = draft->import;
+    (is_error ? report_error : report_warning)(import->report, import->offset, "%s: %s", import->path, text);
+}
+
+bool draft_refuse(MeshDraft *draft, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    draft_report(draft, true, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+void draft_warn(MeshDraft *draft, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    draft_report(draft, false, format, arguments);
+    va_end(arguments);
+}
+
+bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (draft->is_binary) return draft_refuse(draft, "byte %zu: %s", offset, text);
+    report_error(&draft->report, offset, "%s", text);
+    return false;
+}
+
+size_t draft_part_count(const MeshDraft *draft, DraftPart part)
+{
+    return part == DRAFT_POSITION ? draft->positions.count
+           : part == DRAFT_UV     ? draft->uvs.count
+                                  : draft->normals.count;
+}
+
+void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset)
+{
+    if (index >= draft->needed[part].index) draft->needed[part] = (DraftPlace){index + 1, offset};
+}
+
+void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner)
+{
+    DraftIndices *indices = &draft->corners[part];
+    array_reserve(*indices, corner + 1);
+    for (; indices->count < corner; indices->count++)
+        indices->items[indices->count] = DRAFT_NONE;
+}
+
+bool draft_end_face(MeshDraft *draft, size_t offset)
+{
+    const size_t first = draft->face_start, count = draft->corners[DRAFT_POSITION].count - first;
+    if (count > POLYGON_MAX)
+        return draft_fails(draft, offset, "a face of %zu corners; %d is the most", count, POLYGON_MAX);
+    if (count < 3) {
+        for (int part = 0; part < DRAFT_PART_COUNT; part++)
+            if (draft->corners[part].count > first) draft->corners[part].count = first;
+        return true;
+    }
+    if (count > 3) array_push(draft->polygons, ((DraftPolygon){first, count}));
+    draft->face_start += count;
+    return true;
+}
+
+void draft_free(MeshDraft *draft)
+{
+    free(draft->positions.items);
+    free(draft->normals.items);
+    free(draft->uvs.items);
+    for (int part = 0; part < DRAFT_PART_COUNT; part++)
+        free(draft->corners[part].items);
+    free(draft->polygons.items);
+    free(draft->materials.items);
+    free(draft->unread.items);
+}

@@ -1,0 +1,105 @@
+// A mesh as its file has it, before it is placed in the world. Every reader of meshes fills a draft, which is
+// then checked, cut into triangles, transformed and made one Mesh.
+#pragma once
+
+#include "host/base/array.h"
+#include "host/import/mesh/mesh_import.h"
+
+// A corner without a normal or without texture coordinates.
+#define DRAFT_NONE UINT32_MAX
+
+typedef enum { DRAFT_POSITION, DRAFT_UV, DRAFT_NORMAL, DRAFT_PART_COUNT } DraftPart;
+
+typedef struct {
+    uint32_t *items;
+    size_t count, capacity;
+} DraftIndices;
+
+// From this corner on, triangles have this material.
+typedef struct {
+    size_t first_corner;
+    uint32_t material; // of the scene
+} DraftMaterialRun;
+
+// A face of more than three corners.
+typedef struct {
+    size_t first_corner, corner_count;
+} DraftPolygon;
+
+// An index, and where the file has it.
+typedef struct {
+    size_t index, offset;
+} DraftPlace;
+
+typedef struct {
+    const MeshImport *import;
+    Scene *scene;
+    Source source;  // the file
+    bool is_binary; // messages name bytes, not lines
+    Report report;  // of the file
+
+    struct {
+        Vector3 *items;
+        size_t count, capacity;
+    } positions, normals;
+    struct {
+        double (*items)[2];
+        size_t count, capacity;
+    } uvs;
+    // The corners of all faces: for each part one index, empty for a part that no corner has.
+    DraftIndices corners[DRAFT_PART_COUNT];
+    struct {
+        DraftPolygon *items;
+        size_t count, capacity;
+    } polygons; // all other corners are those of triangles
+    struct {
+        DraftMaterialRun *items;
+        size_t count, capacity;
+    } materials;
+    // The positions that are no numbers; they may stand in a file where no face uses them.
+    struct {
+        DraftPlace *items;
+        size_t count, capacity;
+    } unread;
+    DraftPlace
+        needed[DRAFT_PART_COUNT]; // the number of parts that corners name, where it is beyond those so far
+    size_t first_index;           // 0 or 1: how the file counts them
+    size_t face_start, crossed_count;
+} MeshDraft;
+
+extern const char *const draft_part_names[DRAFT_PART_COUNT];
+
+// Reports an error at an offset of the file; always false.
+bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+// An error or a warning of the file as a whole, at its name in the scene. The first is always false.
+bool draft_refuse(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void draft_warn(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+size_t draft_part_count(const MeshDraft *draft, DraftPart part);
+// Gives all corners from this one on a part, and those before none.
+void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
+void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
+
+// The index, whose place in the file is `offset`, of the next corner; one that the file has later is checked
+// at the end. Position first.
+static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t index, size_t offset)
+{
+    if (index >= draft_part_count(draft, part)) draft_note_index(draft, part, index, offset);
+    array_push(draft->corners[part], index);
+}
+
+// Ends the face at the corners since the last one: points and lines are skipped. False: too many corners.
+bool draft_end_face(MeshDraft *draft, size_t offset);
+
+// False with an error if a face has corners that are missing or no numbers, or if there are no triangles or
+// too many.
+bool draft_check(MeshDraft *draft);
+// A checked draft as a mesh in the world. Its arrays are used up.
+void draft_finish(MeshDraft *draft, Mesh *mesh);
+void draft_free(MeshDraft *draft);
+
+// The readers. False with an error.
+bool obj_read(MeshDraft *draft);
+// By assimp.
+bool foreign_read(MeshDraft *draft);

@@ -1,0 +1,333 @@
+// From a draft to a mesh: checked, its polygons cut into triangles, placed in the world, and for each
+// combination of position, normal and texture coordinates one vertex.
+#include "host/base/memory.h"
+#include "host/import/mesh/affine.h"
+#include "host/import/mesh/draft.h"
+#include "host/import/mesh/scan.h"
+#include "host/import/number.h"
+#include "host/scene/polygon.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { TRIANGLES_MAX = 1 << 28 };
+
+static bool is_in_range(Vector3 v)
+{
+    return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
+}
+
+static bool indices_are_sound(MeshDraft *draft)
+{
+    for (DraftPart part = 0; part < DRAFT_PART_COUNT; part++) {
+        const DraftPlace *needed = &draft->needed[part];
+        const size_t count = draft_part_count(draft, part);
+        if (needed->index > count)
+            return draft_fails(draft, needed->offset, "a face names %s %zu (from %zu); there are %zu",
+                               draft_part_names[part], needed->index - 1 + draft->first_index,
+                               draft->first_index, count);
+    }
+    return true;
+}
+
+static int places_compare(const void *a, const void *b)
+{
+    const DraftPlace *first = a, *second = b;
+    return (first->index > second->index) - (first->index < second->index);
+}
+
+static bool position_fails(MeshDraft *draft, uint32_t position)
+{
+    const DraftPlace wanted = {.index = position};
+    const DraftPlace *place =
+        bsearch(&wanted, draft->unread.items, draft->unread.count, sizeof wanted, places_compare);
+    if (!place)
+        return draft_refuse(draft, "vertex %zu (from %zu) is not finite or too large",
+                            position + draft->first_index, draft->first_index);
+    const Source *source = &draft->source;
+    Scan scan = {source->bytes + place->offset, source->bytes + source->length, source->bytes};
+    const Word word = scan_word(&scan);
+    if (word.length == 0) return draft_fails(draft, place->offset, "a coordinate of the vertex is missing");
+    return draft_fails(draft, place->offset, "'%.*s' is no coordinate: a number up to %g", word_shown(word),
+                       word.text, NUMBER_MAX);
+}
+
+// Vertices that no face has are not checked.
+static bool positions_are_sound(MeshDraft *draft)
+{
+    bool all = true;
+    for (size_t i = 0; i < draft->positions.count; i++)
+        all &= is_in_range(draft->positions.items[i]);
+    const DraftIndices *corners = &draft->corners[DRAFT_POSITION];
+    for (size_t i = 0; i < corners->count && !all; i++)
+        if (!is_in_range(draft->positions.items[corners->items[i]]))
+            return position_fails(draft, corners->items[i]);
+    return true;
+}
+
+// Texture coordinates that are no numbers become 0; normals, no normal.
+static void parts_mend(MeshDraft *draft)
+{
+    size_t uv_count = 0, normal_count = 0;
+    for (size_t i = 0; i < draft->uvs.count; i++) {
+        double *uv = draft->uvs.items[i];
+        if (is_in_range((Vector3){uv[0], uv[1], 0})) continue;
+        uv[0] = uv[1] = 0;
+        uv_count++;
+    }
+    for (size_t i = 0; i < draft->normals.count; i++) {
+        if (is_in_range(draft->normals.items[i])) continue;
+        draft->normals.items[i] = (Vector3){0, 0, 0};
+        normal_count++;
+    }
+    if (uv_count > 0)
+        draft_warn(draft, "texture coordinates that are not finite or too large, read as 0: %zu", uv_count);
+    if (normal_count > 0)
+        draft_warn(draft, "normals that are not finite or too large, not used: %zu", normal_count);
+}
+
+// The corners of triangles alone.
+typedef struct {
+    MeshDraft *draft;
+    DraftIndices corners[DRAFT_PART_COUNT];
+    size_t run; // of materials, that comes next
+    struct {
+        Vector3 *items;
+        size_t count, capacity;
+    } polygon;
+    PolygonTriangles cut;
+} Cutter;
+
+static void corner_copy(Cutter *cutter, size_t corner)
+{
+    for (int part = 0; part < DRAFT_PART_COUNT; part++)
+        if (cutter->draft->corners[part].count > 0)
+            array_push(cutter->corners[part], cutter->draft->corners[part].items[corner]);
+}
+
+// Copies the corners of triangles, from one up to another, behind which no polygon's corners are: the runs
+// of materials that begin there move as far.
+static void triangles_copy(Cutter *cutter, size_t first, size_t end)
+{
+    const size_t shift = cutter->corners[DRAFT_POSITION].count - first;
+    for (; cutter->run < cutter->draft->materials.count; cutter->run++) {
+        DraftMaterialRun *run = &cutter->draft->materials.items[cutter->run];
+        if (run->first_corner > end) break;
+        run->first_corner += shift;
+    }
+    for (int part = 0; part < DRAFT_PART_COUNT && end > first; part++) {
+        const DraftIndices *from = &cutter->draft->corners[part];
+        DraftIndices *to = &cutter->corners[part];
+        if (from->count == 0) continue;
+        array_reserve(*to, end - first);
+        memcpy(to->items + to->count, from->items + first, (end - first) * sizeof *from->items);
+        to->count += end - first;
+    }
+}
+
+// Triangulated from the second corner, so that a convex quadrilateral is cut as a fan cuts it: by the
+// diagonal from the first. A polygon without area becomes a fan.
+static void polygon_cut(Cutter *cutter, size_t first, size_t count)
+{
+    const MeshDraft *draft = cutter->draft;
+    cutter->polygon.count = 0;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t position = draft->corners[DRAFT_POSITION].items[first + (i + 1) % count];
+        array_push(cutter->polygon, draft->positions.items[position]);
+    }
+    const PolygonStatus status = polygon_triangulate(cutter->polygon.items, count, &cutter->cut);
+    cutter->draft->crossed_count += status == POLYGON_CROSSED;
+    for (size_t i = 0; i + 2 < count && status == POLYGON_WITHOUT_AREA; i++) {
+        corner_copy(cutter, first);
+        corner_copy(cutter, first + i + 1);
+        corner_copy(cutter, first + i + 2);
+    }
+    for (size_t i = 0; i < cutter->cut.count; i++)
+        for (int k = 0; k < 3; k++)
+            corner_copy(cutter, first + (cutter->cut.items[i][k] + 1) % count);
+}
+
+static void polygons_cut(MeshDraft *draft)
+{
+    if (draft->polygons.count == 0) return;
+    Cutter cutter = {.draft = draft};
+    size_t at = 0;
+    for (size_t i = 0; i < draft->polygons.count; i++) {
+        const DraftPolygon *polygon = &draft->polygons.items[i];
+        triangles_copy(&cutter, at, polygon->first_corner);
+        polygon_cut(&cutter, polygon->first_corner, polygon->corner_count);
+        at = polygon->first_corner + polygon->corner_count;
+    }
+    triangles_copy(&cutter, at, draft->corners[DRAFT_POSITION].count);
+    for (int part = 0; part < DRAFT_PART_COUNT; part++) {
+        free(draft->corners[part].items);
+        draft->corners[part] = cutter.corners[part];
+    }
+    free(cutter.polygon.items);
+    free(cutter.cut.items);
+}
+
+// Tested before the transform, whose rounding could give a degenerate triangle an area.
+static bool triangle_has_area(const MeshDraft *draft, const uint32_t *corners)
+{
+    const Vector3 *positions = draft->positions.items;
+    const Vector3 a = positions[corners[0]];
+    return !vector_is_zero(
+        vector_cross(vector_subtract(positions[corners[1]], a), vector_subtract(positions[corners[2]], a)));
+}
+
+// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side. Degenerate
+// triangles collapse to a point, which no ray hits.
+static void triangles_orient(MeshDraft *draft, bool mirrored)
+{
+    const DraftIndices *positions = &draft->corners[DRAFT_POSITION];
+    for (size_t i = 0; i < positions->count; i += 3) {
+        const bool has_area = triangle_has_area(draft, positions->items + i);
+        for (int part = 0; part < DRAFT_PART_COUNT && (mirrored || !has_area); part++) {
+            if (draft->corners[part].count == 0) continue;
+            uint32_t *corners = draft->corners[part].items + i;
+            const uint32_t second = has_area ? corners[2] : corners[0],
+                           third = has_area ? corners[1] : corners[0];
+            corners[1] = second;
+            corners[2] = third;
+        }
+    }
+}
+
+static void vectors_transform(MeshDraft *draft, const Affine *affine)
+{
+    const Affine for_normals = affine_for_normals(affine);
+    for (size_t i = 0; i < draft->positions.count; i++)
+        draft->positions.items[i] = affine_point(affine, draft->positions.items[i]);
+    for (size_t i = 0; i < draft->normals.count; i++) {
+        const Vector3 normal = vector_normalize(affine_direction(&for_normals, draft->normals.items[i]));
+        draft->normals.items[i] = is_in_range(normal) ? normal : (Vector3){0, 0, 0};
+    }
+}
+
+// A vertex of the mesh among those of one position.
+typedef struct {
+    uint32_t uv, normal, next;
+} Combination;
+
+typedef struct {
+    MeshDraft *draft;
+    uint32_t *first; // of each position, DRAFT_NONE: not yet
+    struct {
+        Combination *items;
+        size_t count, capacity;
+    } combinations;
+    size_t capacity;
+    Mesh *mesh;
+} Combiner;
+
+static uint32_t part_of_corner(const MeshDraft *draft, DraftPart part, size_t corner)
+{
+    return draft->corners[part].count > 0 ? draft->corners[part].items[corner] : DRAFT_NONE;
+}
+
+static uint32_t combination_add(Combiner *combiner, uint32_t position, Combination added)
+{
+    const MeshDraft *draft = combiner->draft;
+    Mesh *mesh = combiner->mesh;
+    const uint32_t index = (uint32_t)combiner->combinations.count;
+    array_push(combiner->combinations, added);
+    if (combiner->capacity < combiner->combinations.capacity) {
+        combiner->capacity = combiner->combinations.capacity;
+        mesh->vertices = memory_resize(mesh->vertices, combiner->capacity, sizeof *mesh->vertices);
+        if (draft->corners[DRAFT_NORMAL].count > 0)
+            mesh->normals = memory_resize(mesh->normals, combiner->capacity, sizeof *mesh->normals);
+        if (draft->corners[DRAFT_UV].count > 0)
+            mesh->uvs = memory_resize(mesh->uvs, combiner->capacity, sizeof *mesh->uvs);
+    }
+    mesh->vertices[index] = draft->positions.items[position];
+    if (mesh->normals)
+        mesh->normals[index] =
+            added.normal == DRAFT_NONE ? (Vector3){0, 0, 0} : draft->normals.items[added.normal];
+    static const double no_uv[2] = {0, 0};
+    if (mesh->uvs)
+        memcpy(mesh->uvs[index], added.uv == DRAFT_NONE ? no_uv : draft->uvs.items[added.uv], sizeof no_uv);
+    return index;
+}
+
+// A position may have many combinations in a hostile file: only the latest are compared, mesh_join_vertices
+// finds the rest.
+static uint32_t vertex_of_corner(Combiner *combiner, size_t corner)
+{
+    enum { COMPARED_MAX = 64 };
+    const MeshDraft *draft = combiner->draft;
+    const uint32_t position = draft->corners[DRAFT_POSITION].items[corner];
+    Combination wanted = {part_of_corner(draft, DRAFT_UV, corner),
+                          part_of_corner(draft, DRAFT_NORMAL, corner), combiner->first[position]};
+    uint32_t at = wanted.next;
+    for (int compared = 0; at != DRAFT_NONE && compared < COMPARED_MAX; compared++) {
+        const Combination *known = &combiner->combinations.items[at];
+        if (known->uv == wanted.uv && known->normal == wanted.normal) return at;
+        at = known->next;
+    }
+    return combiner->first[position] = combination_add(combiner, position, wanted);
+}
+
+// Corners that have positions alone are taken over as they are.
+static void corners_combine(MeshDraft *draft, Mesh *mesh)
+{
+    DraftIndices *corners = &draft->corners[DRAFT_POSITION];
+    mesh->triangle_count = corners->count / 3;
+    if (draft->corners[DRAFT_UV].count == 0 && draft->corners[DRAFT_NORMAL].count == 0) {
+        mesh->vertices = draft->positions.items;
+        mesh->vertex_count = draft->positions.count;
+        draft->positions.items = NULL;
+    } else {
+        Combiner combiner = {.draft = draft, .mesh = mesh};
+        combiner.first = memory_allocate(draft->positions.count, sizeof *combiner.first);
+        memset(combiner.first, 0xff, draft->positions.count * sizeof *combiner.first);
+        for (size_t i = 0; i < corners->count; i++)
+            corners->items[i] = vertex_of_corner(&combiner, i);
+        mesh->vertex_count = combiner.combinations.count;
+        free(combiner.first);
+        free(combiner.combinations.items);
+    }
+    mesh->triangles = memory_resize(corners->items, mesh->triangle_count, sizeof *mesh->triangles);
+    corners->items = NULL;
+}
+
+static void materials_expand(const MeshDraft *draft, Mesh *mesh)
+{
+    if (draft->materials.count == 0) return;
+    mesh->materials = memory_allocate(mesh->triangle_count, sizeof *mesh->materials);
+    for (size_t i = 0; i < draft->materials.count; i++) {
+        const size_t end = i + 1 < draft->materials.count ? draft->materials.items[i + 1].first_corner / 3
+                                                          : mesh->triangle_count;
+        for (size_t k = draft->materials.items[i].first_corner / 3; k < end; k++)
+            mesh->materials[k] = draft->materials.items[i].material;
+    }
+}
+
+static bool triangles_fit(MeshDraft *draft)
+{
+    size_t corner_count = draft->corners[DRAFT_POSITION].count;
+    for (size_t i = 0; i < draft->polygons.count; i++)
+        corner_count +=
+            2 * draft->polygons.items[i].corner_count - 6; // n - 2 triangles in place of n corners
+    if (corner_count == 0) return draft_refuse(draft, "no triangles");
+    return corner_count / 3 <= TRIANGLES_MAX ||
+           draft_refuse(draft, "%zu triangles, more than %d", corner_count / 3, TRIANGLES_MAX);
+}
+
+bool draft_check(MeshDraft *draft)
+{
+    if (draft->import->smoothing == SMOOTH_NEVER) draft->corners[DRAFT_NORMAL].count = 0;
+    return indices_are_sound(draft) && positions_are_sound(draft) && triangles_fit(draft);
+}
+
+void draft_finish(MeshDraft *draft, Mesh *mesh)
+{
+    *mesh = (Mesh){0};
+    parts_mend(draft);
+    polygons_cut(draft);
+    const Affine affine = affine_of_transform(&draft->import->transform);
+    triangles_orient(draft, affine_determinant(&affine) < 0);
+    vectors_transform(draft, &affine);
+    corners_combine(draft, mesh);
+    materials_expand(draft, mesh);
+}

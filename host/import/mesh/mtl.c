@@ -1,0 +1,354 @@
+// Wavefront MTL (Alias|Wavefront, Advanced Visualizer manual, MTL material format, 1995), as far as materials
+// of scenes have it: docs/scene-format.md.
+#include "host/import/mesh/mtl.h"
+#include "host/base/memory.h"
+#include "host/image/image.h"
+#include "host/import/mesh/scan.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef struct {
+    char *name;
+    Material material;
+    char *image;          // of map_Kd, or NULL
+    uint32_t scene_index; // DRAFT_NONE: not in the scene yet
+} MtlMaterial;
+
+typedef struct {
+    MeshDraft *draft;
+    struct {
+        MtlMaterial *items;
+        size_t count, capacity;
+    } materials;
+    // of the current file
+    const char *path;
+    Report report;
+    Scan scan;
+    UnusedWords unused;
+} MtlReader;
+
+// Relative to the folder of the file that names it.
+static char *path_of(const char *from, const char *name, size_t length)
+{
+    const char *slash = strrchr(from, '/');
+    Text path = {0};
+    if (slash && !(length > 0 && *name == '/')) text_append(&path, from, (size_t)(slash + 1 - from));
+    const size_t start = path.count;
+    text_append(&path, name, length);
+    for (size_t i = start; i < path.count; i++)
+        if (path.items[i] == '\\') path.items[i] = '/';
+    return path.items;
+}
+
+static MtlMaterial *material_of(MtlReader *reader)
+{
+    return reader->materials.count > 0 ? &reader->materials.items[reader->materials.count - 1] : NULL;
+}
+
+static void name_read(MtlReader *reader, MtlMaterial *previous)
+{
+    (void)previous;
+    const Word name = scan_rest(&reader->scan);
+    MtlMaterial material = {.name = memory_allocate(name.length + 1, 1),
+                            .material = material_default(),
+                            .scene_index = DRAFT_NONE};
+    memcpy(material.name, name.text, name.length);
+    material.name[name.length] = '\0';
+    material.material.ior = 1;
+    array_push(reader->materials, material);
+}
+
+// False with a warning where it is no number.
+static bool number_of_line(MtlReader *reader, double *value)
+{
+    double number;
+    scan_more(&reader->scan);
+    const NumberStatus status = scan_number(&reader->scan, &number);
+    if (status == NUMBER_READ)
+        *value = number;
+    else
+        report_warning(&reader->report, (size_t)(reader->scan.at - reader->scan.start),
+                       "no number up to %g: the default is used", NUMBER_MAX);
+    return status == NUMBER_READ;
+}
+
+// One number stands for three.
+static bool color_of_line(MtlReader *reader, Color *color)
+{
+    double numbers[3];
+    int count = 0;
+    do
+        if (!number_of_line(reader, &numbers[count])) return false;
+    while (++count < 3 && scan_more(&reader->scan));
+    if (count == 1) numbers[1] = numbers[0];
+    if (count < 3) numbers[2] = numbers[1];
+    *color = (Color){fmax(numbers[0], 0), fmax(numbers[1], 0), fmax(numbers[2], 0)};
+    return true;
+}
+
+static void diffuse_read(MtlReader *reader, MtlMaterial *material)
+{
+    color_of_line(reader, &material->material.color);
+}
+
+// Highlights have the light's color; only the strength of the file's specular color is kept.
+static void specular_read(MtlReader *reader, MtlMaterial *material)
+{
+    Color color;
+    if (color_of_line(reader, &color)) material->material.specular = (color.x + color.y + color.z) / 3;
+}
+
+static void shininess_read(MtlReader *reader, MtlMaterial *material)
+{
+    double number;
+    if (number_of_line(reader, &number)) material->material.shininess = fmax(number, 0);
+}
+
+static void ior_read(MtlReader *reader, MtlMaterial *material)
+{
+    double number;
+    if (number_of_line(reader, &number) && number > 0) material->material.ior = number;
+}
+
+static void transparency_read(MtlReader *reader, MtlMaterial *material)
+{
+    double number;
+    if (number_of_line(reader, &number)) material->material.transmission = fmin(fmax(number, 0), 1);
+}
+
+static void dissolve_read(MtlReader *reader, MtlMaterial *material)
+{
+    Scan ahead = reader->scan;
+    if (word_is(scan_word(&ahead), "-halo")) reader->scan = ahead;
+    double number;
+    if (number_of_line(reader, &number)) material->material.transmission = 1 - fmin(fmax(number, 0), 1);
+}
+
+// An option of a texture starts with `-`; up to three numbers or one word are its own.
+static bool texture_option_skip(Scan *scan)
+{
+    Scan ahead = *scan;
+    const Word word = scan_word(&ahead);
+    double number;
+    if (word.length < 2 || word.text[0] != '-') return false;
+    *scan = ahead;
+    int count = 0;
+    while (count < 3 && scan_more(scan) && scan_number(scan, &number) == NUMBER_READ)
+        count++;
+    if (count == 0) scan_word(scan);
+    return true;
+}
+
+static void texture_read(MtlReader *reader, MtlMaterial *material)
+{
+    scan_more(&reader->scan);
+    const size_t offset = (size_t)(reader->scan.at - reader->scan.start);
+    bool has_options = false;
+    while (texture_option_skip(&reader->scan))
+        has_options = true;
+    if (has_options) report_warning(&reader->report, offset, "options of textures are not used");
+    const Word name = scan_rest(&reader->scan);
+    char *path = path_of(reader->path, name.text, name.length);
+    const SceneOptions *options = reader->draft->import->options;
+    if (options && options->file_named) options->file_named(options->context, path);
+    free(material->image);
+    material->image = NULL;
+    if (access(path, R_OK) != 0)
+        report_warning(&reader->report, name.offset, "cannot read '%s': %s: the color is used", path,
+                       strerror(errno));
+    else if (!image_is_known(path))
+        report_warning(&reader->report, name.offset, "'%s' is no PNG, JPEG, PPM or EXR: the color is used",
+                       path);
+    else
+        material->image = memory_copy_text(path);
+    free(path);
+}
+
+// What a material mostly has where it says nothing by it: no light of its own, no filter.
+static void neutral_read(MtlReader *reader, Word word, double neutral)
+{
+    double numbers[3] = {neutral, neutral, neutral};
+    for (int i = 0; i < 3 && scan_more(&reader->scan); i++)
+        if (scan_number(&reader->scan, &numbers[i]) != NUMBER_READ) numbers[i] = NAN;
+    if (numbers[0] != neutral || numbers[1] != neutral || numbers[2] != neutral)
+        unused_note(&reader->unused, &reader->report, word, "is not used");
+}
+
+static void nothing_read(MtlReader *reader, MtlMaterial *material)
+{
+    (void)reader;
+    (void)material;
+}
+
+static const struct {
+    const char *word;
+    void (*read)(MtlReader *reader, MtlMaterial *material);
+} statements[] = {
+    {"newmtl", name_read}, {"Kd", diffuse_read},      {"Ks", specular_read}, {"Ns", shininess_read},
+    {"Ni", ior_read},      {"Tr", transparency_read}, {"d", dissolve_read},  {"map_Kd", texture_read},
+    {"Ka", nothing_read},  {"illum", nothing_read},
+};
+
+static void line_read(MtlReader *reader)
+{
+    const Word word = scan_word(&reader->scan);
+    MtlMaterial *material = material_of(reader);
+    if (word.length == 0) return;
+    for (size_t i = 0; i < sizeof statements / sizeof *statements; i++) {
+        if (!word_is(word, statements[i].word)) continue;
+        if (i > 0 && !material)
+            report_warning(&reader->report, word.offset, "a line before the first newmtl is not used");
+        else
+            statements[i].read(reader, material);
+        return;
+    }
+    if (word_is(word, "Ke"))
+        neutral_read(reader, word, 0);
+    else if (word_is(word, "Tf"))
+        neutral_read(reader, word, 1);
+    else
+        unused_note(&reader->unused, &reader->report, word, "is not used");
+}
+
+static bool library_read(MtlReader *reader, const char *path)
+{
+    const SceneOptions *options = reader->draft->import->options;
+    if (options && options->file_named) options->file_named(options->context, path);
+    Text text = {0};
+    MessageList ignored = {0}, messages = {0};
+    const bool is_there = access(path, R_OK) == 0 && text_read_file(&text, path, &ignored);
+    if (is_there) {
+        const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+        reader->path = path;
+        reader->report = report_open(&source, &messages);
+        reader->scan = (Scan){source.bytes, source.bytes + source.length, source.bytes};
+        reader->unused.count = 0;
+        if (scan_is_text(&reader->scan, &reader->report)) {
+            do
+                line_read(reader);
+            while (scan_line(&reader->scan));
+        }
+        report_include(reader->draft->import->report, &reader->report);
+    }
+    message_list_free(&ignored);
+    text_free(&text);
+    return is_there;
+}
+
+// The name may have blanks, or be several names.
+static bool libraries_of_line_read(MtlReader *reader, Word line)
+{
+    const char *obj_path = reader->draft->import->path;
+    char *path = path_of(obj_path, line.text, line.length);
+    bool read = library_read(reader, path);
+    free(path);
+    if (read || !memchr(line.text, ' ', line.length)) return read;
+    Scan scan = {line.text, line.text + line.length, line.text};
+    for (Word word = scan_word(&scan); word.length > 0 && word.text < scan.end; word = scan_word(&scan)) {
+        path = path_of(obj_path, word.text, word.length);
+        read = library_read(reader, path);
+        free(path);
+        if (!read) return false;
+    }
+    return true;
+}
+
+// The file of the OBJ file's own name stands in for one that is missing.
+static bool fallback_read(MtlReader *reader)
+{
+    const char *obj_path = reader->draft->import->path;
+    Text path = {0};
+    text_append(&path, obj_path, strlen(obj_path) - strlen("obj"));
+    text_appendf(&path, "mtl");
+    const bool read = library_read(reader, text_c(&path));
+    text_free(&path);
+    return read;
+}
+
+static bool libraries_read(MtlReader *reader, const ObjMaterials *materials)
+{
+    for (size_t i = 0; i < materials->libraries.count; i++) {
+        const Word name = materials->libraries.items[i];
+        if (libraries_of_line_read(reader, name) || fallback_read(reader)) continue;
+        report_warning(&reader->draft->report, name.offset,
+                       "the material file '%.*s' cannot be read: the default material is used",
+                       word_shown(name), name.text);
+        return false;
+    }
+    return true;
+}
+
+static int materials_compare(const void *a, const void *b)
+{
+    return strcmp(((const MtlMaterial *)a)->name, ((const MtlMaterial *)b)->name);
+}
+
+static int name_compare(const void *name, const void *material)
+{
+    const Word *word = name;
+    const MtlMaterial *other = material;
+    const int order = strncmp(word->text, other->name, word->length);
+    return order != 0 ? order : other->name[word->length] == '\0' ? 0 : -1;
+}
+
+// The image times the diffuse color is what a surface has by MTL.
+static void texture_use(MeshDraft *draft, MtlMaterial *material)
+{
+    if (!material->image) return;
+    if (draft->corners[DRAFT_UV].count == 0) {
+        draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", material->image,
+                   material->name);
+        return;
+    }
+    const uint32_t texture = scene_add_texture(draft->scene, material->image, draft->import->offset);
+    if (texture == 0) {
+        draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
+                   material->name);
+        return;
+    }
+    Material *look = &material->material;
+    look->texture = texture;
+    look->diffuse = look->color;
+    look->ambient = (look->color.x + look->color.y + look->color.z) / 3;
+}
+
+static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)
+{
+    if (material->scene_index == DRAFT_NONE) {
+        texture_use(draft, material);
+        material->scene_index = scene_add_material(draft->scene, &material->material, material->name);
+    }
+    return material->scene_index;
+}
+
+void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
+{
+    MtlReader reader = {.draft = draft};
+    const bool all_read = libraries_read(&reader, materials);
+    if (reader.materials.count > 0)
+        qsort(reader.materials.items, reader.materials.count, sizeof(MtlMaterial), materials_compare);
+    MtlMaterial otherwise = {.name = "", .material = material_default(), .scene_index = DRAFT_NONE};
+    if (materials->used.count > 0 && materials->used.items[0].first_corner > 0)
+        array_push(draft->materials, ((DraftMaterialRun){0, material_use(draft, &otherwise)}));
+    UnusedWords unknown = {0};
+    for (size_t i = 0; i < materials->used.count; i++) {
+        const ObjMaterial *used = &materials->used.items[i];
+        MtlMaterial *material = reader.materials.count > 0
+                                    ? bsearch(&used->name, reader.materials.items, reader.materials.count,
+                                              sizeof(MtlMaterial), name_compare)
+                                    : NULL;
+        if (!material && all_read)
+            unused_note(&unknown, &draft->report, used->name, "is in no material file: the default is used");
+        array_push(
+            draft->materials,
+            ((DraftMaterialRun){used->first_corner, material_use(draft, material ? material : &otherwise)}));
+    }
+    for (size_t i = 0; i < reader.materials.count; i++) {
+        free(reader.materials.items[i].name);
+        free(reader.materials.items[i].image);
+    }
+    free(reader.materials.items);
+}

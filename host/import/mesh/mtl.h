@@ -1,0 +1,25 @@
+// The materials that an OBJ file names, from its MTL files.
+#pragma once
+
+#include "host/import/line.h"
+#include "host/import/mesh/draft.h"
+
+// `usemtl`: from this corner on.
+typedef struct {
+    Word name;
+    size_t first_corner;
+} ObjMaterial;
+
+typedef struct {
+    struct {
+        ObjMaterial *items;
+        size_t count, capacity;
+    } used;
+    struct {
+        Word *items;
+        size_t count, capacity;
+    } libraries; // `mtllib`
+} ObjMaterials;
+
+// Adds the materials to the scene and to the draft, with warnings for what is missing or cannot be used.
+void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials);

@@ -1,0 +1,190 @@
+// Wavefront OBJ (Alias|Wavefront, Advanced Visualizer manual, appendix B, 1995): polygons, and the materials
+// of its MTL files.
+#include "host/import/mesh/draft.h"
+#include "host/import/mesh/mtl.h"
+#include "host/import/mesh/scan.h"
+
+#include <stdlib.h>
+
+typedef struct {
+    MeshDraft *draft;
+    Scan scan;
+    UnusedWords unused;
+    bool has_colors;
+    ObjMaterials materials;
+} ObjReader;
+
+static size_t offset_of(const ObjReader *reader)
+{
+    return (size_t)(reader->scan.at - reader->scan.start);
+}
+
+// Numbers up to the first word that is none. Whether that is the line's end.
+static bool numbers_read(ObjReader *reader, double *numbers, int most, int *count)
+{
+    for (*count = 0; scan_more(&reader->scan); ++*count)
+        if (*count == most || scan_number(&reader->scan, &numbers[*count]) != NUMBER_READ) return false;
+    return true;
+}
+
+// A fourth number is homogeneous, more are a color.
+static bool position_read(ObjReader *reader)
+{
+    MeshDraft *draft = reader->draft;
+    double numbers[4] = {0};
+    int count;
+    const bool at_end = numbers_read(reader, numbers, 4, &count);
+    const size_t offset = offset_of(reader);
+    Vector3 position = {numbers[0], numbers[1], numbers[2]};
+    if (count < 3) {
+        position = vector_all(NAN);
+        array_push(draft->unread, ((DraftPlace){draft->positions.count, offset}));
+    } else if (count == 4 && at_end) {
+        if (numbers[3] == 0) return draft_fails(draft, offset, "the fourth number of a vertex is 0");
+        position = (Vector3){position.x / numbers[3], position.y / numbers[3], position.z / numbers[3]};
+    } else if (count == 4 && !reader->has_colors) {
+        report_warning(&draft->report, offset, "colors of vertices are not used");
+        reader->has_colors = true;
+    }
+    if (draft->positions.count == DRAFT_NONE - 1) return draft_fails(draft, offset, "too many vertices");
+    array_push(draft->positions, position);
+    return true;
+}
+
+static bool uv_read(ObjReader *reader)
+{
+    double numbers[3] = {NAN, 0, 0};
+    int count;
+    if (!numbers_read(reader, numbers, 3, &count) && count < 2) numbers[count] = NAN;
+    array_reserve(reader->draft->uvs, 1);
+    memcpy(reader->draft->uvs.items[reader->draft->uvs.count++], numbers, sizeof(double[2]));
+    return true;
+}
+
+static bool normal_read(ObjReader *reader)
+{
+    double numbers[3] = {0};
+    int count;
+    numbers_read(reader, numbers, 3, &count);
+    const Vector3 normal = {numbers[0], numbers[1], numbers[2]};
+    array_push(reader->draft->normals, count == 3 ? normal : vector_all(NAN));
+    return true;
+}
+
+static bool corner_fails(ObjReader *reader, const char *start)
+{
+    reader->scan.at = start;
+    const Word word = scan_word(&reader->scan);
+    return draft_fails(reader->draft, word.offset, "'%.*s' is no corner of a face", word_shown(word),
+                       word.text);
+}
+
+// The next index, of a vertex or behind a slash: from 1, or below 0 back from the last one so far.
+static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
+{
+    enum { DIGITS_MAX = 10 };
+    const char *at = reader->scan.at, *start = at;
+    const bool is_negative = *at == '-';
+    if (*at == '-' || *at == '+') at++;
+    const char *first = at;
+    int64_t index = 0;
+    for (; (unsigned char)(*at - '0') < 10 && at - first < DIGITS_MAX; at++)
+        index = 10 * index + (*at - '0');
+    if (at == first || (unsigned char)(*at - '0') < 10) return corner_fails(reader, corner);
+    reader->scan.at = at;
+    const size_t offset = (size_t)(start - reader->scan.start);
+    const int64_t count = (int64_t)draft_part_count(reader->draft, part);
+    const int64_t from_0 = is_negative ? count - index : index - 1;
+    if (from_0 < 0 || from_0 >= DRAFT_NONE || (is_negative && index == 0))
+        return draft_fails(reader->draft, offset, "a face names %s %s%lld; there are %lld before it",
+                           draft_part_names[part], is_negative ? "-" : "", (long long)index,
+                           (long long)count);
+    draft_add_index(reader->draft, part, (uint32_t)from_0, offset);
+    return true;
+}
+
+// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+static bool corner_read(ObjReader *reader)
+{
+    static const DraftPart parts[] = {DRAFT_UV, DRAFT_NORMAL};
+    const char *start = reader->scan.at;
+    const size_t corner = reader->draft->corners[DRAFT_POSITION].count;
+    if (!index_read(reader, DRAFT_POSITION, start)) return false;
+    for (int i = 0; i < 2; i++) {
+        DraftIndices *indices = &reader->draft->corners[parts[i]];
+        const bool has_slash = *reader->scan.at == '/';
+        if (has_slash) reader->scan.at++;
+        if (has_slash && *reader->scan.at != '/' && !scan_is_word_end(reader->scan.at)) {
+            if (indices->count == 0) draft_begin_part(reader->draft, parts[i], corner);
+            if (!index_read(reader, parts[i], start)) return false;
+        } else if (indices->count > 0) {
+            array_push(*indices, DRAFT_NONE);
+        }
+    }
+    return scan_is_word_end(reader->scan.at) || corner_fails(reader, start);
+}
+
+static bool face_read(ObjReader *reader)
+{
+    const size_t offset = offset_of(reader);
+    while (scan_more(&reader->scan))
+        if (!corner_read(reader)) return false;
+    return draft_end_face(reader->draft, offset);
+}
+
+static bool material_read(ObjReader *reader)
+{
+    const ObjMaterial material = {scan_rest(&reader->scan), reader->draft->face_start};
+    array_push(reader->materials.used, material);
+    return true;
+}
+
+static bool library_read(ObjReader *reader)
+{
+    array_push(reader->materials.libraries, scan_rest(&reader->scan));
+    return true;
+}
+
+static bool nothing_read(ObjReader *reader)
+{
+    (void)reader;
+    return true;
+}
+
+// Names of groups and objects mean nothing here, and smoothing is the scene's matter.
+static const struct {
+    const char *word;
+    bool (*read)(ObjReader *reader);
+} statements[] = {
+    {"v", position_read}, {"vt", uv_read},           {"vn", normal_read},      {"f", face_read},
+    {"fo", face_read},    {"usemtl", material_read}, {"mtllib", library_read}, {"g", nothing_read},
+    {"o", nothing_read},  {"s", nothing_read},
+};
+
+static bool line_read(ObjReader *reader)
+{
+    const Word word = scan_word(&reader->scan);
+    if (word.length == 0) return true;
+    for (size_t i = 0; i < sizeof statements / sizeof *statements; i++)
+        if (word_is(word, statements[i].word)) return statements[i].read(reader);
+    unused_note(&reader->unused, &reader->draft->report, word, "is not used");
+    return true;
+}
+
+bool obj_read(MeshDraft *draft)
+{
+    const Source *source = &draft->source;
+    ObjReader reader = {.draft = draft,
+                        .scan = {source->bytes, source->bytes + source->length, source->bytes}};
+    draft->first_index = 1;
+    bool read = scan_is_text(&reader.scan, &draft->report);
+    if (read) {
+        do
+            read = line_read(&reader);
+        while (read && scan_line(&reader.scan));
+    }
+    if (read && draft->import->own_materials) obj_materials_read(draft, &reader.materials);
+    free(reader.materials.used.items);
+    free(reader.materials.libraries.items);
+    return read;
+}

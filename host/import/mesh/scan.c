@@ -1,0 +1,21 @@
+#include "host/import/mesh/scan.h"
+
+bool scan_is_text(Scan *scan, Report *report)
+{
+    const size_t length = (size_t)(scan->end - scan->start);
+    const char *nul = length > 0 ? memchr(scan->start, '\0', length) : NULL;
+    if (nul) report_error(report, (size_t)(nul - scan->start), "not text: a NUL character");
+    if (length >= 3 && memcmp(scan->start, "\xEF\xBB\xBF", 3) == 0) scan->at += 3;
+    return !nul;
+}
+
+void unused_note(UnusedWords *unused, Report *report, Word word, const char *what)
+{
+    for (size_t i = 0; i < unused->count; i++)
+        if (unused->words[i].length == word.length &&
+            memcmp(unused->words[i].text, word.text, word.length) == 0)
+            return;
+    if (unused->count == sizeof unused->words / sizeof *unused->words) return;
+    unused->words[unused->count++] = word;
+    report_warning(report, word.offset, "'%.*s' %s", word_shown(word), word.text, what);
+}

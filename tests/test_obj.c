@@ -1,0 +1,384 @@
+// OBJ and MTL files: the layouts that are read, materials and their images, and each message with its place.
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#define SCENE_OF(mesh)                                                                                       \
+    "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \
+    "objects:\n  - mesh: {file: a.obj" mesh "}\n"
+
+#define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+#define FACE    CORNERS "f 1 2 3\n"
+
+static char folder[] = "/tmp/glint-obj-XXXXXX";
+static const char *const names[] = {"a.obj", "a.mtl", "b c.mtl", "d.mtl", "a.ppm", "textures/a.ppm", "a.tga"};
+
+static int folder_open(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static int folder_close(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        unlink(names[i]);
+    return chdir("/") == 0 ? rmdir(folder) : -1;
+}
+
+static void file_write(const char *name, const char *text)
+{
+    FILE *file = fopen(name, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(text, 1, strlen(text), file), strlen(text));
+    assert_int_equal(fclose(file), 0);
+}
+
+// Reads the scene of the mesh; all messages with their files, a line each, must be `expected`.
+static bool scene_read(Scene *scene, const char *text, const char *expected)
+{
+    MessageList messages = {0};
+    Text source = {0}, got = {0};
+    text_appendf(&source, "%s", text);
+    const bool read = scene_read_text(scene, "scene.yaml", &source, false, &messages);
+    for (size_t i = 0; i < messages.count; i++) {
+        text_appendf(&got, "%s:", messages.items[i].file);
+        message_describe(&got, &messages.items[i]);
+    }
+    assert_string_equal(text_c(&got), expected);
+    message_list_free(&messages);
+    text_free(&source);
+    text_free(&got);
+    return read;
+}
+
+static Scene scene_of_obj(const char *obj, const char *expected)
+{
+    Scene scene;
+    file_write("a.obj", obj);
+    assert_true(scene_read(&scene, SCENE_OF(""), expected));
+    return scene;
+}
+
+static Vector3 corner_of(const Mesh *mesh, size_t corner)
+{
+    return mesh->vertices[mesh->triangles[corner / 3][corner % 3]];
+}
+
+static void assert_unit_square(const char *obj)
+{
+    static const double expected[6][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
+    Scene scene = scene_of_obj(obj, "");
+    const Mesh *mesh = &scene.meshes.items[0];
+    assert_int_equal(mesh->triangle_count, 2);
+    for (size_t i = 0; i < 6; i++) {
+        // a quadrilateral is cut by its first diagonal, wherever the first triangle starts
+        const Vector3 corner = corner_of(mesh, i);
+        assert_vector(corner, expected[i][0], expected[i][1], 0);
+    }
+    scene_free(&scene);
+}
+
+static void layouts_are_read(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4",
+        "# a square\n\n  v\t0  0 0 \nv 1. -0 +0.0 # no color\nv 100e-2 1 0\nv .0 1E0 0\no a\ng b c\ns off\nf "
+        " 1 2\t3 4  \n",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n",
+        // faces may stand before what they name
+        "f 1 2 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
+        "v 0 0 \\\n0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 \\\n3 \\\n  4\n",
+        "# goes on \\\nv 7 7 7\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nfo +1 2 3 4\n",
+        "v 0 0 0 1\nv 2 0 0 2\nv -1 -1 0 -1\nv 0 0.5 0 0.5\nf 1 2 3 4\n",
+        "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2// 3/1 4//1\nf 1 2\n",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 1 2\n",
+        // what no face has is not checked
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv nan 0\nv 1e31 0 0\nf 1 2 3 4\n",
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        for (int ends = 0; ends < 3; ends++) {
+            static const char *const line_ends[] = {"\n", "\r\n", "\r"};
+            Text text = {0};
+            for (const char *at = texts[i]; *at; at++)
+                text_append(&text, *at == '\n' ? line_ends[ends] : at,
+                            *at == '\n' ? strlen(line_ends[ends]) : 1);
+            assert_unit_square(text_c(&text));
+            text_free(&text);
+        }
+    }
+}
+
+// The same position with other normals and texture coordinates is another vertex; the same of all is not.
+static void corners_combine_their_parts(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_obj(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nvt 0.5\nvt 0.25 0.75 9\nvn 0 0 2\nvn 3 0 0\nvn 0 0 1\n"
+        "f 1/1/1 2/2/1 3//2\nf 4/1/3 2/2/1 3/1/2\nf 1 2/2/1 3//2\n",
+        "");
+    const Mesh *mesh = &scene.meshes.items[0];
+    assert_int_equal(mesh->vertex_count, 5);
+    const uint32_t(*triangles)[3] = (const uint32_t(*)[3])mesh->triangles;
+    assert_int_equal(triangles[0][0], triangles[1][0]);
+    assert_int_equal(triangles[0][1], triangles[1][1]);
+    assert_int_not_equal(triangles[0][2], triangles[1][2]);
+    assert_int_equal(triangles[0][2], triangles[2][2]);
+    assert_vector(mesh->normals[triangles[0][0]], 0, 0, 1);
+    assert_vector(mesh->normals[triangles[0][2]], 1, 0, 0);
+    assert_vector(mesh->normals[triangles[2][0]], 0, 0, 0);
+    assert_number(mesh->uvs[triangles[0][0]][0], 0.5);
+    assert_number(mesh->uvs[triangles[0][0]][1], 0);
+    assert_number(mesh->uvs[triangles[0][1]][1], 0.75);
+    assert_number(mesh->uvs[triangles[0][2]][0], 0);
+    scene_free(&scene);
+}
+
+// More combinations at one position than are compared with each other.
+static void one_position_may_have_many_normals(void **state)
+{
+    (void)state;
+    enum { NORMALS = 300 };
+    Text text = {0};
+    text_appendf(&text, CORNERS);
+    for (int i = 0; i < NORMALS; i++)
+        text_appendf(&text, "vn %d 1 0\n", i);
+    for (int round = 0; round < 2; round++)
+        for (int i = 1; i <= NORMALS; i++)
+            text_appendf(&text, "f 1//%d 2//1 3//1\n", i);
+    Scene scene = scene_of_obj(text_c(&text), "");
+    assert_int_equal(scene.meshes.items[0].triangle_count, 2 * NORMALS);
+    assert_int_equal(scene.meshes.items[0].vertex_count, NORMALS + 2);
+    scene_free(&scene);
+    text_free(&text);
+}
+
+static const Material *material_of(const Scene *scene, size_t triangle)
+{
+    const Mesh *mesh = &scene->meshes.items[0];
+    return &scene->materials
+                .items[mesh->materials ? mesh->materials[triangle] : scene->objects.items[0].material];
+}
+
+// Polygons become triangles, and the materials move with them.
+static void materials_are_those_of_their_faces(void **state)
+{
+    (void)state;
+    file_write("a.mtl", "Kd 1 0 0\nnewmtl red one \nKd 1 0 0\nKa 9 9 9\nillum 2\nKe 0 0 0\nTf 1 1 1\n");
+    file_write(
+        "b c.mtl",
+        "newmtl gray\nKd 0.5\nKs 0.9 0.3 0\nNs 40\nd -halo 0.25\nNi 1.25\nnewmtl clear\nTr 0.5\nKd -1 2 0\n");
+    Scene scene = scene_of_obj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nmtllib a.mtl\nusemtl red "
+                               "one\nf 1 2 3\nf 1 2 3 4\nusemtl gray\n"
+                               "usemtl clear\nf 1 2 3\nusemtl gray\nf 1 2 3 4\nf 1 2 3\nmtllib b c.mtl\n",
+                               "a.mtl:1:1: warning: a line before the first newmtl is not used\n");
+    static const double reds[] = {1, 1, 1, 1, 1, 0, 0.5, 0.5, 0.5},
+                        greens[] = {1, 1, 0, 0, 0, 2, 0.5, 0.5, 0.5};
+    assert_int_equal(scene.meshes.items[0].triangle_count, sizeof reds / sizeof *reds);
+    for (size_t i = 0; i < sizeof reds / sizeof *reds; i++) {
+        assert_number(material_of(&scene, i)->color.x, reds[i]);
+        assert_number(material_of(&scene, i)->color.y, greens[i]);
+    }
+    const Material *gray = material_of(&scene, 8), *clear = material_of(&scene, 5);
+    assert_number(gray->specular, 0.4);
+    assert_number(gray->shininess, 40);
+    assert_number(gray->transmission, 0.75);
+    assert_number(gray->ior, 1.25);
+    assert_number(clear->transmission, 0.5);
+    assert_number(clear->ior, 1);
+    assert_number(clear->shininess, material_default().shininess);
+    scene_free(&scene);
+
+    // a material of the scene's own wins
+    assert_true(scene_read(&scene, SCENE_OF(", material: {color: [0, 0, 1]}"), ""));
+    assert_null(scene.meshes.items[0].materials);
+    assert_vector(material_of(&scene, 0)->color, 0, 0, 1);
+    scene_free(&scene);
+
+    scene = scene_of_obj(FACE, "");
+    assert_vector(material_of(&scene, 0)->color, 1, 1, 1);
+    scene_free(&scene);
+}
+
+static void missing_materials_are_reported(void **state)
+{
+    (void)state;
+    file_write("a.mtl", "newmtl red\nKd 1 0 0\n");
+    // the file of the mesh's own name stands in
+    Scene scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE, "");
+    assert_vector(material_of(&scene, 0)->color, 1, 0, 0);
+    scene_free(&scene);
+    file_write("d.mtl", "newmtl blue\nKd 0 0 1\n");
+    scene = scene_of_obj("mtllib d.mtl a.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\n", "");
+    assert_vector(material_of(&scene, 0)->color, 1, 0, 0);
+    assert_vector(material_of(&scene, 1)->color, 0, 0, 1);
+    scene_free(&scene);
+    unlink("a.mtl");
+    scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE,
+                         "a.obj:1:8: warning: the material file 'missing.mtl' cannot be read: the default "
+                         "material is used\n");
+    assert_vector(material_of(&scene, 0)->color, 1, 1, 1);
+    scene_free(&scene);
+    scene = scene_of_obj("mtllib d.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\nusemtl red\nf 1 2 3\n",
+                         "a.obj:2:8: warning: 'red' is in no material file: the default is used\n");
+    assert_vector(material_of(&scene, 1)->color, 0, 0, 1);
+    assert_vector(material_of(&scene, 2)->color, 1, 1, 1);
+    scene_free(&scene);
+}
+
+static void images_of_materials_are_used(void **state)
+{
+    (void)state;
+    file_write("a.ppm", "P3 1 1 255 255 0 0\n");
+    file_write("a.tga", "no image");
+    file_write("a.mtl", "newmtl red\nKd 0.75 0.5 0.25\nmap_Kd ./a.ppm\nnewmtl same\nmap_Kd ./a.ppm\n");
+    Scene scene = scene_of_obj(
+        "mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\nusemtl same\nf 1 2 3\n", "");
+    const Material *red = material_of(&scene, 0), *same = material_of(&scene, 1);
+    assert_int_equal(scene.textures.count, 1);
+    assert_string_equal(scene.textures.items[0].path, "./a.ppm");
+    assert_int_equal(red->texture, 1);
+    assert_int_equal(same->texture, 1);
+    assert_vector(red->diffuse, 0.75, 0.5, 0.25);
+    assert_number(red->ambient, 0.5);
+    assert_vector(same->diffuse, 1, 1, 1);
+    assert_string_equal(scene.file, "scene.yaml");
+    scene_free(&scene);
+
+    scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
+                         "scene.yaml:4:18: warning: a.obj: no texture coordinates for the image './a.ppm' of "
+                         "material 'red'\n");
+    assert_int_equal(material_of(&scene, 0)->texture, 0);
+    assert_vector(material_of(&scene, 0)->color, 0.75, 0.5, 0.25);
+    scene_free(&scene);
+
+    static const struct {
+        const char *mtl, *expected;
+    } cases[] = {
+        {"map_Kd none.png\n",
+         "a.mtl:2:8: warning: cannot read 'none.png': No such file or directory: the color is used\n"},
+        {"map_Kd a.tga\n", "a.mtl:2:8: warning: 'a.tga' is no PNG, JPEG, PPM or EXR: the color is used\n"},
+        {"map_Kd -s 2 2 1 -clamp on -bm 3 a.ppm\n", "a.mtl:2:8: warning: options of textures are not used\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Text mtl = {0};
+        text_appendf(&mtl, "newmtl red\n%s", cases[i].mtl);
+        file_write("a.mtl", text_c(&mtl));
+        text_free(&mtl);
+        scene =
+            scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", cases[i].expected);
+        assert_int_equal(scene.textures.count, i == 2);
+        scene_free(&scene);
+    }
+}
+
+static void what_is_not_used_is_reported_once(void **state)
+{
+    (void)state;
+    file_write(
+        "a.mtl",
+        "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe 1 0 0\nTf 0 1 1\nmap_Bump b.png\n"
+        "newmtl more\nKe 1 0 0\nmap_Bump b.png\nPr 0.5\n");
+    Scene scene = scene_of_obj(
+        "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt nan 0\nvt 0 1e31\nvn 0 inf 0\n"
+        "f 1/1/1 2/2/1 3/1/1\nl 1 2\np 1\nl 2 3\ncstype bezier\n",
+        "scene.yaml:4:18: warning: a.obj: texture coordinates that are not finite or too large, "
+        "read as 0: 2\n"
+        "scene.yaml:4:18: warning: a.obj: normals that are not finite or too large, not used: 1\n"
+        "a.mtl:2:4: warning: no number up to 1e+30: the default is used\n"
+        "a.mtl:3:6: warning: no number up to 1e+30: the default is used\n"
+        "a.mtl:4:4: warning: no number up to 1e+30: the default is used\n"
+        "a.mtl:5:2: warning: no number up to 1e+30: the default is used\n"
+        "a.mtl:6:4: warning: no number up to 1e+30: the default is used\n"
+        "a.mtl:7:1: warning: 'Ke' is not used\n"
+        "a.mtl:8:1: warning: 'Tf' is not used\n"
+        "a.mtl:9:1: warning: 'map_Bump' is not used\n"
+        "a.mtl:13:1: warning: 'Pr' is not used\n"
+        "a.obj:3:11: warning: colors of vertices are not used\n"
+        "a.obj:10:1: warning: 'l' is not used\n"
+        "a.obj:11:1: warning: 'p' is not used\n"
+        "a.obj:13:1: warning: 'cstype' is not used\n");
+    const Material *red = material_of(&scene, 0);
+    assert_vector(red->color, 1, 1, 1);
+    assert_number(red->specular, 0);
+    assert_number(red->shininess, material_default().shininess);
+    assert_number(red->transmission, 0);
+    assert_number(red->ior, 1);
+    scene_free(&scene);
+}
+
+static void faults_have_their_place(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *obj, *expected;
+    } cases[] = {
+        {"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n",
+         "a.obj:3:5: error: 'nan' is no coordinate: a number up to 1e+30\n"},
+        {"v 0 0 0\nv 1e35 0 0\nv 0 1 0\nf 1 2 3\n",
+         "a.obj:2:3: error: '1e35' is no coordinate: a number up to 1e+30\n"},
+        {"v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2:6: error: a coordinate of the vertex is missing\n"},
+        {"v nan 0 0\nv 0 0 0\nv 1 0x1 0\nv 0 1 0\nf -3 -2 -1\n",
+         "a.obj:3:5: error: '0x1' is no coordinate: a number up to 1e+30\n"},
+        {"v 0 0 0 0\n", "a.obj:1:10: error: the fourth number of a vertex is 0\n"},
+        {CORNERS "f 1 2 4\n", "a.obj:4:7: error: a face names vertex 4 (from 1); there are 3\n"},
+        {CORNERS "f 1 2 0\n", "a.obj:4:7: error: a face names vertex 0; there are 3 before it\n"},
+        {CORNERS "f -4 2 3\n", "a.obj:4:3: error: a face names vertex -4; there are 3 before it\n"},
+        {CORNERS "f 1 2 9999999999\n",
+         "a.obj:4:7: error: a face names vertex 9999999999; there are 3 before it\n"},
+        {CORNERS "f 1 2 99999999999\n", "a.obj:4:7: error: '99999999999' is no corner of a face\n"},
+        {CORNERS "f 1 2 4294967295\n",
+         "a.obj:4:7: error: a face names vertex 4294967295 (from 1); there are 3\n"},
+        {CORNERS "vt 0 0\nf 1/1 2/2 3/1\n",
+         "a.obj:5:9: error: a face names texture coordinate 2 (from 1); there are 1\n"},
+        {CORNERS "f 1//1 2 3\n", "a.obj:4:6: error: a face names normal 1 (from 1); there are 0\n"},
+        {CORNERS "f 1 2 x\n", "a.obj:4:7: error: 'x' is no corner of a face\n"},
+        {CORNERS "f 1 2 3/1/1/1\n", "a.obj:4:7: error: '3/1/1/1' is no corner of a face\n"},
+        {CORNERS "f 1 2 3.5\n", "a.obj:4:7: error: '3.5' is no corner of a face\n"},
+        {CORNERS "f 1 2 -\n", "a.obj:4:7: error: '-' is no corner of a face\n"},
+        {CORNERS "f 1 2\n", "scene.yaml:4:18: error: a.obj: no triangles\n"},
+        {"", "scene.yaml:4:18: error: a.obj: no triangles\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Scene scene;
+        file_write("a.obj", cases[i].obj);
+        assert_false(scene_read(&scene, SCENE_OF(""), cases[i].expected));
+    }
+    FILE *file = fopen("a.obj", "wb");
+    assert_int_equal(fwrite("v 0\0", 1, 4, file), 4);
+    fclose(file);
+    Scene scene;
+    assert_false(scene_read(&scene, SCENE_OF(""), "a.obj:1:4: error: not text: a NUL character\n"));
+    Text text = {0};
+    text_appendf(&text, CORNERS "f");
+    for (int i = 0; i <= 16384; i++)
+        text_appendf(&text, " 1");
+    file_write("a.obj", text_c(&text));
+    text_free(&text);
+    assert_false(
+        scene_read(&scene, SCENE_OF(""), "a.obj:4:2: error: a face of 16385 corners; 16384 is the most\n"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(layouts_are_read),
+        cmocka_unit_test(corners_combine_their_parts),
+        cmocka_unit_test(one_position_may_have_many_normals),
+        cmocka_unit_test(materials_are_those_of_their_faces),
+        cmocka_unit_test(missing_materials_are_reported),
+        cmocka_unit_test(images_of_materials_are_used),
+        cmocka_unit_test(what_is_not_used_is_reported_once),
+        cmocka_unit_test(faults_have_their_place),
+    };
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
+}
