@@ -178,6 +178,7 @@ MEANINGS = {
     "reason": "text; why not measured",
     "frame_ms": "object; first command to pixels on the host",
     "kernel_ms": "object; sum of the launches, by `clock`",
+    "processor_ms": "number; of all processors together, that this process used for a frame: the median",
     "{frame_ms,kernel_ms,against_frame_ms}.{min,median,max}": "number",
     "{frame_ms,kernel_ms,against_frame_ms}.quartile_range": "number; upper less lower quartile",
     "{frame_ms,kernel_ms,against_frame_ms}.runs": "count",

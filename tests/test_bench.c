@@ -59,7 +59,7 @@ static BenchTimes times_make(size_t runs, double rate)
         LaunchTime second = launch_at(5.02 + 0.1 * (double)i, 0.020, rate);
         bench_add_launch(&times, &first);
         bench_add_launch(&times, &second);
-        bench_end_run(&times, 0.045);
+        bench_end_run(&times, 0.045, 0.06);
     }
     return times;
 }
@@ -70,6 +70,7 @@ static void test_events_that_agree(void **state)
     BenchTimes times = times_make(30, 1.001);
     assert_null(bench_doubt(&times));
     assert_near(bench_kernel(&times).median, 0.030 * 1.001, 1e-12);
+    assert_near(series_summarize(&times.processor).median, 0.06, 1e-12);
     assert_int_equal(bench_kernel(&times).count, 30);
     assert_true(bench_converged(&times, 30));
     assert_false(bench_converged(&times, 31));
@@ -95,7 +96,7 @@ static void test_event_without_times(void **state)
     BenchTimes times = times_make(30, 1);
     LaunchTime zeros = {.host_seconds = 0.030, .host_start_seconds = 9};
     bench_add_launch(&times, &zeros);
-    bench_end_run(&times, 0.045);
+    bench_end_run(&times, 0.045, 0.06);
     assert_string_equal(bench_doubt(&times), "the runtime reports no times for events");
     assert_near(bench_kernel(&times).min, 0.030, 1e-12);
     bench_times_free(&times);
@@ -108,7 +109,7 @@ static void test_runs_that_scatter(void **state)
     for (int i = 0; i < 40; i++) {
         LaunchTime launch = launch_at(i, i % 2 ? 0.010 : 0.011, 1);
         bench_add_launch(&times, &launch);
-        bench_end_run(&times, 0.045);
+        bench_end_run(&times, 0.045, 0.06);
     }
     assert_false(bench_converged(&times, 20));
     bench_times_free(&times);

@@ -261,6 +261,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     const BenchRow *row = &report->rows[i];
     hash_json(json, "kernel_hash", row->kernel_hash);
     times_json(json, row);
+    json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);
     samples_json(json, "kernel_samples_ms", bench_doubt(&row->times) ? &row->times.host : &row->times.event);
     json_begin_object(json, "build_ms");

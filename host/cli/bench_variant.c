@@ -111,11 +111,13 @@ bool variant_run(Variant *variant, BenchTimes *times)
 {
     renderer_report_restart(variant->renderer);
     const RenderReport *report = renderer_report(variant->renderer);
-    double end_seconds = 0;
+    double end_seconds = 0, processor_start_seconds = clock_processor_seconds();
     if (!renderer_render(variant->renderer, 0, band_read, &end_seconds)) return false;
     for (size_t i = 0; times && i < report->launches.count; i++)
         bench_add_launch(times, &report->launches.items[i].time);
-    if (times) bench_end_run(times, end_seconds - report->launches.items[0].time.host_start_seconds);
+    if (times)
+        bench_end_run(times, end_seconds - report->launches.items[0].time.host_start_seconds,
+                      clock_processor_seconds() - processor_start_seconds);
     return true;
 }
 

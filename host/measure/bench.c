@@ -23,9 +23,10 @@ void bench_add_launch(BenchTimes *times, const LaunchTime *launch)
     times->host_last = launch->host_start_seconds + launch->host_seconds;
 }
 
-void bench_end_run(BenchTimes *times, double frame_seconds)
+void bench_end_run(BenchTimes *times, double frame_seconds, double processor_seconds)
 {
     series_add(&times->frame, frame_seconds);
+    series_add(&times->processor, processor_seconds);
     series_add(&times->event, times->run_event);
     series_add(&times->host, times->run_host);
     times->run_event = times->run_host = 0;
@@ -34,6 +35,7 @@ void bench_end_run(BenchTimes *times, double frame_seconds)
 void bench_times_free(BenchTimes *times)
 {
     series_free(&times->frame);
+    series_free(&times->processor);
     series_free(&times->event);
     series_free(&times->host);
 }

@@ -15,6 +15,7 @@ typedef struct {
 // Times of the runs of one variant; zeroed: none yet.
 typedef struct {
     Series frame;       // seconds from a run's first enqueue until the host has read its last band
+    Series processor;   // seconds of all processors that this process used meanwhile
     Series event, host; // seconds of a run's launches, by their events and by the host's clock
     const char *doubt;  // why the events are not to be believed, as seen in some launch; NULL: they are
     double run_event, run_host; // sums of the run at work
@@ -24,7 +25,7 @@ typedef struct {
 
 // For each launch of a run, then once for the run.
 void bench_add_launch(BenchTimes *times, const LaunchTime *launch);
-void bench_end_run(BenchTimes *times, double frame_seconds);
+void bench_end_run(BenchTimes *times, double frame_seconds, double processor_seconds);
 void bench_times_free(BenchTimes *times);
 
 // Why the host's clock is used for the launches, or NULL where their events' times are: every event agreed
