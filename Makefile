@@ -158,12 +158,12 @@ PEERS_OPTIONS ?= --whole --seconds 1
 PEERS_JSON    ?= docs/measurements/bench-peers.json
 has_embree := $(wildcard /usr/include/embree3/rtcore.h)
 peers_python := $(BUILD)/peers/python/bin/python
+peers_bench = $(peers_python) tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree)
 
 bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
-	$(peers_python) tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
-	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS)
-	$(if $(SPD),$(peers_python) tools/peers/compare --glint $(BUILD)/glint --runs $(ROUNDS) --size 1024x1024 \
-	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
+	$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS)
+	$(if $(SPD),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) --seconds 1 --size 1024x1024 \
+	    --precisions single,double --only glint,Tachyon,POV-Ray --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
 	tools/report README.md docs/performance.md
 
 # With PyYAML: Debian's, if it is there.

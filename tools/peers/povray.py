@@ -8,11 +8,16 @@ def vector(values):
     return "<" + ",".join(f"{value:.9g}" for value in values) + ">"
 
 
-def texture(name, material, ambient):
-    finish = [part * material.get("ambient", 1) for part in ambient]
-    return (f"#declare {name} = texture {{ pigment {{ rgb {vector(material.get('color', [1, 1, 1]))} }} "
-            f"finish {{ ambient rgb {vector(finish)} diffuse {material.get('diffuse', 1)} "
-            f"phong {material.get('specular', 0)} phong_size {material.get('shininess', 32)} }} }}\n")
+def material_text(name, material, ambient):
+    """Of a transparent one POV-Ray shows only the opaque fraction of ambient and diffuse light."""
+    transmission = material.get("transmission", 0)
+    opaque = 1 - transmission
+    finish = [part * material.get("ambient", 1) / opaque for part in ambient]
+    return (f"#declare M_{name} = material {{ texture {{ pigment {{ rgb {vector(material.get('color', [1, 1, 1]))} "
+            f"transmit {transmission} }} finish {{ ambient rgb {vector(finish)} "
+            f"diffuse {material.get('diffuse', 1) / opaque:.9g} phong {material.get('specular', 0)} "
+            f"phong_size {material.get('shininess', 32)} reflection {material.get('reflection', 0)} }} }} "
+            f"interior {{ ior {material.get('ior', 1.5)} }} }}\n")
 
 
 def write_list(write, name, texts):
@@ -27,7 +32,26 @@ def write_mesh(write, mesh):
     if mesh.normals:
         write_list(write, "normal_vectors", [vector(normal) for normal in mesh.normals])
     write_list(write, "face_indices", [vector(face) for face in mesh.faces])
-    write(f"texture {{ T_{mesh.material} }} }}\n")
+
+
+def write_shapes(write, scene, end):
+    """Each with what `end` gives for the name of its material; none where that is None."""
+    def write_shape(text, name):
+        if end(name) is not None:
+            write(f"{text} {end(name)}\n")
+
+    for point, normal, name in scene.planes:
+        away = sum(p * n for p, n in zip(point, unit(normal)))
+        write_shape(f"plane {{ {vector(unit(normal))}, {away:.9g}", name)
+    for center, radius, name in scene.spheres:
+        write_shape(f"sphere {{ {vector(center)}, {radius:.9g}", name)
+    for start, radius, to, to_radius, name in scene.cones:
+        write_shape(f"cone {{ {vector(start)}, {radius:.9g}, {vector(to)}, {to_radius:.9g} open" if radius != to_radius else
+                    f"cylinder {{ {vector(start)}, {vector(to)}, {radius:.9g} open", name)
+    for mesh in scene.meshes:
+        if end(mesh.material) is not None:
+            write_mesh(write, mesh)
+            write(f"{end(mesh.material)}\n")
 
 
 def write_scene(scene, path, size):
@@ -37,7 +61,7 @@ def write_scene(scene, path, size):
     tall = 2 * scene.half_tangent()
     with open(path, "w") as file:
         write = file.write
-        write("#version 3.7;\nglobal_settings { assumed_gamma 1 ambient_light rgb 1 max_trace_level 1 }\n"
+        write("#version 3.7;\nglobal_settings { assumed_gamma 1 ambient_light rgb 1 max_trace_level 6 adc_bailout 0 }\n"
               f"background {{ rgb {vector(scene.background)} }}\n"
               f"camera {{ location {vector(scene.camera['position'])} direction {vector(view)} "
               f"right {vector([tall * size[0] / size[1] * part for part in right])} "
@@ -45,14 +69,11 @@ def write_scene(scene, path, size):
         for position, color in scene.lights:
             write(f"light_source {{ {vector(position)} rgb {vector(color)} }}\n")
         for name, material in scene.materials.items():
-            write(texture(f"T_{name}", material, scene.ambient))
-        for point, normal, material in scene.planes:
-            away = sum(p * n for p, n in zip(point, unit(normal)))
-            write(f"plane {{ {vector(unit(normal))}, {away:.9g} texture {{ T_{material} }} }}\n")
-        for center, radius, material in scene.spheres:
-            write(f"sphere {{ {vector(center)}, {radius:.9g} texture {{ T_{material} }} }}\n")
-        for mesh in scene.meshes:
-            write_mesh(write, mesh)
+            write(material_text(name, material, scene.ambient))
+        glass = {name for name, material in scene.materials.items() if material.get("transmission", 0) > 0}
+        write_shapes(write, scene, lambda name: f"material {{ M_{name} }} {'no_shadow ' * (name in glass)}}}")
+        # Glass of NFF has the shadow of an opaque object, which in POV-Ray another object must cast.
+        write_shapes(write, scene, lambda name: "no_image no_reflection }" if name in glass else None)
 
 
 def command(scene_path, image, size):
@@ -60,9 +81,6 @@ def command(scene_path, image, size):
             "File_Gamma=1.0"]
 
 
-def stage_seconds(_stdout, stderr):
-    """What the program reports of its own time: (read, prepare, trace)."""
-    def seconds(name):
-        match = re.search(name + r" Time:.*\(([0-9.]+) seconds\)", stderr)
-        return float(match.group(1)) if match else 0.0
-    return seconds("Parse"), seconds("Bounding"), seconds("Trace")
+def trace_seconds(run):
+    """What the program reports of its own time."""
+    return float(re.search(r"Trace Time:.*\(([0-9.]+) seconds\)", run.stderr).group(1))

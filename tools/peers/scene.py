@@ -9,6 +9,10 @@ import yaml
 SPHERE = re.compile(r"- sphere: {center: \[([^,]+), ([^,]+), ([^\]]+)\], radius: ([^,]+), material: (\w+)}\s*$")
 
 
+class NotModelled(Exception):
+    """What a program does not have."""
+
+
 @dataclass
 class Mesh:
     vertices: list
@@ -27,6 +31,7 @@ class Scene:
     spheres: list = field(default_factory=list)  # of (center, radius, material)
     planes: list = field(default_factory=list)   # of (point, normal, material)
     meshes: list = field(default_factory=list)
+    cones: list = field(default_factory=list)    # open, of (from, its radius, to, its radius, material)
 
     def half_tangent(self):
         """Of the vertical field of view."""
@@ -131,7 +136,7 @@ def read_scene(path):
     data = yaml.safe_load(head)
     refuse_other_keys("a camera", data["camera"], ["position", "look_at", "up", "fov"])
     for material in data["materials"].values():
-        refuse_other_keys("a material", material, ["color", "ambient", "diffuse", "specular", "shininess"])
+        refuse_other_keys("a material", material, ["color", "ambient", "diffuse", "specular", "shininess", "reflection"])
     lights = []
     for light in data["lights"]:
         refuse_other_keys("a light", light, ["point"])

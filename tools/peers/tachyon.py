@@ -1,7 +1,7 @@
 """Writes a scene in Tachyon's format (John Stone, Tachyon, Debian package tachyon) and runs it."""
 import re
 
-from scene import triple
+from scene import NotModelled, triple
 
 
 def place(values):
@@ -18,7 +18,7 @@ def frustum(scene, size):
 
 
 def texture(material, ambient):
-    return (f"Ambient {ambient:.9g} Diffuse {material.get('diffuse', 1)} Specular 0 Opacity 1 "
+    return (f"Ambient {ambient:.9g} Diffuse {material.get('diffuse', 1)} Specular {material.get('reflection', 0)} Opacity 1 "
             f"Phong Plastic {material.get('specular', 0)} Phong_size {material.get('shininess', 32)} "
             f"Color {triple(material.get('color', [1, 1, 1]))} TexFunc 0")
 
@@ -36,7 +36,11 @@ def write_mesh(write, mesh):
 
 def write_scene(scene, path, size):
     if len(set(scene.ambient)) != 1:
-        raise ValueError("Tachyon has gray ambient light only")
+        raise NotModelled("gray ambient light only")
+    if any(start != end for _, start, _, end, _ in scene.cones):
+        raise NotModelled("no cones")
+    if any(material.get("transmission", 0) > 0 for material in scene.materials.values()):
+        raise NotModelled("no refraction")
     with open(path, "w") as file:
         write = file.write
         write(f"Begin_Scene\nResolution {size[0]} {size[1]}\nCamera\nZoom 1\n"
@@ -52,6 +56,8 @@ def write_scene(scene, path, size):
             write(f"Plane Center {place(point)} Normal {place(normal)} {material}\n")
         for center, radius, material in scene.spheres:
             write(f"Sphere Center {place(center)} Rad {radius:.9g} {material}\n")
+        for start, radius, end, _, material in scene.cones:
+            write(f"FCylinder Base {place(start)} Apex {place(end)} Rad {radius:.9g} {material}\n")
         for mesh in scene.meshes:
             write_mesh(write, mesh)
         write("End_Scene\n")
@@ -63,7 +69,6 @@ def command(scene_path, image, size):
             "-format", "PPM", "-o", image]
 
 
-def stage_seconds(stdout, _stderr):
-    """What the program reports of its own time: (read, prepare, trace)."""
-    names = "Scene Parsing", "Preprocessing", "Ray Tracing"
-    return tuple(float(re.search(name + r" Time:\s*([0-9.]+)", stdout).group(1)) for name in names)
+def trace_seconds(run):
+    """What the program reports of its own time."""
+    return float(re.search(r"Ray Tracing Time:\s*([0-9.]+)", run.stdout).group(1))
