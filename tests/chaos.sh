@@ -10,6 +10,6 @@ case $BUILD in *-sanitize)
     ;;
 esac
 unset OCL_ICD_VENDORS GLINT_DEVICE
-seconds=10
+seconds=6
 [ "${GLINT_LONG_TESTS-}" != 1 ] || seconds=55
 exec tools/chaos --seconds $seconds --glint "${GLINT:-$BUILD/glint}"

@@ -43,6 +43,21 @@ objects:
 """
 
 
+BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
+
+
+def plain(name, folder="."):
+    """One of scenes/; unless tests are long a copy with the features of BALLS, whose kernels then serve it, too."""
+    if IS_LONG:
+        return ROOT / "scenes" / name
+    others = "plane:", "box:", "cylinder:", "directional:"
+    kept = [line for line in read(ROOT / "scenes" / name).splitlines() if not any(word in line for word in others)]
+    text = "\n".join(kept)
+    changed = text.replace("specular: 0.4", "specular: 0.4, reflection: 0.25", 1)
+    assert changed != text, name
+    return write(f"{folder}/{name}", changed)
+
+
 def skip_all(reason):
     print(f"skipped: {reason}")
     sys.exit(77)

@@ -6,7 +6,7 @@ is_sanitized && skip_all "the plain build measures the same kernels"
 build=${BUILD:-build}
 make=${MAKE:-make}
 check "the ladder builds" $make -s BUILD="$build" ladder
-rays=500
+rays=250
 is_long && rays=1500
 for shape in sphere plane disc box cylinder cone triangle torus paraboloid; do
     check "$shape" "$build/tools/numerics/ladder" --rays $rays --check --shape $shape

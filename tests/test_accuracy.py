@@ -8,26 +8,13 @@ import math
 import tempfile
 from collections import namedtuple
 
-from glint import IS_LONG, PLANET, ROOT, TestCase, main, need_device, png_read, read, run, skip_all, write
+from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, run, skip_all, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
 MISS = 0xFFFFFFFF
 SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
 GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
-BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
 Approx = namedtuple("Approx", "value relative absolute", defaults=(0, 0))
-
-
-def plain(name, folder):
-    """One of scenes/; unless tests are long a copy with the features of BALLS, whose kernels then serve it, too."""
-    if IS_LONG:
-        return ROOT / "scenes" / name
-    others = "plane:", "box:", "cylinder:", "directional:"
-    kept = [line for line in read(ROOT / "scenes" / name).splitlines() if not any(word in line for word in others)]
-    text = "\n".join(kept)
-    changed = text.replace("specular: 0.4", "specular: 0.4, reflection: 0.25", 1)
-    assert changed != text, name
-    return write(f"{folder}/{name}", changed)
 
 
 def arrays_load(prefix, light_count):

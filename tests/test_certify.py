@@ -1,10 +1,11 @@
 #!/usr/bin/env -S python3 -B
-"""glint certify: double decides as the reference does on every kind of scene, and errors are noticed.
+"""glint certify: double decides as the reference does on every kind of scene, and errors are noticed. With
+GLINT_LONG_TESTS=1 also on a mesh without other shapes.
 
 run_tests: sanitize-long-only"""
-from glint import PLANET, ROOT, TestCase, main, need_device, write
+from glint import IS_LONG, PLANET, ROOT, TestCase, main, need_device, write
 
-SCENES = "demo", "mirror-glass", "paraboloids", "triangles"
+SCENES = ["demo", "mirror-glass", "paraboloids"] + (["triangles"] if IS_LONG else [])
 SMALL = "--size 96x64 --pixels 600"
 STRONG = """\
 camera: {position: [0, 0, -5], look_at: [0, 0, 0]}

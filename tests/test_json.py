@@ -9,7 +9,7 @@ import sys
 import unittest
 
 import json_reference
-from glint import PLANET, PROGRAM, ROOT, TestCase, main, need_device, read, write
+from glint import BALLS, PLANET, PROGRAM, ROOT, TestCase, main, need_device, read, write
 
 WRITES = "--write" in sys.argv
 RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
@@ -144,13 +144,13 @@ class Json(TestCase):
         write("planet.yaml", PLANET)
         # which of two is nearer is lost at single
         write("twins.yaml", PLAIN + "  - sphere: {center: [1e-9, 0.5, 0], radius: 0.5}\n")
-        mirrors = ROOT / "tests/scenes/mirror-balls.yaml"  # at fast, paths are wrong
+        # of BALLS paths are wrong at fast
         common = f"--size 96x64 {QUICK} --bounces 16 --json"
         self.check_members(
             "glint accuracy",
-            self.json(f"accuracy planet.yaml {mirrors} strong.yaml {common} --precision fast,double --save saved"),
+            self.json(f"accuracy planet.yaml {BALLS} strong.yaml {common} --precision fast,double --save saved"),
             self.json(f"accuracy twins.yaml {common} --precision single --perturb 1:1000"),
-            self.json(f"accuracy planet.yaml {common} --precision single --reference saved/0-planet-reference.color.npy"))
+            self.json(f"accuracy {BALLS} {common} --precision fast --reference saved/1-mirror-balls-reference.color.npy"))
 
 
 def write_page():

@@ -1,8 +1,8 @@
 #!/usr/bin/env -S python3 -B
 """glint verify: the hard cases pass, also on a device whose divisions, roots and powers are as wrong as the OpenCL C
-specification permits. Here at single and a few at the other precisions, without M6: a million rays through 10,300 objects
-one by one, as test_bvh does with fewer. GLINT_LONG_TESTS=1 runs all at every precision, perturbed by 20 seeds. A sanitized
-build, many times as slow, runs the host's side of a few."""
+specification permits. Here at single and a few at the other precisions, without M1, a closed mesh as M2 has one farther
+away, and M6, a million rays through 10,300 objects one by one, as test_bvh does with fewer. GLINT_LONG_TESTS=1 runs all at
+every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few."""
 import re
 import unittest
 
@@ -12,7 +12,7 @@ DEVICE = need_device()
 TIERS = {"fast": "A", "single": "B", "strict": "C", "double": "D"}
 PRECISIONS = [precision for precision in TIERS if precision != "double" or DEVICE["fp64"]]
 ALL_CASES = re.findall(r"\b[A-Z][1-9]\b", run("verify NONE").stderr)
-CASES = [case for case in ALL_CASES if IS_LONG or case != "M6"]
+CASES = [case for case in ALL_CASES if IS_LONG or case not in ("M1", "M6")]
 DEVICE_FUNCTIONS = (
     "sqrt|rsqrt|pow|powr|pown|exp|exp2|log|log2|native_[a-z0-9]*|half_[a-z]+|normalize|length|distance|sin|cos|tan|acos|"
     "atan2?|hypot|mad|mix|smoothstep|dot|cross|fmod"
@@ -49,13 +49,13 @@ class Verify(VerifyTestCase):
         if IS_LONG:
             cases += ["S2", "C6", "T1", "P2", "R2", "R6"]
         hashes = self.hashes(cases, f"--precision {precision} --lanes 1")
-        self.assertEqual(self.hashes(cases, f"--precision {precision} --lanes 8"), hashes)
+        self.assertEqual(self.hashes(cases, f"--precision {precision}{' --lanes 8' if IS_LONG else ''}"), hashes)
         lean = ["S5", "C7"] if IS_LONG else ["S5"]
         self.assertEqual(self.hashes(lean, f"--precision {precision} --lean"), self.hashes(lean, f"--precision {precision}"))
 
     def test_report(self):
-        report = self.json("verify P4 --precision single --lanes 8 --json")
-        self.assertEqual((report["schema"], report["precisions"][0]["lanes"]), (3, 8))
+        report = self.json("verify P4 --precision single --lanes 1 --json")
+        self.assertEqual((report["schema"], report["precisions"][0]["lanes"]), (3, 1))
         self.assertTrue(report["reference_bits"] and report["glint"] and report["device"]["platform_version"])
         self.assertNotIn("perturb", report)
         report = self.json("verify P4 --precision single --perturb 1:1000 --json")
@@ -115,6 +115,7 @@ class PerturbedDevice(VerifyTestCase):
         self.assertEqual(pixels("--perturb 7 --lanes 1"), seed_7)
         self.assertNotEqual(pixels("--perturb 8"), seed_7)
 
+    @unittest.skipUnless(IS_LONG, "verify traces rays, too")
     def test_traced_rays(self):
         write("rays", "0.3 0.4 -9 0 0.01 1\n-5 1 0 1 0 0.02\n1 9 -2 0.01 -1 0\n")
         scene = self.scene()
