@@ -70,7 +70,7 @@ static void assert_refused(const Text *text, const char *message)
 {
     Text expected = {0};
     file_write(text);
-    text_appendf(&expected, "4:18: error: a.ply: %s\n", message);
+    text_appendf(&expected, "%s\n", message);
     assert_messages("scene.yaml", SCENE, text_c(&expected));
     text_free(&expected);
 }
@@ -140,8 +140,8 @@ static void number_append(Text *text, double number, const Type *type, bool big)
     }
 }
 
-// With numbers of this type beside the coordinates and as lengths of lists, and elements assimp does not
-// know.
+// With numbers of this type beside the coordinates and as lengths of lists, and elements that no
+// mesh has.
 static Text binary_square(const Type *type, bool big, const char *line_end)
 {
     const Type *single = &types[6], *whole = &types[4];
@@ -191,40 +191,41 @@ static void faults_name_line_and_row(void **state)
         const char *text, *message;
     } cases[] = {
         {HEADER CORNERS "3 0 1 2\n2000000000 1 3 2\n",
-         "line 15: face 1 (from 0) declares 2000000000 numbers of 'vertex_indices', the line has 3 more"},
+         "15:1: error: face 1 (from 0) declares 2000000000 numbers of 'vertex_indices', the line has 3 more"},
         {HEADER CORNERS "3 0 1\n3 1 3 2\n",
-         "line 14: face 0 (from 0) declares 3 numbers of 'vertex_indices', the line has 2 more"},
-        {HEADER CORNERS "3 0 1 2\n", "line 15: the file ends before face 1 (from 0) of 2"},
-        {HEADER CORNERS, "line 14: the file ends before face 0 (from 0) of 2"},
-        {HEADER "0 0 0\n1 0\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: vertex 1 (from 0) lacks its 'z'"},
-        {HEADER "0 0 0\n1 x 0\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: 'x' is no number of type float"},
-        {HEADER "0 0 0\n1 0 1.5.5\n0 1 0\n1 1 0\n" TRIANGLES, "line 11: '1.5.5' is no number of type float"},
-        {HEADER CORNERS "3 0 1 2\n-1 1 3 2\n", "line 15: '-1' is no number of type uchar"},
-        {HEADER CORNERS "3 0 1 2\n3 1 3 1.5\n", "line 15: '1.5' is no number of type int"},
-        {HEADER CORNERS "3 0 1 2\n3 1 3 4294967298\n", "line 15: '4294967298' is no number of type int"},
+         "14:1: error: face 0 (from 0) declares 3 numbers of 'vertex_indices', the line has 2 more"},
+        {HEADER CORNERS "3 0 1 2\n", "15:1: error: the file ends before face 1 (from 0) of 2"},
+        {HEADER CORNERS, "14:1: error: the file ends before face 0 (from 0) of 2"},
+        {HEADER "0 0 0\n1 0\n0 1 0\n1 1 0\n" TRIANGLES, "11:4: error: vertex 1 (from 0) lacks its 'z'"},
+        {HEADER "0 0 0\n1 x 0\n0 1 0\n1 1 0\n" TRIANGLES, "11:3: error: 'x' is no number of type float"},
+        {HEADER "0 0 0\n1 0 1.5.5\n0 1 0\n1 1 0\n" TRIANGLES,
+         "11:5: error: '1.5.5' is no number of type float"},
+        {HEADER CORNERS "3 0 1 2\n-1 1 3 2\n", "15:1: error: '-1' is no number of type uchar"},
+        {HEADER CORNERS "3 0 1 2\n3 1 3 1.5\n", "15:7: error: '1.5' is no number of type int"},
+        {HEADER CORNERS "3 0 1 2\n3 1 3 4294967298\n", "15:7: error: '4294967298' is no number of type int"},
         {ASCII "element vertex 4\n" XYZ "element face 2\nproperty list int int vertex_indices\n" END CORNERS
                "3 0 1 2\n-3 1 3 2\n",
-         "line 15: '-3' is no length of a list"},
+         "15:1: error: -3 is no length of a list"},
         {ASCII "element vertex 4\n" XYZ "element face 2\nproperty list float int vertex_indices\n" END CORNERS
                "3 0 1 2\n2.5 1 3 2\n",
-         "line 15: '2.5' is no length of a list"},
+         "15:1: error: 2.5 is no length of a list"},
         {ASCII "element vertex 4\n" XYZ "element face 1\nproperty list uchar float texcoord\n"
                "property list uchar int vertex_index\n" END CORNERS "6 0 0 1 0 0 1 1 0\n",
-         "line 15: face 0 (from 0) has 1 corners, but 3 texture coordinates"},
-        {ASCII "element vertex 4\nproperty int64 x\n" END, "line 4: 'int64' is no type of PLY"},
-        {ASCII "element vertex 4\nproperty list uchar half x\n" END, "line 4: 'half' is no type of PLY"},
-        {ASCII "element vertex 4\nproperty float\n" END, "line 4: a property without a name"},
-        {ASCII XYZ END, "line 3: a property before the first element"},
-        {ASCII "element vertex -4\n" END, "line 3: '-4' is no number of 'vertex'"},
+         "15:18: error: face 0 (from 0) has 1 corners, but 3 texture coordinates"},
+        {ASCII "element vertex 4\nproperty int64 x\n" END, "4:10: error: 'int64' is no type of PLY"},
+        {ASCII "element vertex 4\nproperty list uchar half x\n" END, "4:21: error: 'half' is no type of PLY"},
+        {ASCII "element vertex 4\nproperty float\n" END, "4:15: error: a property without a name"},
+        {ASCII XYZ END, "3:9: error: a property before the first element"},
+        {ASCII "element vertex -4\n" END, "3:16: error: '-4' is no number of 'vertex'"},
         {ASCII "element vertex 4\n" XYZ "element vertex 4\n" XYZ END,
-         "line 11: the header declares 'vertex' twice"},
+         "7:9: error: the header declares 'vertex' twice"},
         {ASCII "element vertex 4\n" XYZ
                "element tristrips 1\nproperty list int int vertex_indices\n" END CORNERS "4 0 1 2 3\n",
-         "line 9: strips of triangles (tristrips) are not read, only faces"},
-        {"ply\nformat binary 1.0\n" END, "line 2: 'binary' is no format of PLY"},
-        {"ply\nelement vertex 0\n" END, "line 3: the header lacks its format"},
-        {"solid\n", "line 1: no PLY file, which starts with a line 'ply'"},
-        {"", "line 1: no PLY file, which starts with a line 'ply'"},
+         "7:9: error: strips of triangles (tristrips) are not read, only faces"},
+        {"ply\nformat binary 1.0\n" END, "2:8: error: 'binary' is no format of PLY"},
+        {"ply\nelement vertex 0\n" END, "3:1: error: the header lacks its format"},
+        {"solid\n", "1:1: error: no PLY file, which starts with a line 'ply'"},
+        {"", "1:1: error: no PLY file, which starts with a line 'ply'"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         Text text = {0};
@@ -273,7 +274,8 @@ static void binary_faults_name_byte_and_row(void **state)
         const Type *type = &types[cases[i].type];
         Text text = binary_with_count(headers[cases[i].header], cases[i].count, type), message = {0};
         text_appendf(&message,
-                     "byte %zu: face 1 (from 0) declares %s numbers of 'vertex_indices', the file has 3 more",
+                     "4:18: error: a.ply: byte %zu: face 1 (from 0) declares %s numbers of 'vertex_indices', "
+                     "the file has 3 more",
                      text.count - type->size - 12, cases[i].promise);
         assert_refused(&text, text_c(&message));
         text_free(&text);
@@ -299,12 +301,86 @@ static void binary_file_cut_short_is_refused(void **state)
     text_free(&whole);
 }
 
+static Scene scene_of_ply(const char *ply, const char *expected)
+{
+    Text text = {0};
+    text_appendf(&text, "%s", ply);
+    file_write(&text);
+    text_free(&text);
+    assert_messages("scene.yaml", SCENE, expected);
+    return scene_of_text("scene.yaml", SCENE);
+}
+
+// Normals and texture coordinates of vertices, and those of corners, which a vertex may have several of.
+static void normals_and_uvs_are_read(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_ply(
+        ASCII FACES "element vertex 4\n" XYZ "property float nx\nproperty float ny\nproperty float nz\n"
+                    "property float s\nproperty double t\n" END TRIANGLES
+                    "0 0 0 0 0 2 0.5 0.25\n1 0 0 0 1 0 1 0\n0 1 0 0 1 0 nan 1\n1 1 0 0 inf 0 1 1\n",
+        "4:18: warning: a.ply: texture coordinates that are not finite or too large, read as 0: 1\n"
+        "4:18: warning: a.ply: normals that are not finite or too large, not used: 1\n");
+    const Mesh *mesh = &scene.meshes.items[0];
+    const uint32_t(*read)[3] = (const uint32_t(*)[3])mesh->triangles;
+    assert_int_equal(mesh->vertex_count, 4);
+    assert_vector(mesh->normals[read[0][0]], 0, 0, 1);
+    assert_vector(mesh->normals[read[0][1]], 0, 1, 0);
+    assert_vector(mesh->normals[read[1][1]], 0, 0, 0);
+    assert_number(mesh->uvs[read[0][0]][0], 0.5);
+    assert_number(mesh->uvs[read[0][0]][1], 0.25);
+    assert_number(mesh->uvs[read[0][2]][0], 0);
+    scene_free(&scene);
+
+    scene = scene_of_ply(
+        ASCII "element face 2\nproperty list uchar float texcoord\nproperty list uchar int vertex_index\n"
+              "element vertex 4\n" XYZ "property float u\nproperty float v\n" END
+              "6 0 0 1 0 0 1 3 0 1 2\n4 1 0.5 1 1 3 1 3 2\n"
+              "0 0 0 9 9\n1 0 0 9 9\n0 1 0 9 9\n1 1 0 9 9\n",
+        "");
+    mesh = &scene.meshes.items[0];
+    read = (const uint32_t(*)[3])mesh->triangles;
+    assert_null(mesh->normals);
+    assert_int_equal(mesh->vertex_count, 6);
+    assert_number(mesh->uvs[read[0][1]][0], 1);
+    assert_number(mesh->uvs[read[0][1]][1], 0);
+    assert_number(mesh->uvs[read[1][0]][1], 0.5);
+    assert_number(mesh->uvs[read[1][2]][0], 0);
+    scene_free(&scene);
+}
+
+static void what_is_not_used_is_reported(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_ply(ASCII "element vertex 4\n" XYZ "property uchar red\nproperty uchar green\n"
+                                     "element edge 1\nproperty int vertex1\nelement empty 9\n" FACES END
+                                     "0 0 0 1 1\n1 0 0 1 1\n0 1 0 1 1\n1 1 0 1 1\n0\n" TRIANGLES,
+                               "7:16: warning: not used: 'red', 'green'\n"
+                               "9:9: warning: the element 'edge' is not used\n");
+    scene_free(&scene);
+}
+
+static void vertices_without_a_coordinate_are_refused(void **state)
+{
+    (void)state;
+    Text text = {0};
+    text_appendf(&text,
+                 ASCII "element vertex 1\nproperty float x\nproperty float z\n" FACES END "0 0\n" TRIANGLES);
+    assert_refused(&text, "3:9: error: the vertices have no 'y'");
+    text_free(&text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ascii_layouts_are_read),           cmocka_unit_test(binary_layouts_are_read),
-        cmocka_unit_test(faults_name_line_and_row),         cmocka_unit_test(binary_faults_name_byte_and_row),
+        cmocka_unit_test(ascii_layouts_are_read),
+        cmocka_unit_test(binary_layouts_are_read),
+        cmocka_unit_test(faults_name_line_and_row),
+        cmocka_unit_test(binary_faults_name_byte_and_row),
         cmocka_unit_test(binary_file_cut_short_is_refused),
+        cmocka_unit_test(normals_and_uvs_are_read),
+        cmocka_unit_test(what_is_not_used_is_reported),
+        cmocka_unit_test(vertices_without_a_coordinate_are_refused),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

@@ -36,6 +36,19 @@ static void mesh_fuzz(const char *path, const Source *source, MessageList *messa
     scene_free(&scene);
 }
 
+// The file is the one that a mesh names.
+static void mtl_fuzz(const char *path, const Source *source, MessageList *messages)
+{
+    static const char obj[] =
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1 2 3\n";
+    char obj_path[PATH_MAX];
+    snprintf(obj_path, sizeof obj_path, "%.*sobj", (int)(strlen(path) - strlen("mtl")), path);
+    FILE *file = fopen(obj_path, "wb");
+    if (!file || fputs(obj, file) < 0 || fclose(file) != 0) abort();
+    mesh_fuzz(obj_path, source, messages);
+    unlink(obj_path);
+}
+
 static const SceneOptions scene_options = {.lenient = true};
 
 static void yaml_fuzz(const char *path, const Source *source, MessageList *messages)
@@ -119,21 +132,14 @@ static const struct {
     const char *name, *file;
     void (*read)(const char *path, const Source *source, MessageList *messages);
 } readers[] = {
-    {"png", "a.png", image_fuzz},
-    {"jpeg", "a.jpg", image_fuzz},
-    {"ppm", "a.ppm", image_fuzz},
-    {"exr", "a.exr", image_fuzz},
-    {"npy", "a.npy", image_fuzz},
-    {"obj", "a.obj", mesh_fuzz},
-    {"ply", "a.ply", mesh_fuzz},
-    {"stl", "a.stl", mesh_fuzz},
-    {"yaml", "a.yaml", yaml_fuzz},
-    {"rt", "a.rt", rt_fuzz},
-    {"cfg", "a.cfg", cfg_fuzz},
-    {"nff", "a.nff", nff_fuzz},
-    {"checkpoint", "a", checkpoint_fuzz},
-    {"cache", "a", cache_fuzz},
-    {"baseline", "a.json", baseline_fuzz},
+    {"png", "a.png", image_fuzz}, {"jpeg", "a.jpg", image_fuzz},
+    {"ppm", "a.ppm", image_fuzz}, {"exr", "a.exr", image_fuzz},
+    {"npy", "a.npy", image_fuzz}, {"obj", "a.obj", mesh_fuzz},
+    {"mtl", "a.mtl", mtl_fuzz},   {"ply", "a.ply", mesh_fuzz},
+    {"stl", "a.stl", mesh_fuzz},  {"yaml", "a.yaml", yaml_fuzz},
+    {"rt", "a.rt", rt_fuzz},      {"cfg", "a.cfg", cfg_fuzz},
+    {"nff", "a.nff", nff_fuzz},   {"checkpoint", "a", checkpoint_fuzz},
+    {"cache", "a", cache_fuzz},   {"baseline", "a.json", baseline_fuzz},
 };
 
 static size_t reader;

@@ -4,14 +4,12 @@
 #include "host/base/memory.h"
 #include "host/import/mesh/affine.h"
 #include "host/import/mesh/draft.h"
-#include "host/import/mesh/ply.h"
 #include "host/import/number.h"
 
 #include <assimp/cimport.h>
 #include <assimp/scene.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 typedef struct {
     MeshDraft *draft;
@@ -115,25 +113,18 @@ static uint32_t material_index(Importer *importer, unsigned index)
     return *known;
 }
 
+// Of a mesh without normals or texture coordinates these are 0 where another has some.
 static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affine *affine)
 {
     const Affine for_normals = affine_for_normals(affine);
     for (unsigned i = 0; i < from->mNumVertices; i++) {
+        const Vector3 normal = from->mNormals ? vector_of(&from->mNormals[i]) : (Vector3){0, 0, 0};
         array_push(draft->positions, affine_point(affine, vector_of(&from->mVertices[i])));
-        if (from->mNormals)
-            array_push(draft->normals,
-                       vector_normalize(affine_direction(&for_normals, vector_of(&from->mNormals[i]))));
-        if (!from->mTextureCoords[0]) continue;
-        array_reserve(draft->uvs, 1);
-        double *uv = draft->uvs.items[draft->uvs.count++];
-        uv[0] = from->mTextureCoords[0][i].x;
-        uv[1] = from->mTextureCoords[0][i].y;
+        if (draft->is_shared[DRAFT_NORMAL])
+            array_push(draft->normals, vector_normalize(affine_direction(&for_normals, normal)));
+        const struct aiVector3D *uvs = from->mTextureCoords[0];
+        if (draft->is_shared[DRAFT_UV]) draft_add_uv(draft, uvs ? uvs[i].x : 0, uvs ? uvs[i].y : 0);
     }
-    const size_t corner = draft->face_start;
-    if (from->mNormals && draft->corners[DRAFT_NORMAL].count == 0)
-        draft_begin_part(draft, DRAFT_NORMAL, corner);
-    if (from->mTextureCoords[0] && draft->corners[DRAFT_UV].count == 0)
-        draft_begin_part(draft, DRAFT_UV, corner);
 }
 
 // Tested before the node's transform, whose rounding could give a degenerate triangle an area.
@@ -146,24 +137,18 @@ static bool face_has_area(const struct aiMesh *mesh, const struct aiFace *face)
     return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
 }
 
-static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct aiFace *face,
-                     const size_t first[DRAFT_PART_COUNT], bool mirrored)
+static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct aiFace *face, size_t first,
+                     bool mirrored)
 {
-    const bool has_part[] = {[DRAFT_POSITION] = true,
-                             [DRAFT_UV] = from->mTextureCoords[0] != NULL,
-                             [DRAFT_NORMAL] = from->mNormals != NULL};
     const unsigned count = face->mNumIndices;
     for (unsigned i = 0; i < count; i++)
         if (face->mIndices[i] >= from->mNumVertices)
             return draft_refuse(draft, "a face names vertex %u (from 0); there are %u", face->mIndices[i],
                                 from->mNumVertices);
-    const bool has_area = count < 3 || face_has_area(from, face);
+    const bool has_area = face_has_area(from, face);
     for (unsigned i = 0; i < count; i++) {
         const unsigned index = face->mIndices[!has_area ? 0 : mirrored ? (count - i) % count : i];
-        for (int part = 0; part < DRAFT_PART_COUNT; part++) {
-            if (part != DRAFT_POSITION && draft->corners[part].count == 0 && !has_part[part]) continue;
-            array_push(draft->corners[part], has_part[part] ? (uint32_t)(first[part] + index) : DRAFT_NONE);
-        }
+        array_push(draft->corners[DRAFT_POSITION], (uint32_t)(first + index));
     }
     return draft_end_face(draft, 0);
 }
@@ -171,9 +156,8 @@ static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct a
 static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine *affine)
 {
     MeshDraft *draft = importer->draft;
-    const size_t first[DRAFT_PART_COUNT] = {draft->positions.count, draft->uvs.count, draft->normals.count};
-    if (draft->positions.count + from->mNumVertices >= DRAFT_NONE)
-        return draft_refuse(draft, "too many vertices");
+    const size_t first = draft->positions.count;
+    if (first + from->mNumVertices >= DRAFT_NONE) return draft_refuse(draft, "too many vertices");
     if (importer->materials && from->mMaterialIndex >= importer->file->mNumMaterials)
         return draft_refuse(draft, "material %u (from 0) is not there", from->mMaterialIndex);
     if (importer->materials)
@@ -215,17 +199,7 @@ bool foreign_read(MeshDraft *draft)
 {
     char fault[200];
     if (gltf_find_fault(draft->import->path, fault, sizeof fault)) return draft_refuse(draft, "%s", fault);
-    Importer importer = {.draft = draft};
-    const char *ending = strrchr(draft->import->path, '.');
-    if (ending && !strcasecmp(ending, ".ply")) {
-        Text clean = {0};
-        if (!ply_rewrite(&clean, draft->import->path, fault, sizeof fault))
-            return draft_refuse(draft, "%s", fault);
-        importer.file = aiImportFileFromMemory(text_c(&clean), (unsigned)clean.count, 0, "ply");
-        text_free(&clean);
-    } else {
-        importer.file = aiImportFile(draft->import->path, 0);
-    }
+    Importer importer = {.draft = draft, .file = aiImportFile(draft->import->path, 0)};
     if (!importer.file) return draft_refuse(draft, "%s", aiGetErrorString());
     const bool added = file_add(&importer);
     aiReleaseImport(importer.file);

@@ -46,8 +46,10 @@ typedef struct {
         double (*items)[2];
         size_t count, capacity;
     } uvs;
-    // The corners of all faces: for each part one index, empty for a part that no corner has.
+    // The corners of all faces: for each part one index. None for a part that no corner has, or whose indices
+    // are those of the positions, of which each has one then.
     DraftIndices corners[DRAFT_PART_COUNT];
+    bool is_shared[DRAFT_PART_COUNT];
     struct {
         DraftPolygon *items;
         size_t count, capacity;
@@ -89,6 +91,19 @@ static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t in
     array_push(draft->corners[part], index);
 }
 
+static inline void draft_add_uv(MeshDraft *draft, double u, double v)
+{
+    array_reserve(draft->uvs, 1);
+    double *uv = draft->uvs.items[draft->uvs.count++];
+    uv[0] = u;
+    uv[1] = v;
+}
+
+static inline bool draft_has(const MeshDraft *draft, DraftPart part)
+{
+    return draft->is_shared[part] || draft->corners[part].count > 0;
+}
+
 // Ends the face at the corners since the last one: points and lines are skipped. False: too many corners.
 bool draft_end_face(MeshDraft *draft, size_t offset);
 
@@ -101,5 +116,7 @@ void draft_free(MeshDraft *draft);
 
 // The readers. False with an error.
 bool obj_read(MeshDraft *draft);
+bool ply_read(MeshDraft *draft);
+bool stl_read(MeshDraft *draft);
 // By assimp.
 bool foreign_read(MeshDraft *draft);

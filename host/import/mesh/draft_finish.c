@@ -223,7 +223,9 @@ typedef struct {
 
 static uint32_t part_of_corner(const MeshDraft *draft, DraftPart part, size_t corner)
 {
-    return draft->corners[part].count > 0 ? draft->corners[part].items[corner] : DRAFT_NONE;
+    return draft->corners[part].count > 0 ? draft->corners[part].items[corner]
+           : draft->is_shared[part]       ? draft->corners[DRAFT_POSITION].items[corner]
+                                          : DRAFT_NONE;
 }
 
 static uint32_t combination_add(Combiner *combiner, uint32_t position, Combination added)
@@ -235,9 +237,9 @@ static uint32_t combination_add(Combiner *combiner, uint32_t position, Combinati
     if (combiner->capacity < combiner->combinations.capacity) {
         combiner->capacity = combiner->combinations.capacity;
         mesh->vertices = memory_resize(mesh->vertices, combiner->capacity, sizeof *mesh->vertices);
-        if (draft->corners[DRAFT_NORMAL].count > 0)
+        if (draft_has(draft, DRAFT_NORMAL))
             mesh->normals = memory_resize(mesh->normals, combiner->capacity, sizeof *mesh->normals);
-        if (draft->corners[DRAFT_UV].count > 0)
+        if (draft_has(draft, DRAFT_UV))
             mesh->uvs = memory_resize(mesh->uvs, combiner->capacity, sizeof *mesh->uvs);
     }
     mesh->vertices[index] = draft->positions.items[position];
@@ -268,7 +270,7 @@ static uint32_t vertex_of_corner(Combiner *combiner, size_t corner)
     return combiner->first[position] = combination_add(combiner, position, wanted);
 }
 
-// Corners that have positions alone are taken over as they are.
+// Where all parts have the indices of the positions, those are the vertices.
 static void corners_combine(MeshDraft *draft, Mesh *mesh)
 {
     DraftIndices *corners = &draft->corners[DRAFT_POSITION];
@@ -277,6 +279,14 @@ static void corners_combine(MeshDraft *draft, Mesh *mesh)
         mesh->vertices = draft->positions.items;
         mesh->vertex_count = draft->positions.count;
         draft->positions.items = NULL;
+        if (draft->is_shared[DRAFT_NORMAL]) {
+            mesh->normals = draft->normals.items;
+            draft->normals.items = NULL;
+        }
+        if (draft->is_shared[DRAFT_UV]) {
+            mesh->uvs = draft->uvs.items;
+            draft->uvs.items = NULL;
+        }
     } else {
         Combiner combiner = {.draft = draft, .mesh = mesh};
         combiner.first = memory_allocate(draft->positions.count, sizeof *combiner.first);
@@ -316,7 +326,10 @@ static bool triangles_fit(MeshDraft *draft)
 
 bool draft_check(MeshDraft *draft)
 {
-    if (draft->import->smoothing == SMOOTH_NEVER) draft->corners[DRAFT_NORMAL].count = 0;
+    if (draft->import->smoothing == SMOOTH_NEVER) {
+        draft->corners[DRAFT_NORMAL].count = 0;
+        draft->is_shared[DRAFT_NORMAL] = false;
+    }
     return indices_are_sound(draft) && positions_are_sound(draft) && triangles_fit(draft);
 }
 

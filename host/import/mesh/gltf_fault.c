@@ -4,7 +4,6 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/import/mesh/mesh_import.h"
-#include "host/import/mesh/ply.h"
 
 #include <stdint.h>
 #include <stdio.h>

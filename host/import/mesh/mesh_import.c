@@ -12,7 +12,7 @@ static bool (*reader_of(const char *path))(MeshDraft *draft)
     static const struct {
         const char *ending;
         bool (*read)(MeshDraft *draft);
-    } readers[] = {{".obj", obj_read}};
+    } readers[] = {{".obj", obj_read}, {".ply", ply_read}, {".stl", stl_read}};
     const char *ending = strrchr(path, '.');
     for (size_t i = 0; ending && i < sizeof readers / sizeof *readers; i++)
         if (!strcasecmp(ending, readers[i].ending)) return readers[i].read;

@@ -298,7 +298,7 @@ static int name_compare(const void *name, const void *material)
 static void texture_use(MeshDraft *draft, MtlMaterial *material)
 {
     if (!material->image) return;
-    if (draft->corners[DRAFT_UV].count == 0) {
+    if (!draft_has(draft, DRAFT_UV)) {
         draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", material->image,
                    material->name);
         return;

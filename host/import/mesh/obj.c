@@ -56,8 +56,7 @@ static bool uv_read(ObjReader *reader)
     double numbers[3] = {NAN, 0, 0};
     int count;
     if (!numbers_read(reader, numbers, 3, &count) && count < 2) numbers[count] = NAN;
-    array_reserve(reader->draft->uvs, 1);
-    memcpy(reader->draft->uvs.items[reader->draft->uvs.count++], numbers, sizeof(double[2]));
+    draft_add_uv(reader->draft, numbers[0], numbers[1]);
     return true;
 }
 

@@ -1,10 +1,7 @@
 // A PLY file being read: its header and the read position.
 #pragma once
 
-#include "host/base/text.h"
-
-#include <stdbool.h>
-#include <stddef.h>
+#include "host/import/mesh/draft.h"
 
 // Text of the file, without a terminating NUL.
 typedef struct {
@@ -44,12 +41,8 @@ typedef struct {
 } PlyHeader;
 
 typedef struct {
-    const char *start;
+    MeshDraft *draft;
     PlySpan left; // unread
-    size_t line_number;
-    bool by_bytes; // errors give a byte offset instead of a line
-    char *fault;
-    size_t fault_size;
 } PlyReading;
 
 static inline bool ply_is_blank(char character)
@@ -65,20 +58,17 @@ static inline const char *ply_word_start(PlySpan *line)
     return line->at;
 }
 
-// The next line without its end, which is a newline, a carriage return or both. False at the end of the file;
-// the line number is then that of the missing line.
+// The next line without its end, which is a newline, a carriage return or both. False at the end of the file.
 bool ply_line(PlyReading *reading, PlySpan *line);
 // The next word of a line, empty at its end. Words are separated by spaces and tabs.
 PlySpan ply_word(PlySpan *line);
 bool ply_span_is(PlySpan span, const char *text);
 int ply_shown(PlySpan span); // bytes of it that a message shows
 
-// Writes the error as `line N: what` or `byte N: what`; always false.
-bool ply_fails(PlyReading *reading, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Reports an error at this place of the file; always false.
+bool ply_fails(PlyReading *reading, const char *at, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 
 // Reads up to the first byte of the body. False with an error if there is no valid header.
 bool ply_header_read(PlyHeader *header, PlyReading *reading);
 void ply_header_free(PlyHeader *header);
-
-bool ply_rewrite(Text *clean, const char *path, char *fault, size_t size);
-bool gltf_find_fault(const char *path, char *fault, size_t size);

@@ -13,7 +13,6 @@ enum { SHOWN_MAX = 40 };
 bool ply_line(PlyReading *reading, PlySpan *line)
 {
     PlySpan *left = &reading->left;
-    reading->line_number++;
     if (left->at == left->end) return false;
     const char *at = left->at, *end = left->end;
     while (at < end && *at != '\n' && *at != '\r')
@@ -45,16 +44,14 @@ int ply_shown(PlySpan span)
     return span.end - span.at < SHOWN_MAX ? (int)(span.end - span.at) : SHOWN_MAX;
 }
 
-bool ply_fails(PlyReading *reading, const char *format, ...)
+bool ply_fails(PlyReading *reading, const char *at, const char *format, ...)
 {
-    size_t place = reading->by_bytes ? (size_t)(reading->left.at - reading->start) : reading->line_number;
-    int start =
-        snprintf(reading->fault, reading->fault_size, "%s %zu: ", reading->by_bytes ? "byte" : "line", place);
+    char text[256];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(reading->fault + start, reading->fault_size - (size_t)start, format, arguments);
+    vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    return false;
+    return draft_fails(reading->draft, (size_t)(at - reading->draft->source.bytes), "%s", text);
 }
 
 static bool format_read(PlyHeader *header, PlyReading *reading, PlySpan line)
@@ -68,7 +65,7 @@ static bool format_read(PlyHeader *header, PlyReading *reading, PlySpan line)
     for (PlyFormat format = PLY_ASCII; format <= PLY_BIG_ENDIAN; format++)
         if (ply_span_is(word, names[format])) header->format = format;
     return header->format != PLY_NO_FORMAT ||
-           ply_fails(reading, "'%.*s' is no format of PLY", ply_shown(word), word.at);
+           ply_fails(reading, word.at, "'%.*s' is no format of PLY", ply_shown(word), word.at);
 }
 
 // No file holds as many rows as a longer number says.
@@ -88,7 +85,7 @@ static bool element_read(PlyHeader *header, PlyReading *reading, PlySpan line)
     PlyElement element = {.name = ply_word(&line), .first_property = header->properties.count};
     PlySpan count = ply_word(&line);
     if (!count_read(count, &element.count))
-        return ply_fails(reading, "'%.*s' is no number of '%.*s'", ply_shown(count), count.at,
+        return ply_fails(reading, count.at, "'%.*s' is no number of '%.*s'", ply_shown(count), count.at,
                          ply_shown(element.name), element.name.at);
     array_push(header->elements, element);
     return true;
@@ -112,12 +109,13 @@ static const PlyType *type_of(PlySpan word)
 static bool type_read(PlyReading *reading, PlySpan word, const PlyType **type)
 {
     *type = type_of(word);
-    return *type || ply_fails(reading, "'%.*s' is no type of PLY", ply_shown(word), word.at);
+    return *type || ply_fails(reading, word.at, "'%.*s' is no type of PLY", ply_shown(word), word.at);
 }
 
 static bool property_read(PlyHeader *header, PlyReading *reading, PlySpan line)
 {
-    if (header->elements.count == 0) return ply_fails(reading, "a property before the first element");
+    if (header->elements.count == 0)
+        return ply_fails(reading, line.at, "a property before the first element");
     PlyProperty property = {0};
     PlySpan word = ply_word(&line);
     if (ply_span_is(word, "list")) {
@@ -126,7 +124,8 @@ static bool property_read(PlyHeader *header, PlyReading *reading, PlySpan line)
     }
     if (!type_read(reading, word, &property.type)) return false;
     property.name = ply_word(&line);
-    if (property.name.at == property.name.end) return ply_fails(reading, "a property without a name");
+    if (property.name.at == property.name.end)
+        return ply_fails(reading, line.at, "a property without a name");
     array_push(header->properties, property);
     header->elements.items[header->elements.count - 1].property_count++;
     return true;
@@ -153,13 +152,15 @@ bool ply_header_read(PlyHeader *header, PlyReading *reading)
 {
     PlySpan line;
     if (!ply_line(reading, &line) || line.end - line.at < 3 || strncasecmp(line.at, "ply", 3) != 0)
-        return ply_fails(reading, "no PLY file, which starts with a line 'ply'");
+        return ply_fails(reading, reading->draft->source.bytes,
+                         "no PLY file, which starts with a line 'ply'");
     while (ply_line(reading, &line)) {
         if (is_end_of_header(line))
-            return header->format != PLY_NO_FORMAT || ply_fails(reading, "the header lacks its format");
+            return header->format != PLY_NO_FORMAT ||
+                   ply_fails(reading, line.at, "the header lacks its format");
         if (!header_line_read(header, reading, line)) return false;
     }
-    return ply_fails(reading, "the header lacks its end, a line 'end_header'");
+    return ply_fails(reading, reading->left.at, "the header lacks its end, a line 'end_header'");
 }
 
 void ply_header_free(PlyHeader *header)

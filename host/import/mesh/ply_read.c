@@ -1,102 +1,77 @@
-// Checks that a PLY file is complete, and rewrites it for assimp, whose reader allocates whatever length a
-// list claims, repeats the last line of a file that is too short, misreads a last line without a newline, and
-// misparses unknown elements, repeated blanks and empty lines.
-#include "host/base/array.h"
-#include "host/import/mesh/mesh_import.h"
+// A PLY file's vertices and faces (Turk, The PLY Polygon File Format, 1994), in text or binary.
+#include "host/import/line.h"
 #include "host/import/mesh/ply.h"
-#include "host/import/number.h"
 
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
+// What a property is to a mesh: a number of a vertex, or a list of a face.
+typedef enum {
+    ROLE_X,
+    ROLE_Y,
+    ROLE_Z,
+    ROLE_NX,
+    ROLE_NY,
+    ROLE_NZ,
+    ROLE_U,
+    ROLE_V,
+    ROLE_NUMBER_COUNT,
+    ROLE_CORNERS = ROLE_NUMBER_COUNT,
+    ROLE_CORNER_UVS,
+    ROLE_NONE,
+} PlyRole;
+
+typedef struct {
+    double *items;
+    size_t count, capacity;
+} Numbers;
+
 typedef struct {
     PlyHeader header;
     PlyReading reading;
-    Text *clean;
-    size_t header_size;        // of `clean`
+    PlySpan line;              // of text: what is left of the row's line
     const PlyElement *element; // of the current row, and the row's index
-    bool wanted;               // assimp uses the element
-    PlySpan kept;              // consecutive lines not written yet
     size_t row;
-    const PlyProperty *corners, *coordinates; // the element's lists; NULL: none
-    double corner_count, coordinate_count;    // of the current row
-} PlyRewriter;
+    struct {
+        PlyRole *items;
+        size_t count, capacity;
+    } roles; // of the element's properties
+    bool has_role[ROLE_NONE + 1];
+    double numbers[ROLE_NONE + 1]; // of the current vertex
+    const char *unread;            // its first coordinate that is no number in range, or NULL
+    Numbers corners, corner_uvs;   // of the current face
+} PlyReader;
 
-static const PlyProperty *properties_of(const PlyRewriter *rewriter, const PlyElement *element)
+static const PlyProperty *properties_of(const PlyReader *reader, const PlyElement *element)
 {
-    return rewriter->header.properties.items + element->first_property;
+    return reader->header.properties.items + element->first_property;
 }
-
-static bool is_one_of(PlySpan name, const char *const *names, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        if (ply_span_is(name, names[i])) return true;
-    return false;
-}
-
-#define IS_ONE_OF(name, ...)                                                                                 \
-    is_one_of(name, (const char *const[]){__VA_ARGS__},                                                      \
-              sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 
 static bool is_wanted(const PlyElement *element)
 {
-    return element->property_count > 0 && IS_ONE_OF(element->name, "vertex", "face", "material");
+    return element->property_count > 0 &&
+           (ply_span_is(element->name, "vertex") || ply_span_is(element->name, "face"));
 }
 
-// assimp reads the first item of an optional list even if the list is empty.
-static bool name_is_wanted(const PlyElement *element, const PlyProperty *property)
+static PlyRole role_of(const PlyElement *element, const PlyProperty *property)
 {
-    if (property->count_type)
-        return ply_span_is(element->name, "face") &&
-               IS_ONE_OF(property->name, "vertex_index", "vertex_indices", "texcoord");
-    for (const char *at = property->name.at; at < property->name.end; at++)
-        if (*at <= ' ' || *at > '~') return false;
-    return true;
-}
-
-static void element_write(PlyRewriter *rewriter, const PlyElement *element)
-{
-    text_appendf(rewriter->clean, "element %.*s %zu\n", (int)(element->name.end - element->name.at),
-                 element->name.at, element->count);
-    for (size_t i = 0; i < element->property_count; i++) {
-        const PlyProperty *property = &properties_of(rewriter, element)[i];
-        text_appendf(rewriter->clean, "property ");
-        if (property->count_type) text_appendf(rewriter->clean, "list %s ", property->count_type->name);
-        text_appendf(rewriter->clean, "%s ", property->type->name);
-        if (name_is_wanted(element, property))
-            text_append(rewriter->clean, property->name.at, (size_t)(property->name.end - property->name.at));
-        else
-            text_appendf(rewriter->clean, "unknown");
-        text_appendf(rewriter->clean, "\n");
+    static const struct {
+        const char *name;
+        PlyRole role;
+    } numbers[] = {{"x", ROLE_X},   {"y", ROLE_Y}, {"z", ROLE_Z},  {"nx", ROLE_NX},       {"ny", ROLE_NY},
+                   {"nz", ROLE_NZ}, {"u", ROLE_U}, {"s", ROLE_U},  {"texture_u", ROLE_U}, {"tx", ROLE_U},
+                   {"v", ROLE_V},   {"t", ROLE_V}, {"ty", ROLE_V}, {"texture_v", ROLE_V}},
+      lists[] = {
+          {"vertex_indices", ROLE_CORNERS}, {"vertex_index", ROLE_CORNERS}, {"texcoord", ROLE_CORNER_UVS}};
+    if (ply_span_is(element->name, "vertex") && !property->count_type) {
+        for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+            if (ply_span_is(property->name, numbers[i].name)) return numbers[i].role;
+    } else if (ply_span_is(element->name, "face") && property->count_type) {
+        for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
+            if (ply_span_is(property->name, lists[i].name)) return lists[i].role;
     }
-}
-
-static void header_write(PlyRewriter *rewriter)
-{
-    static const char *const formats[] = {
-        [PLY_ASCII] = "ascii",
-        [PLY_LITTLE_ENDIAN] = "binary_little_endian",
-        [PLY_BIG_ENDIAN] = "binary_big_endian",
-    };
-    text_appendf(rewriter->clean, "ply\nformat %s 1.0\n", formats[rewriter->header.format]);
-    for (size_t i = 0; i < rewriter->header.elements.count; i++)
-        if (is_wanted(&rewriter->header.elements.items[i]))
-            element_write(rewriter, &rewriter->header.elements.items[i]);
-    text_appendf(rewriter->clean, "end_header\n");
-    rewriter->header_size = rewriter->clean->count;
-}
-
-// assimp takes a newline right after the header for part of it unless a carriage return precedes.
-static void rows_write(PlyRewriter *rewriter, PlySpan rows)
-{
-    if (rewriter->clean->count == rewriter->header_size && rows.at < rows.end && *rows.at == '\n') {
-        rewriter->clean->count--;
-        text_append(rewriter->clean, "\r\n", 2);
-    }
-    text_append(rewriter->clean, rows.at, (size_t)(rows.end - rows.at));
+    return ROLE_NONE;
 }
 
 static bool names_agree(PlySpan a, PlySpan b)
@@ -105,227 +80,122 @@ static bool names_agree(PlySpan a, PlySpan b)
     return length == (size_t)(b.end - b.at) && !memcmp(a.at, b.at, length);
 }
 
-// If an element is declared twice, assimp writes the second's rows beyond the first's; of a triangle strip it
-// keeps one triangle.
-static bool elements_are_sound(PlyRewriter *rewriter)
+static bool elements_are_sound(PlyReader *reader)
 {
-    const PlyElement *elements = rewriter->header.elements.items;
-    for (size_t i = 0; i < rewriter->header.elements.count; i++) {
+    const PlyElement *elements = reader->header.elements.items;
+    for (size_t i = 0; i < reader->header.elements.count; i++) {
         PlySpan name = elements[i].name;
         if (ply_span_is(name, "tristrips") && elements[i].count > 0)
-            return ply_fails(&rewriter->reading, "strips of triangles (tristrips) are not read, only faces");
+            return ply_fails(&reader->reading, name.at,
+                             "strips of triangles (tristrips) are not read, only faces");
         for (size_t k = 0; k < i && is_wanted(&elements[i]); k++)
             if (names_agree(name, elements[k].name))
-                return ply_fails(&rewriter->reading, "the header declares '%.*s' twice", ply_shown(name),
-                                 name.at);
+                return ply_fails(&reader->reading, name.at, "the header declares '%.*s' twice",
+                                 ply_shown(name), name.at);
     }
     return true;
 }
 
-static bool is_digit(char character)
+// One warning for each element: of all that it has where nothing of it is used.
+static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
 {
-    return character >= '0' && character <= '9';
-}
-
-// More digits before the point or in an exponent overflow in assimp.
-static const char *digits_skip(const char *at, const char *end)
-{
-    enum { DIGITS_MAX = 19 };
-    const char *first = at;
-    while (at < end && is_digit(*at) && at - first < DIGITS_MAX)
-        at++;
-    return at;
-}
-
-static const char *sign_skip(const char *at, const char *end)
-{
-    return at < end && (*at == '-' || *at == '+') ? at + 1 : at;
-}
-
-// The end of the number that starts at `at`; NULL if assimp would not read it as that number.
-static const char *whole_skip(const char *at, const char *end, PlyNumberKind kind)
-{
-    const char *first = kind == PLY_SIGNED ? sign_skip(at, end) : at;
-    uint64_t value = 0;
-    for (at = first; at < end && is_digit(*at) && value <= UINT32_MAX; at++)
-        value = 10 * value + (uint64_t)(*at - '0');
-    return at > first && value <= UINT32_MAX ? at : NULL;
-}
-
-static const char *not_finite_skip(const char *at, const char *end)
-{
-    static const char *const names[] = {"infinity", "inf", "nan"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        size_t length = strlen(names[i]);
-        if ((size_t)(end - at) >= length && !strncasecmp(at, names[i], length)) return at + length;
+    Text unused = {0};
+    const PlyProperty *first = NULL;
+    for (size_t i = 0; i < element->property_count; i++) {
+        const PlyProperty *property = &properties_of(reader, element)[i];
+        if (reader->roles.items[i] != ROLE_NONE) continue;
+        text_appendf(&unused, "%s '%.*s'", first ? "," : "", ply_shown(property->name), property->name.at);
+        if (!first) first = property;
     }
-    return NULL;
+    const PlySpan name = element->name;
+    const char *start = reader->reading.draft->source.bytes;
+    if (!is_wanted(element))
+        report_warning(&reader->reading.draft->report, (size_t)(name.at - start),
+                       "the element '%.*s' is not used", ply_shown(name), name.at);
+    else if (first)
+        report_warning(&reader->reading.draft->report, (size_t)(first->name.at - start), "not used:%s",
+                       text_c(&unused));
+    text_free(&unused);
 }
 
-static const char *real_skip(const char *at, const char *end)
+static bool is_binary(const PlyReader *reader)
 {
-    at = sign_skip(at, end);
+    return reader->header.format != PLY_ASCII;
+}
+
+static bool value_missing(PlyReader *reader, const PlyProperty *property)
+{
+    PlySpan element = reader->element->name;
+    return ply_fails(&reader->reading, is_binary(reader) ? reader->reading.left.at : reader->line.at,
+                     "%.*s %zu (from 0) lacks its '%.*s'", ply_shown(element), element.at, reader->row,
+                     ply_shown(property->name), property->name.at);
+}
+
+// Whole numbers have 32 bits.
+static bool whole_read(const char **text, const char *end, PlyNumberKind kind, double *value)
+{
+    const char *at = *text;
+    const bool is_negative = kind == PLY_SIGNED && at < end && *at == '-';
+    if (kind == PLY_SIGNED && at < end && (*at == '-' || *at == '+')) at++;
     const char *first = at;
-    at = digits_skip(at, end);
-    bool has_digits = at > first;
-    if (at < end && *at == '.')
-        for (at++; at < end && is_digit(*at); at++)
-            has_digits = true;
-    if (!has_digits) return not_finite_skip(first, end);
-    if (at == end || (*at != 'e' && *at != 'E')) return at;
-    first = sign_skip(at + 1, end);
-    at = digits_skip(first, end);
-    return at > first ? at : NULL;
+    uint64_t number = 0;
+    for (; at < end && (unsigned char)(*at - '0') < 10 && number <= UINT32_MAX; at++)
+        number = 10 * number + (uint64_t)(*at - '0');
+    if (at == first || number > UINT32_MAX) return false;
+    *text = at;
+    *value = is_negative ? -(double)number : (double)number;
+    return true;
 }
 
-// Reports that the row lacks the property's value; always false.
-static bool value_missing(PlyRewriter *rewriter, const PlyProperty *property)
+// What is not finite or too large becomes NAN.
+static bool real_read(const char **text, const char *end, double *value)
 {
-    PlySpan element = rewriter->element->name;
-    return ply_fails(&rewriter->reading, "%.*s %zu (from 0) lacks its '%.*s'", ply_shown(element), element.at,
-                     rewriter->row, ply_shown(property->name), property->name.at);
-}
-
-// Reads the line's next word, if any.
-static bool word_read(PlyRewriter *rewriter, const PlyType *type, PlySpan *line, PlySpan *word)
-{
-    const char *start = ply_word_start(line), *end = line->end;
-    *word = (PlySpan){start, start};
-    if (start == end) return true;
-    const char *at = type->kind == PLY_REAL ? real_skip(start, end) : whole_skip(start, end, type->kind);
-    if (at && (at == end || ply_is_blank(*at))) {
-        line->at = word->end = at;
+    static const char *const not_finite[] = {"infinity", "inf", "nan"};
+    const NumberStatus status = number_scan(text, end, value);
+    if (status != NUMBER_READ) *value = NAN;
+    if (status != NUMBER_MALFORMED) return true;
+    const char *at = *text;
+    if (at < end && (*at == '-' || *at == '+')) at++;
+    for (size_t i = 0; i < sizeof not_finite / sizeof *not_finite; i++) {
+        const size_t length = strlen(not_finite[i]);
+        if ((size_t)(end - at) < length || strncasecmp(at, not_finite[i], length) != 0) continue;
+        *text = at + length;
         return true;
     }
-    *word = ply_word(line);
-    return ply_fails(&rewriter->reading, "'%.*s' is no number of type %s", ply_shown(*word), word->at,
+    return false;
+}
+
+// The line's next word as a number of the type; `is_there` says whether there is one.
+static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
+{
+    const char *at = ply_word_start(&reader->line), *end = reader->line.end;
+    *is_there = at < end;
+    if (at == end) return true;
+    const bool read =
+        type->kind == PLY_REAL ? real_read(&at, end, value) : whole_read(&at, end, type->kind, value);
+    if (read && (at == end || ply_is_blank(*at))) {
+        reader->line.at = at;
+        return true;
+    }
+    const PlySpan word = ply_word(&reader->line);
+    return ply_fails(&reader->reading, word.at, "'%.*s' is no number of type %s", ply_shown(word), word.at,
                      type->name);
 }
 
-static bool line_number_read(PlyRewriter *rewriter, const PlyProperty *property, const PlyType *type,
-                             PlySpan *line, PlySpan *word)
+static size_t bytes_left(const PlyReader *reader)
 {
-    if (!word_read(rewriter, type, line, word)) return false;
-    return word->at < word->end || value_missing(rewriter, property);
+    return (size_t)(reader->reading.left.end - reader->reading.left.at);
 }
 
-static bool list_fails(PlyRewriter *rewriter, const PlyProperty *property, double promised, size_t held,
-                       const char *holder)
+static double binary_number(const PlyReader *reader, const PlyType *type)
 {
-    PlySpan element = rewriter->element->name;
-    return ply_fails(&rewriter->reading,
-                     "%.*s %zu (from 0) declares %.15g numbers of '%.*s', %s has %zu more",
-                     ply_shown(element), element.at, rewriter->row, promised, ply_shown(property->name),
-                     property->name.at, holder, held);
-}
-
-static bool is_count(double number)
-{
-    return number >= 0 && floor(number) == number;
-}
-
-static void list_note(PlyRewriter *rewriter, const PlyProperty *property, double count)
-{
-    if (property == rewriter->corners) rewriter->corner_count = count;
-    if (property == rewriter->coordinates) rewriter->coordinate_count = count;
-}
-
-// assimp also reads texture coordinates for corners that do not exist.
-static bool row_is_sound(PlyRewriter *rewriter)
-{
-    if (rewriter->coordinate_count <= 2 * rewriter->corner_count) return true;
-    return ply_fails(&rewriter->reading, "face %zu (from 0) has %.15g corners, but %.15g texture coordinates",
-                     rewriter->row, rewriter->corner_count, rewriter->coordinate_count / 2);
-}
-
-static bool line_count_read(PlyRewriter *rewriter, const PlyProperty *property, PlySpan *line, double *count)
-{
-    PlySpan word;
-    if (!line_number_read(rewriter, property, property->count_type, line, &word)) return false;
-    size_t length = (size_t)(word.end - word.at);
-    if (length == 1 && is_digit(*word.at)) {
-        *count = *word.at - '0';
-        return true;
-    }
-    return (number_read(word.at, length, count) == NUMBER_READ && is_count(*count)) ||
-           ply_fails(&rewriter->reading, "'%.*s' is no length of a list", ply_shown(word), word.at);
-}
-
-static bool line_list_read(PlyRewriter *rewriter, const PlyProperty *property, PlySpan *line)
-{
-    double count;
-    if (!line_count_read(rewriter, property, line, &count)) return false;
-    list_note(rewriter, property, count);
-    for (size_t i = 0; (double)i < count; i++) {
-        PlySpan word;
-        if (!word_read(rewriter, property->type, line, &word)) return false;
-        if (word.at == word.end) return list_fails(rewriter, property, count, i, "the line");
-    }
-    return true;
-}
-
-// The next nonempty line.
-static bool line_row_start(PlyRewriter *rewriter, PlySpan *line)
-{
-    PlySpan name = rewriter->element->name;
-    do {
-        if (!ply_line(&rewriter->reading, line))
-            return ply_fails(&rewriter->reading, "the file ends before %.*s %zu (from 0) of %zu",
-                             ply_shown(name), name.at, rewriter->row, rewriter->element->count);
-    } while (ply_word_start(line) == line->end);
-    return true;
-}
-
-static void kept_write(PlyRewriter *rewriter)
-{
-    if (!rewriter->kept.at) return;
-    text_append(rewriter->clean, rewriter->kept.at, (size_t)(rewriter->kept.end - rewriter->kept.at));
-    text_append(rewriter->clean, "\n", 1);
-    rewriter->kept = (PlySpan){0};
-}
-
-// Well-formed input is copied in one piece.
-static void line_keep(PlyRewriter *rewriter, PlySpan line)
-{
-    PlySpan *kept = &rewriter->kept;
-    if (kept->at && line.at == kept->end + 1 && *kept->end == '\n') {
-        kept->end = line.end;
-        return;
-    }
-    kept_write(rewriter);
-    *kept = line;
-}
-
-// A row is a line; what follows the last property is ignored.
-static bool line_row_read(PlyRewriter *rewriter)
-{
-    PlySpan line, word;
-    if (!line_row_start(rewriter, &line)) return false;
-    const char *start = line.at;
-    for (size_t i = 0; i < rewriter->element->property_count; i++) {
-        const PlyProperty *property = &properties_of(rewriter, rewriter->element)[i];
-        if (property->count_type ? !line_list_read(rewriter, property, &line)
-                                 : !line_number_read(rewriter, property, property->type, &line, &word))
-            return false;
-    }
-    if (rewriter->wanted) line_keep(rewriter, (PlySpan){start, line.at});
-    return true;
-}
-
-static size_t bytes_left(const PlyRewriter *rewriter)
-{
-    return (size_t)(rewriter->reading.left.end - rewriter->reading.left.at);
-}
-
-static double binary_number(const PlyRewriter *rewriter, const PlyType *type)
-{
-    const unsigned char *bytes = (const unsigned char *)rewriter->reading.left.at;
+    const unsigned char *bytes = (const unsigned char *)reader->reading.left.at;
     uint64_t bits = 0;
     for (size_t i = 0; i < type->size; i++)
-        bits = bits << 8 | bytes[rewriter->header.format == PLY_BIG_ENDIAN ? i : type->size - 1 - i];
+        bits = bits << 8 | bytes[reader->header.format == PLY_BIG_ENDIAN ? i : type->size - 1 - i];
     if (type->kind == PLY_UNSIGNED) return (double)bits;
     if (type->kind == PLY_SIGNED) {
-        const uint64_t sign = type->size == 1 ? 0x80 : type->size == 2 ? 0x8000 : 0x80000000;
+        const uint64_t sign = (uint64_t)1 << (8 * type->size - 1);
         return (double)(bits & (sign - 1)) - (double)(bits & sign);
     }
     double number;
@@ -336,98 +206,206 @@ static double binary_number(const PlyRewriter *rewriter, const PlyType *type)
     return type->size == sizeof single ? single : number;
 }
 
-static bool bytes_skip(PlyRewriter *rewriter, const PlyProperty *property, size_t size)
+// The row's next number, which must be there.
+static bool number_next(PlyReader *reader, const PlyProperty *property, const PlyType *type, double *value)
 {
-    if (size > bytes_left(rewriter)) return value_missing(rewriter, property);
-    rewriter->reading.left.at += size;
-    return true;
-}
-
-static bool binary_list_read(PlyRewriter *rewriter, const PlyProperty *property)
-{
-    const char *start = rewriter->reading.left.at;
-    if (!bytes_skip(rewriter, property, property->count_type->size)) return false;
-    rewriter->reading.left.at = start;
-    double count = binary_number(rewriter, property->count_type);
-    rewriter->reading.left.at += property->count_type->size;
-    size_t most = bytes_left(rewriter) / property->type->size;
-    if (!is_count(count) || count > (double)most) {
-        rewriter->reading.left.at = start;
-        return list_fails(rewriter, property, count, most, "the file");
+    if (is_binary(reader)) {
+        if (bytes_left(reader) < type->size) return value_missing(reader, property);
+        *value = binary_number(reader, type);
+        reader->reading.left.at += type->size;
+        return true;
     }
-    list_note(rewriter, property, count);
-    return bytes_skip(rewriter, property, (size_t)count * property->type->size);
+    bool is_there;
+    return word_read(reader, type, value, &is_there) && (is_there || value_missing(reader, property));
 }
 
-static bool binary_row_read(PlyRewriter *rewriter)
+static bool list_fails(PlyReader *reader, const PlyProperty *property, const char *at, double promised,
+                       size_t held)
 {
-    for (size_t i = 0; i < rewriter->element->property_count; i++) {
-        const PlyProperty *property = &properties_of(rewriter, rewriter->element)[i];
-        if (property->count_type ? !binary_list_read(rewriter, property)
-                                 : !bytes_skip(rewriter, property, property->type->size))
+    PlySpan element = reader->element->name;
+    return ply_fails(&reader->reading, at,
+                     "%.*s %zu (from 0) declares %.15g numbers of '%.*s', the %s has %zu more",
+                     ply_shown(element), element.at, reader->row, promised, ply_shown(property->name),
+                     property->name.at, is_binary(reader) ? "file" : "line", held);
+}
+
+static bool is_count(double number)
+{
+    return number >= 0 && floor(number) == number;
+}
+
+static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *numbers)
+{
+    double count;
+    const char *start = is_binary(reader) ? reader->reading.left.at : ply_word_start(&reader->line);
+    if (!number_next(reader, property, property->count_type, &count)) return false;
+    if (is_binary(reader)) {
+        const size_t most = bytes_left(reader) / property->type->size;
+        if (!is_count(count) || count > (double)most) return list_fails(reader, property, start, count, most);
+        if (!numbers) {
+            reader->reading.left.at += (size_t)count * property->type->size;
+            return true;
+        }
+    } else if (!is_count(count)) {
+        return ply_fails(&reader->reading, start, "%.15g is no length of a list", count);
+    }
+    for (size_t i = 0; (double)i < count; i++) {
+        double value;
+        bool is_there = true;
+        if (is_binary(reader) ? !number_next(reader, property, property->type, &value)
+                              : !word_read(reader, property->type, &value, &is_there))
             return false;
+        if (!is_there) return list_fails(reader, property, start, count, i);
+        if (numbers) array_push(*numbers, value);
     }
     return true;
 }
 
-static void element_start(PlyRewriter *rewriter, const PlyElement *element)
+static bool property_read(PlyReader *reader, size_t index)
 {
-    rewriter->element = element;
-    rewriter->wanted = is_wanted(element);
-    rewriter->corners = rewriter->coordinates = NULL;
-    for (size_t i = 0; i < element->property_count && rewriter->wanted; i++) {
-        const PlyProperty *property = &properties_of(rewriter, element)[i];
-        if (!property->count_type || !name_is_wanted(element, property)) continue;
-        *(ply_span_is(property->name, "texcoord") ? &rewriter->coordinates : &rewriter->corners) = property;
+    const PlyProperty *property = &properties_of(reader, reader->element)[index];
+    const PlyRole role = reader->roles.items[index];
+    if (property->count_type)
+        return list_read(reader, property,
+                         role == ROLE_CORNERS      ? &reader->corners
+                         : role == ROLE_CORNER_UVS ? &reader->corner_uvs
+                                                   : NULL);
+    if (role <= ROLE_Z && !is_binary(reader) && !reader->unread) {
+        const char *start = ply_word_start(&reader->line);
+        if (!number_next(reader, property, property->type, &reader->numbers[role])) return false;
+        if (isnan(reader->numbers[role])) reader->unread = start;
+        return true;
+    }
+    return number_next(reader, property, property->type, &reader->numbers[role]);
+}
+
+// A row of text is a nonempty line; what follows its last property is ignored.
+static bool row_start(PlyReader *reader)
+{
+    PlySpan name = reader->element->name;
+    do {
+        if (!ply_line(&reader->reading, &reader->line))
+            return ply_fails(&reader->reading, reader->reading.left.at,
+                             "the file ends before %.*s %zu (from 0) of %zu", ply_shown(name), name.at,
+                             reader->row, reader->element->count);
+    } while (ply_word_start(&reader->line) == reader->line.end);
+    return true;
+}
+
+static bool vertex_add(PlyReader *reader)
+{
+    MeshDraft *draft = reader->reading.draft;
+    const double *numbers = reader->numbers;
+    if (reader->unread)
+        array_push(draft->unread,
+                   ((DraftPlace){draft->positions.count, (size_t)(reader->unread - draft->source.bytes)}));
+    if (draft->positions.count == DRAFT_NONE - 1) return draft_refuse(draft, "too many vertices");
+    array_push(draft->positions, ((Vector3){numbers[ROLE_X], numbers[ROLE_Y], numbers[ROLE_Z]}));
+    if (draft->is_shared[DRAFT_NORMAL])
+        array_push(draft->normals, ((Vector3){numbers[ROLE_NX], numbers[ROLE_NY], numbers[ROLE_NZ]}));
+    if (draft->is_shared[DRAFT_UV]) draft_add_uv(draft, numbers[ROLE_U], numbers[ROLE_V]);
+    return true;
+}
+
+static bool face_add(PlyReader *reader)
+{
+    MeshDraft *draft = reader->reading.draft;
+    const char *at = is_binary(reader) ? reader->reading.left.at : reader->line.at;
+    const size_t offset = (size_t)(at - draft->source.bytes), count = reader->corners.count;
+    if (reader->corner_uvs.count > 2 * count)
+        return ply_fails(&reader->reading, at,
+                         "face %zu (from 0) has %zu corners, but %zu texture coordinates", reader->row, count,
+                         reader->corner_uvs.count / 2);
+    for (size_t i = 0; i < count; i++) {
+        const double index = reader->corners.items[i];
+        if (!(index >= 0 && index <= UINT32_MAX && floor(index) == index))
+            return ply_fails(&reader->reading, at, "face %zu (from 0) names vertex %.15g", reader->row,
+                             index);
+        draft_add_index(draft, DRAFT_POSITION, (uint32_t)index, offset);
+        if (!reader->has_role[ROLE_CORNER_UVS]) continue;
+        const bool has_uv = 2 * i + 1 < reader->corner_uvs.count;
+        array_push(draft->corners[DRAFT_UV], has_uv ? (uint32_t)draft->uvs.count : DRAFT_NONE);
+        if (has_uv) draft_add_uv(draft, reader->corner_uvs.items[2 * i], reader->corner_uvs.items[2 * i + 1]);
+    }
+    return draft_end_face(draft, offset);
+}
+
+static bool row_read(PlyReader *reader)
+{
+    reader->unread = NULL;
+    reader->corners.count = reader->corner_uvs.count = 0;
+    if (!is_binary(reader) && !row_start(reader)) return false;
+    for (size_t i = 0; i < reader->element->property_count; i++)
+        if (!property_read(reader, i)) return false;
+    if (!is_wanted(reader->element)) return true;
+    return ply_span_is(reader->element->name, "face") ? face_add(reader) : vertex_add(reader);
+}
+
+static void roles_find(PlyReader *reader, const PlyElement *element)
+{
+    reader->roles.count = 0;
+    memset(reader->has_role, 0, sizeof reader->has_role);
+    for (size_t i = 0; i < element->property_count; i++) {
+        PlyRole role = role_of(element, &properties_of(reader, element)[i]);
+        if (reader->has_role[role]) role = ROLE_NONE;
+        array_push(reader->roles, role);
+        reader->has_role[role] = true;
     }
 }
 
-static bool element_read(PlyRewriter *rewriter, const PlyElement *element)
+// These come before the vertices'.
+static bool corners_have_uvs(const PlyReader *reader)
 {
-    bool (*row_read)(PlyRewriter *) = rewriter->reading.by_bytes ? binary_row_read : line_row_read;
-    element_start(rewriter, element);
-    const char *start = rewriter->reading.left.at;
+    for (size_t i = 0; i < reader->header.elements.count; i++) {
+        const PlyElement *element = &reader->header.elements.items[i];
+        for (size_t k = 0; k < element->property_count; k++)
+            if (role_of(element, &properties_of(reader, element)[k]) == ROLE_CORNER_UVS) return true;
+    }
+    return false;
+}
+
+static bool element_start(PlyReader *reader, const PlyElement *element)
+{
+    static const char *const names[] = {"x", "y", "z"};
+    MeshDraft *draft = reader->reading.draft;
+    reader->element = element;
+    roles_find(reader, element);
+    if (element->property_count == 0) return true;
+    element_warn_of_unused(reader, element);
+    if (!ply_span_is(element->name, "vertex")) return true;
+    for (PlyRole role = ROLE_X; role <= ROLE_Z; role++)
+        if (!reader->has_role[role])
+            return ply_fails(&reader->reading, element->name.at, "the vertices have no '%s'", names[role]);
+    draft->is_shared[DRAFT_NORMAL] =
+        reader->has_role[ROLE_NX] && reader->has_role[ROLE_NY] && reader->has_role[ROLE_NZ];
+    draft->is_shared[DRAFT_UV] =
+        reader->has_role[ROLE_U] && reader->has_role[ROLE_V] && !corners_have_uvs(reader);
+    return true;
+}
+
+static bool element_read(PlyReader *reader, const PlyElement *element)
+{
+    MeshDraft *draft = reader->reading.draft;
+    draft->is_binary = false; // the header's lines
+    if (!element_start(reader, element)) return false;
+    draft->is_binary = is_binary(reader);
     // without properties there are no rows, whatever their number
-    size_t count = element->property_count > 0 ? element->count : 0;
-    for (rewriter->row = 0; rewriter->row < count; rewriter->row++) {
-        rewriter->corner_count = rewriter->coordinate_count = 0;
-        if (!row_read(rewriter) || !row_is_sound(rewriter)) return false;
-    }
-    if (rewriter->reading.by_bytes && rewriter->wanted)
-        rows_write(rewriter, (PlySpan){start, rewriter->reading.left.at});
+    const size_t count = element->property_count > 0 ? element->count : 0;
+    for (reader->row = 0; reader->row < count; reader->row++)
+        if (!row_read(reader)) return false;
     return true;
 }
 
-static bool file_rewrite(PlyRewriter *rewriter)
+bool ply_read(MeshDraft *draft)
 {
-    if (!ply_header_read(&rewriter->header, &rewriter->reading) || !elements_are_sound(rewriter))
-        return false;
-    header_write(rewriter);
-    rewriter->reading.by_bytes = rewriter->header.format != PLY_ASCII;
-    for (size_t i = 0; i < rewriter->header.elements.count; i++)
-        if (!element_read(rewriter, &rewriter->header.elements.items[i])) return false;
-    kept_write(rewriter);
-    return true;
-}
-
-bool ply_rewrite(Text *clean, const char *path, char *fault, size_t size)
-{
-    MessageList messages = {0};
-    Text file = {0};
-    bool read = text_read_file(&file, path, &messages);
-    if (read) {
-        const char *start = text_c(&file);
-        PlyRewriter rewriter = {.reading = {.start = start, .left = {start, start + file.count}},
-                                .clean = clean};
-        rewriter.reading.fault = fault;
-        rewriter.reading.fault_size = size;
-        array_reserve(*clean, file.count + 1);
-        read = file_rewrite(&rewriter);
-        ply_header_free(&rewriter.header);
-    } else {
-        snprintf(fault, size, "the file cannot be read");
-    }
-    text_free(&file);
-    message_list_free(&messages);
+    const Source *source = &draft->source;
+    PlyReader reader = {.reading = {draft, {source->bytes, source->bytes + source->length}}};
+    bool read = ply_header_read(&reader.header, &reader.reading) && elements_are_sound(&reader);
+    for (size_t i = 0; read && i < reader.header.elements.count; i++)
+        read = element_read(&reader, &reader.header.elements.items[i]);
+    ply_header_free(&reader.header);
+    free(reader.roles.items);
+    free(reader.corners.items);
+    free(reader.corner_uvs.items);
     return read;
 }

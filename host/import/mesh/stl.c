@@ -1,0 +1,131 @@
+// STL (3D Systems, StereoLithography Interface Specification, 1989), in text or binary. The normals of its
+// facets are those of its triangles, so they are not read.
+#include "host/import/mesh/draft.h"
+#include "host/import/mesh/scan.h"
+
+#include <strings.h>
+
+enum { HEADER_SIZE = 84, FACET_SIZE = 50, FACET_VERTICES = 12, FACET_ATTRIBUTE = 48 };
+
+static bool word_is_in_any_case(Word word, const char *text)
+{
+    return word.length == strlen(text) && strncasecmp(word.text, text, word.length) == 0;
+}
+
+typedef struct {
+    MeshDraft *draft;
+    Scan scan;
+    UnusedWords unused;
+    size_t corner_count; // of the current facet
+} StlReader;
+
+static bool vertex_read(StlReader *reader)
+{
+    MeshDraft *draft = reader->draft;
+    double numbers[3];
+    int count = 0;
+    while (count < 3 && scan_more(&reader->scan) &&
+           scan_number(&reader->scan, &numbers[count]) == NUMBER_READ)
+        count++;
+    const size_t offset = (size_t)(reader->scan.at - reader->scan.start);
+    if (count < 3) array_push(draft->unread, ((DraftPlace){draft->positions.count, offset}));
+    if (draft->positions.count == DRAFT_NONE - 1) return draft_fails(draft, offset, "too many vertices");
+    array_push(draft->corners[DRAFT_POSITION], (uint32_t)draft->positions.count);
+    array_push(draft->positions,
+               count < 3 ? vector_all(NAN) : ((Vector3){numbers[0], numbers[1], numbers[2]}));
+    reader->corner_count++;
+    return true;
+}
+
+static bool facet_end(StlReader *reader, size_t offset)
+{
+    const size_t count = reader->corner_count;
+    reader->corner_count = 0;
+    if (count > 0 && count < 3) return draft_fails(reader->draft, offset, "a facet of %zu corners", count);
+    return draft_end_face(reader->draft, offset);
+}
+
+static bool line_read(StlReader *reader)
+{
+    static const char *const known[] = {"facet", "outer", "solid", "endsolid"};
+    const Word word = scan_word(&reader->scan);
+    if (word.length == 0) return true;
+    if (word_is_in_any_case(word, "vertex")) return vertex_read(reader);
+    if (word_is_in_any_case(word, "endloop") || word_is_in_any_case(word, "endfacet"))
+        return facet_end(reader, word.offset);
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (word_is_in_any_case(word, known[i])) return true;
+    unused_note(&reader->unused, &reader->draft->report, word, "is not used");
+    return true;
+}
+
+static bool text_read(MeshDraft *draft)
+{
+    const Source *source = &draft->source;
+    StlReader reader = {.draft = draft,
+                        .scan = {source->bytes, source->bytes + source->length, source->bytes}};
+    if (!scan_is_text(&reader.scan, &draft->report)) return false;
+    do
+        if (!line_read(&reader)) return false;
+    while (scan_line(&reader.scan));
+    return reader.corner_count == 0 || draft_fails(draft, source->length, "the file ends within a facet");
+}
+
+static float little_endian_float(const unsigned char *bytes)
+{
+    const uint32_t bits =
+        bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+    float number;
+    memcpy(&number, &bits, sizeof number);
+    return number;
+}
+
+static size_t facet_count(const Source *source)
+{
+    const unsigned char *bytes = (const unsigned char *)source->bytes + HEADER_SIZE - 4;
+    return bytes[0] | (size_t)bytes[1] << 8 | (size_t)bytes[2] << 16 | (size_t)bytes[3] << 24;
+}
+
+static bool binary_read(MeshDraft *draft)
+{
+    const Source *source = &draft->source;
+    draft->is_binary = true;
+    if (source->length < HEADER_SIZE)
+        return draft_fails(draft, source->length,
+                           "no STL file, which starts with 'solid' or has %d bytes before its facets",
+                           HEADER_SIZE);
+    const size_t count = facet_count(source);
+    const size_t held = (source->length - HEADER_SIZE) / FACET_SIZE;
+    if (count >= DRAFT_NONE / 3) return draft_fails(draft, HEADER_SIZE - 4, "too many facets");
+    if (count > held)
+        return draft_fails(draft, HEADER_SIZE - 4, "%zu facets are declared, the file has %zu", count, held);
+    bool has_attributes = false;
+    for (size_t i = 0; i < count; i++) {
+        const size_t offset = HEADER_SIZE + i * FACET_SIZE;
+        const unsigned char *facet = (const unsigned char *)source->bytes + offset;
+        for (size_t corner = 0; corner < 3; corner++) {
+            const unsigned char *bytes = facet + FACET_VERTICES + 12 * corner;
+            array_push(draft->corners[DRAFT_POSITION], (uint32_t)draft->positions.count);
+            array_push(draft->positions,
+                       ((Vector3){little_endian_float(bytes), little_endian_float(bytes + 4),
+                                  little_endian_float(bytes + 8)}));
+        }
+        has_attributes |= facet[FACET_ATTRIBUTE] != 0 || facet[FACET_ATTRIBUTE + 1] != 0;
+        if (!draft_end_face(draft, offset)) return false;
+    }
+    if (has_attributes) draft_warn(draft, "attributes of facets, such as colors, are not used");
+    if (source->length > HEADER_SIZE + count * FACET_SIZE)
+        draft_warn(draft, "%zu bytes behind the last facet are not used",
+                   source->length - HEADER_SIZE - count * FACET_SIZE);
+    return true;
+}
+
+// Binary files may start with `solid`, too; their size is then that of their facets.
+bool stl_read(MeshDraft *draft)
+{
+    const Source *source = &draft->source;
+    const bool is_solid = source->length >= 5 && strncasecmp(source->bytes, "solid", 5) == 0;
+    const bool is_exact =
+        source->length >= HEADER_SIZE && source->length == HEADER_SIZE + facet_count(source) * FACET_SIZE;
+    return is_solid && !is_exact ? text_read(draft) : binary_read(draft);
+}

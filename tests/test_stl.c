@@ -1,0 +1,158 @@
+// STL files in text and binary: facets, and what is wrong with them.
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#define SCENE                                                                                                \
+    "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \
+    "objects:\n  - mesh: {file: a.stl, smooth: true}\n"
+
+#define FACET(a, b, c)                                                                                       \
+    "facet normal 0 0 9\n  outer loop\n    vertex " a "\n    vertex " b "\n    vertex " c "\n  endloop\n"    \
+    "endfacet\n"
+#define TWO_FACETS FACET("0 0 0", "1 0 0", "0 1 0") FACET("0 1 0", "1.0e0 0 0", "+1 1 -0")
+
+static char folder[] = "/tmp/glint-stl-XXXXXX";
+
+static int folder_open(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static int folder_close(void **state)
+{
+    (void)state;
+    unlink("a.stl");
+    return chdir("/") == 0 ? rmdir(folder) : -1;
+}
+
+static void file_write(const char *bytes, size_t length)
+{
+    FILE *file = fopen("a.stl", "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, length, file), length);
+    assert_int_equal(fclose(file), 0);
+}
+
+// Two triangles of four vertices, whose facets' normals are not theirs.
+static void assert_square(const char *messages)
+{
+    static const double expected[6][2] = {{0, 0}, {1, 0}, {0, 1}, {0, 1}, {1, 0}, {1, 1}};
+    assert_messages("scene.yaml", SCENE, messages);
+    Scene scene = scene_of_text("scene.yaml", SCENE);
+    const Mesh *mesh = &scene.meshes.items[0];
+    assert_int_equal(mesh->triangle_count, 2);
+    assert_int_equal(mesh->vertex_count, 4);
+    for (size_t i = 0; i < 6; i++) {
+        const Vector3 corner = mesh->vertices[mesh->triangles[i / 3][i % 3]];
+        assert_vector(corner, expected[i][0], expected[i][1], 0);
+        assert_vector(mesh->normals[mesh->triangles[i / 3][i % 3]], 0, 0, 1);
+    }
+    scene_free(&scene);
+}
+
+static void text_is_read(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *messages;
+    } cases[] = {
+        {"solid part # 1\n" TWO_FACETS "endsolid part\n", ""},
+        {"SOLID\r\nFACET NORMAL 0 0 1\r\nOUTER LOOP\r\nVERTEX 0 0 0\r\nVertex 1 0 0\r\nVERTEX 0 1 "
+         "0\r\nENDLOOP\r\n"
+         "ENDFACET\r\n" FACET("0 1 0", "1 0 0", "1 1 0"),
+         ""},
+        {"solid a\n" FACET("0 0 0", "1 0 0", "0 1 0") "endsolid a\nsolid b\ncolor 1 0 0\ncolor 1 0 0\n" FACET(
+             "0 1 0", "1 0 0", "1 1 0") "endsolid b",
+         "11:1: warning: 'color' is not used\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        file_write(cases[i].text, strlen(cases[i].text));
+        assert_square(cases[i].messages);
+    }
+}
+
+enum { HEADER = 84, FACET_SIZE = 50, WHOLE = HEADER + 2 * FACET_SIZE };
+
+static void binary_fill(char bytes[WHOLE], const char *title)
+{
+    static const float corners[2][3][3] = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                                           {{0, 1, 0}, {1, 0, 0}, {1, 1, 0}}};
+    memset(bytes, 0, WHOLE);
+    memcpy(bytes, title, strlen(title));
+    bytes[80] = 2;
+    for (size_t i = 0; i < 2; i++)
+        memcpy(bytes + HEADER + i * FACET_SIZE + 12, corners[i], sizeof corners[i]);
+}
+
+static void binary_is_read(void **state)
+{
+    (void)state;
+    static const char *const titles[] = {"", "a title", "solid part"};
+    char bytes[WHOLE + 3] = {0};
+    for (size_t i = 0; i < 3; i++) {
+        binary_fill(bytes, titles[i]);
+        file_write(bytes, WHOLE);
+        assert_square("");
+    }
+    binary_fill(bytes, "colored");
+    bytes[WHOLE - 1] = 1;
+    file_write(bytes, WHOLE + 3);
+    assert_square("4:18: warning: a.stl: attributes of facets, such as colors, are not used\n"
+                  "4:18: warning: a.stl: 3 bytes behind the last facet are not used\n");
+}
+
+static void faults_have_their_place(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *message;
+    } cases[] = {
+        {"solid\n" FACET("0 0 0", "1 x 0", "0 1 0"),
+         "5:14: error: 'x' is no coordinate: a number up to 1e+30\n"},
+        {"solid\n" FACET("0 0 0", "1 0", "0 1 0"), "5:15: error: a coordinate of the vertex is missing\n"},
+        {"solid\n" FACET("0 0 0", "1 1e31 0", "0 1 0"),
+         "5:14: error: '1e31' is no coordinate: a number up to 1e+30\n"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",
+         "6:1: error: a facet of 2 corners\n"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n",
+         "7:1: error: the file ends within a facet\n"},
+        {"solid\nendsolid\n", "4:18: error: a.stl: no triangles\n"},
+        {"facet", "4:18: error: a.stl: byte 5: no STL file, which starts with 'solid' or has 84 bytes before "
+                  "its facets\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        file_write(cases[i].text, strlen(cases[i].text));
+        assert_messages("scene.yaml", SCENE, cases[i].message);
+    }
+    char bytes[WHOLE];
+    binary_fill(bytes, "");
+    file_write(bytes, WHOLE - 1);
+    assert_messages("scene.yaml", SCENE,
+                    "4:18: error: a.stl: byte 80: 2 facets are declared, the file has 1\n");
+    memset(bytes + 80, 0xff, 4);
+    file_write(bytes, WHOLE);
+    assert_messages("scene.yaml", SCENE, "4:18: error: a.stl: byte 80: too many facets\n");
+    binary_fill(bytes, "");
+    memset(bytes + HEADER + 12, 0xff, 4);
+    file_write(bytes, WHOLE);
+    assert_messages("scene.yaml", SCENE,
+                    "4:18: error: a.stl: vertex 0 (from 0) is not finite or too large\n");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(text_is_read),
+        cmocka_unit_test(binary_is_read),
+        cmocka_unit_test(faults_have_their_place),
+    };
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
+}
