@@ -2,7 +2,8 @@
 """glint-mpi: the image of several ranks has the bytes of one process's; errors of any rank end the job with a message; a killed
 rank ends it, and its checkpoint goes on. A rank whose device fails, or that sends nonsense, is left out.
 
-run_tests: sanitize-long-only"""
+run_tests: sanitize-long-only
+run_tests: first"""
 import json
 import os
 import shlex

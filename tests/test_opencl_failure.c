@@ -1,6 +1,7 @@
 // Every OpenCL call of a render and a trace fails once: glint reports that call, releases everything, and the
 // next render on the same device is right. The linker puts the functions __wrap_cl… below in the place of
 // those that host/ calls (ld --wrap, see the Makefile); a call without one does not link.
+// run_tests: first
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"

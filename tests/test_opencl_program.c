@@ -1,5 +1,6 @@
 // Programs on the device of this machine: built, launched, cached. Each step is a process of its own, as
 // users run them: what the first one leaves, the next one finds.
+// run_tests: first
 #include "host/base/fault.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"

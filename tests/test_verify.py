@@ -2,7 +2,9 @@
 """glint verify: the hard cases pass, also on a device whose divisions, roots and powers are as wrong as the OpenCL C
 specification permits. Here at single and a few at the other precisions, without M1, a closed mesh as M2 has one farther
 away, and M6, a million rays through 10,300 objects one by one, as test_bvh does with fewer. GLINT_LONG_TESTS=1 runs all at
-every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few."""
+every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few.
+
+run_tests: first"""
 import re
 import unittest
 
