@@ -1,4 +1,4 @@
-// Camera rays. The eye is the origin.
+// Camera rays.
 #ifndef CAMERA_H
 #define CAMERA_H
 
@@ -19,8 +19,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
     real y = real_from_integer((integer)((scalar_integer)header->image.y) - 1 - pixels.y * 2) + dy;
     Vector direction = vector_fma(vector_of(header->right), x,
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
-    const Vector eye = {(real)(0), (real)(0), (real)(0)};
-    Ray ray = ray_make_unit(eye, vector_normalize(direction), active);
+    Ray ray = ray_make_unit(vector_of(header->eye), vector_normalize(direction), active);
     if (IS_CERTIFIED) ray.direction_error = (real)(CAMERA_DIRECTION_ERROR * UNIT_ROUNDOFF);
     ray_set_common_origin(&ray, COMMON_ORIGIN_EYE);
     return ray;

@@ -5,8 +5,8 @@
 // member needs padding, and narrowing goes element by element (tests/test_layout.c checks each on the
 // device).
 //
-// Positions are relative to the eye. Axes and normals are the scene's own, scaled by a power of two to a
-// length in 1/2..1, so that they are exact and never overflow.
+// Positions are relative to the eye that the scene was compiled for. Axes and normals are the scene's own,
+// scaled by a power of two to a length in 1/2..1, so that they are exact and never overflow.
 #ifndef TYPES_H
 #define TYPES_H
 
@@ -252,8 +252,9 @@ typedef struct {
 
 typedef struct {
     scalar4 background, ambient;
-    // A camera ray: forward + x right + y up, x and y in half pixels from the image's center.
-    scalar4 forward, right, up;
+    // A camera ray: from the eye along forward + x right + y up, x and y in half pixels from the image's
+    // center. The eye is the origin, but for a preview of a scene compiled for another eye.
+    scalar4 eye, forward, right, up;
     scalar4 bounds;                  // of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
     scalar4 bounds_low, bounds_high; // its corners
     // corners of a box around all points where a transparent object may touch an opaque one; low above high

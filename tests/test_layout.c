@@ -23,6 +23,7 @@ typedef struct {
 #define MEMBER_LIST(REALS, INTEGERS)                                             \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, background)                     \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, ambient)                        \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, eye)                            \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \

@@ -1,8 +1,9 @@
 // An image rendered in passes, and by a renderer whose camera was moved, has the bits of one rendered at
-// once. run_tests: sanitize-long-only
+// once; a preview's differs by roundings. run_tests: sanitize-long-only
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -137,6 +138,57 @@ static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
     check_moved_renderer(true);
 }
 
+// A preview shows the arrays of the last eye from where the eye is now: the image of a renderer that moved
+// them, but for their roundings. Returns the number of pixels where these show.
+static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
+{
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.moves = true;
+    settings.bvh = bvh;
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    const Camera camera = scene.camera;
+    const Vector3 ahead = vector_subtract(camera.look_at, camera.position);
+    scene.camera.position = vector_add(camera.position, vector_scale(ahead, fraction_of_way));
+    scene.camera.position.x += 0.1;
+    settings.is_preview = true;
+    assert_true(renderer_move(renderer, &scene, &settings, &messages));
+    Film film, expected = film_render(&probe_compute, &scene, &settings, AOVS);
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    const size_t count = film_pixel_count(&film);
+    size_t others = 0, rounded = 0;
+    for (size_t i = 0; i < count; i++) {
+        const bool is_same = film.object[i] == expected.object[i];
+        if (is_same && isinf(film.t[i])) continue;
+        rounded += film.t[i] != expected.t[i];
+        others += !is_same || fabs(film.t[i] - expected.t[i]) > 1e-3 * expected.t[i];
+    }
+    assert_true(others <= count / 200); // at outlines
+    film_free(&film);
+
+    settings.is_preview = false;
+    assert_true(renderer_move(renderer, &scene, &settings, &messages));
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    film_assert_same(&film, &expected, "after a preview");
+    film_free(&film);
+    film_free(&expected);
+    renderer_close(renderer);
+    scene_free(&scene);
+    return rounded;
+}
+
+static void preview_differs_by_roundings(void **state)
+{
+    (void)state;
+    preview_check(scene_of_file("scenes/globe.yaml"), BVH_ON, 0.2);
+    preview_check(scene_of_file("scenes/spheres16.yaml"), BVH_OFF, 0.2);
+    // seen from afar it was rounded by 3e-5
+    Scene scene =
+        scene_of_text("far.yaml", "camera: {position: [0, 0.1, -1000.3], look_at: [0, 0.1, 0], fov: 40}\n"
+                                  "objects: [{sphere: {center: [0.1, 0, 0.3], radius: 1.3}}]\n");
+    assert_true(preview_check(scene, BVH_AUTO, 0.996) > 0);
+}
+
 // Next to a sphere it is defined by its power, in a kernel of its own: an eye that goes to and fro builds
 // each once.
 static void eye_next_to_a_sphere_builds_two_kernels(void **state)
@@ -176,6 +228,7 @@ int main(void)
         cmocka_unit_test(passes_give_the_bits_of_one_render),
         cmocka_unit_test(passes_stop),
         cmocka_unit_test(moved_renderer_gives_the_bits_of_a_new_one),
+        cmocka_unit_test(preview_differs_by_roundings),
         cmocka_unit_test(eye_next_to_a_sphere_builds_two_kernels),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);

@@ -59,6 +59,7 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
     const bool is_double = settings->precision == PRECISION_DOUBLE;
     const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye};
     compiled->eye = (Vector3){NAN, NAN, NAN}; // equal to no eye, so that the next move sets all
+    compiled->eye_offset = (Vector3){0};
     objects_move(compiled, scene, &rounding);
     compiled->features |= settings->extra_features;
     materials_flatten(compiled, scene, &rounding);
@@ -70,6 +71,21 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
     culling_fill(compiled, settings);
     if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
     compiled->eye = rounding.eye;
+    return true;
+}
+
+// Sets the eye's offset from that of the arrays: of a preview any, else 0. False if they must move.
+static bool eye_shift(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
+{
+    const Rounding rounding = {compiled->eye, settings->precision == PRECISION_DOUBLE,
+                               settings->shift_to_eye};
+    const Vector3 offset = point_from_eye(&rounding, eye_of(scene, settings));
+    const bool is_same = vector_is_zero(offset) && vectors_equal(compiled->eye, eye_of(scene, settings));
+    const bool fits = isfinite(offset.x) && isfinite(offset.y) && isfinite(offset.z);
+    if (!is_same && !(settings->is_preview && fits)) return false;
+    if (vectors_equal(offset, compiled->eye_offset)) return true;
+    compiled->eye_offset = offset;
+    culling_fill(compiled, settings);
     return true;
 }
 
@@ -87,9 +103,9 @@ bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettin
     }
     compiled->bvh_seconds = 0;
     if (!lights_fit(compiled, scene, settings, messages)) return false;
-    const bool is_same_eye = vectors_equal(compiled->eye, eye_of(scene, settings));
-    if (is_same_eye ? !numbers_fit(compiled, scene, settings, messages)
-                    : !eye_move(compiled, scene, settings, messages))
+    const bool is_near = eye_shift(compiled, scene, settings);
+    if (is_near ? !numbers_fit(compiled, scene, settings, messages)
+                : !eye_move(compiled, scene, settings, messages))
         return false;
     header_write(compiled, scene, settings);
     compiled->flatten_seconds = clock_seconds() - start - compiled->bvh_seconds;

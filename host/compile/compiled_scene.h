@@ -52,6 +52,7 @@ typedef struct {
     Bounds bvh_bounds;                   // of these; 0 where there are none
     uint32_t cull_sphere_count;          // of each common origin
     Vector3 eye;                         // from which the arrays are seen; NAN: a move failed
+    Vector3 eye_offset;                  // of the camera's eye from there; 0 unless a preview
     Bounds contact;                      // where transparent and opaque primitives may touch
 } CompiledScene;
 

@@ -68,7 +68,7 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
     compiled->cull_sphere_count = (uint32_t)count;
     flat_array_renew(compiled, FLAT_CULL_SPHERES, count * (1 + lights->count));
     CullSphere *row = compiled->arrays[FLAT_CULL_SPHERES].items;
-    row_fill(compiled, (Vector3){0, 0, 0}, slack, row);
+    row_fill(compiled, compiled->eye_offset, slack, row);
     for (size_t i = 0; i < lights->count; i++)
         row_fill(compiled, vector3_of(&((const FlatLight *)lights->items)[i].position), slack, row += count);
 }

@@ -23,6 +23,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
         .ambient = scalar4_of(scene->ambient, 0),
+        .eye = scalar4_of(compiled->eye_offset, 0),
         .forward = scalar4_of(basis.forward, 0),
         .right = scalar4_of(basis.right, 0),
         .up = scalar4_of(basis.up, 0),

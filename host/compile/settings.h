@@ -29,6 +29,7 @@ typedef struct {
     BvhChoice bvh;
     FeatureSet extra_features; // built in although the scene does not need them
     bool shift_to_eye;         // positions are relative to the eye; else as they are
+    bool is_preview;           // scene_move leaves the arrays as the last eye saw them, and takes no time
     // From an earlier compilation of the same textures, whose arrays are then left empty; NULL: read the
     // images.
     const struct CompiledTexture *textures;

@@ -159,6 +159,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
+        .is_preview = settings->is_preview,
     };
 }
 

@@ -33,6 +33,9 @@ typedef struct {
     FeatureSet extra_features; // built in beyond the scene's own, for tests
     bool shift_to_eye;         // the eye is the origin, for images; false for explicit rays
     bool moves;                // the flat arrays stay in the host's memory, so that renderer_move is fast
+    // With `moves`: renderer_move leaves the arrays as the last eye saw them, which takes no time. Their
+    // roundings are then relative to that eye's distance from the surfaces.
+    bool is_preview;
     bool no_cache;
     double band_seconds;  // target duration of a launch; 0: 0.1
     bool (*stop)(void);   // called between launches; true ends the render; NULL: never

@@ -9,10 +9,14 @@
 #include "host/view/pixel_facts.h"
 #include "host/view/preview.h"
 #include "host/view/watch.h"
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+
+enum { REST_NANOSECONDS = 150 * 1000 * 1000 };
 
 struct FrameLoop {
     FrameLoopOptions options;
@@ -47,9 +51,11 @@ struct FrameLoop {
     Renderer *reference; // in double, of the view of errors; NULL: not open
     FrameRequest current;
     unsigned current_number;
-    uint32_t divisor; // of its first frame
+    bool has_preview; // its first frame, coarse or of arrays that another eye saw
+    uint32_t divisor; // of that
     double move_seconds, render_start;
-    Film film; // of the image or the coarse frame: sums of samples, at the end their mean
+    double slowest_move; // to another eye, of the scene as it is
+    Film film;           // of the image or the coarse frame: sums of samples, at the end their mean
     Frame frame;
     Preview preview;
 };
@@ -206,7 +212,7 @@ static void probe_answer(FrameLoop *loop)
     loop->options.notify(loop->options.notify_context);
 }
 
-static bool coarse_take(void *context, const Film *band, double fraction_done)
+static bool preview_take(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
     film_copy_band(context, band);
@@ -220,7 +226,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     if (!atomic_load(&first_is_due)) probe_answer(loop);
     if (!is_last(&loop->film, band)) return true;
     const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
-    if (is_first && loop->current.is_moving && loop->divisor == 1)
+    if (is_first && loop->current.is_moving && !loop->has_preview)
         preview_note(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
                      (double)film_pixel_count(&loop->film));
     if (is_first && view_aovs[loop->current.view]) return true; // what it is made of is yet to come
@@ -259,8 +265,14 @@ static void failure_publish(FrameLoop *loop)
     compute_close(&loop->compute);
 }
 
+// Before the first move is timed: several threads do what one did.
+static double move_guess(const Renderer *renderer)
+{
+    return renderer_report(renderer)->flatten_seconds / 2;
+}
+
 // Opens or moves the renderer for an image of the divisor. False, with a message published, if it cannot.
-static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples)
+static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples, bool is_preview)
 {
     double start = clock_seconds();
     RenderSettings *settings = &loop->settings;
@@ -268,6 +280,7 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
     settings->width = settings->region_width = (size.width + divisor - 1) / divisor;
     settings->height = settings->region_height = (size.height + divisor - 1) / divisor;
     settings->sample_count = samples;
+    settings->is_preview = is_preview;
     loop->scene.camera = loop->current.camera;
     MessageList messages = {0};
     bool prepared = true;
@@ -280,27 +293,48 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
         if (!loop->compute.context) compute_open(&loop->compute, loop->options.device);
         loop->renderer = renderer_open(&loop->compute, &loop->scene, settings, &messages);
         prepared = loop->renderer != NULL;
+        if (prepared) loop->slowest_move = move_guess(loop->renderer);
+        start = clock_seconds();
     }
     messages_publish(loop, &messages);
     if (!compute_ok(&loop->compute)) failure_publish(loop);
     loop->render_start = clock_seconds();
     loop->move_seconds = loop->render_start - start;
+    if (!is_preview) loop->slowest_move = fmax(loop->slowest_move, loop->move_seconds);
     return prepared;
 }
 
-static bool coarse_render(FrameLoop *loop)
+// Large scenes take long to move to another eye: that waits until no other request has come for a while.
+// False: one came.
+static bool camera_rests(FrameLoop *loop)
+{
+    if (loop->slowest_move > PREVIEW_SECONDS) {
+        struct timespec until;
+        clock_gettime(CLOCK_REALTIME, &until);
+        until.tv_nsec += REST_NANOSECONDS;
+        until.tv_sec += until.tv_nsec / 1000000000;
+        until.tv_nsec %= 1000000000;
+        pthread_mutex_lock(&loop->mutex);
+        while (!render_stops() && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
+            continue;
+        pthread_mutex_unlock(&loop->mutex);
+    }
+    return !render_stops();
+}
+
+static bool preview_render(FrameLoop *loop)
 {
     const unsigned aovs = view_aovs[loop->current.view];
-    if (!renderer_prepare(loop, loop->divisor, 1)) return false;
+    if (!renderer_prepare(loop, loop->divisor, 1, true)) return false;
     film_fit(loop, aovs);
     atomic_store(&first_is_due, true);
-    if (!renderer_render(loop->renderer, aovs, coarse_take, &loop->film)) return false;
+    if (!renderer_render(loop->renderer, aovs, preview_take, &loop->film)) return false;
     preview_note(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
                  (double)film_pixel_count(&loop->film));
     frame_fill(loop, 1);
     frame_publish(loop, 0, false);
     atomic_store(&first_is_due, false);
-    return !render_stops();
+    return camera_rests(loop);
 }
 
 // Replaces the image by the heat map of its errors. False: stopped, or failed.
@@ -337,12 +371,14 @@ static bool request_render(FrameLoop *loop)
     const ImageSize size = loop->current.size;
     const View view = loop->current.view;
     const unsigned aovs = AOV_T | view_aovs[view];
-    loop->divisor = loop->current.is_moving ? preview_divisor(&loop->preview, size.width, size.height) : 1;
-    bool complete = (loop->divisor == 1 || coarse_render(loop)) &&
-                    renderer_prepare(loop, 1, view == VIEW_COLOR ? loop->options.settings.sample_count : 1);
+    const bool is_moving = loop->current.is_moving;
+    loop->divisor = is_moving ? preview_divisor(&loop->preview, size.width, size.height) : 1;
+    loop->has_preview = is_moving && (loop->divisor > 1 || loop->slowest_move > PREVIEW_SECONDS);
+    const uint32_t samples = view == VIEW_COLOR ? loop->options.settings.sample_count : 1;
+    bool complete = (!loop->has_preview || preview_render(loop)) && renderer_prepare(loop, 1, samples, false);
     if (complete) {
         film_fit(loop, aovs);
-        atomic_store(&first_is_due, loop->current.is_moving && loop->divisor == 1);
+        atomic_store(&first_is_due, is_moving && !loop->has_preview);
         complete = renderer_accumulate(loop->renderer, aovs, pass_take, loop) &&
                    (view != VIEW_ERROR || errors_render(loop));
         atomic_store(&first_is_due, false);
@@ -428,6 +464,7 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     if (!renderer && compute_ok(&loop->compute)) return false;
     renderers_close(loop);
     loop->renderer = renderer;
+    if (renderer) loop->slowest_move = move_guess(renderer);
     if (!renderer) compute_close(&loop->compute); // the image, which is due, opens it again or says why not
     return true;
 }

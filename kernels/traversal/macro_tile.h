@@ -70,7 +70,7 @@ static inline OriginFrame origin_frame(const Scene *scene, const Ray *ray, mask 
     frame.u_axis = frame.w_axis == 0 ? 1 : 0;
     frame.v_axis = frame.w_axis == 2 ? 1 : 2;
     frame.reversed = scalar4_along(direction, frame.w_axis) < 0 ? frame.leaving : !frame.leaving;
-    scalar4 origin = (scalar4)(0, 0, 0, 0);
+    scalar4 origin = scene->header->eye;
     if (!frame.leaving) origin = scene->lights[ray->common_origin - COMMON_ORIGIN_FIRST_LIGHT].position;
     frame.u = scalar4_along(origin, frame.u_axis);
     frame.v = scalar4_along(origin, frame.v_axis);
