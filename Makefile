@@ -146,6 +146,7 @@ embree_headers := $(wildcard tools/peers/embree/*.h)
 $(BUILD)/peers/embree: $(embree_sources) $(embree_headers) Makefile
 	@mkdir -p $(@D)
 	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp-simd $(embree_sources) \
+	    host/render/sample_pattern.c host/base/memory.c host/base/fault.c \
 	    -lembree3 -lm -lpthread -o $@
 
 # make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are

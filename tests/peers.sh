@@ -39,7 +39,8 @@ other_work_is_reported() {
     [ $? = 3 ]
 }
 
-check "spheres and a mesh by Embree and glint are timed" bench "$build/peers/embree" spheres-16 bunny-2000
+check "spheres, meshes, a directional light and samples by Embree and glint are timed" \
+    bench "$build/peers/embree" spheres-16 bunny-2000 sun-2000x4 soup-500
 check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 check "an image of other work makes the run fail" other_work_is_reported
 # Mirrors, a cylinder, a concave polygon and a smooth one.

@@ -1,17 +1,7 @@
 """Writes a scene as tools/peers/embree reads it, and runs that: a renderer on Embree (Debian package libembree-dev)."""
 import pathlib
 
-from scene import NotModelled, cross, subtract, triple, unit
-
-
-def flat(mesh):
-    """Three vertices of its own for each face, all with the face's normal."""
-    vertices = [mesh.vertices[corner] for face in mesh.faces for corner in face]
-    normals = []
-    for at in range(0, len(vertices), 3):
-        a, b, c = vertices[at:at + 3]
-        normals += [unit(cross(subtract(b, a), subtract(c, a)))] * 3
-    return vertices, normals, [range(at, at + 3) for at in range(0, len(vertices), 3)]
+from scene import NotModelled, cross, triple, unit
 
 
 def write_scene(scene, path, _size=None):
@@ -26,9 +16,11 @@ def write_scene(scene, path, _size=None):
         write = file.write
         write(f"camera 1\n{triple(scene.camera['position'])} {triple(forward)} {triple(right)} "
               f"{triple(cross(right, forward))} {scene.half_tangent():.9g}\n{triple(scene.background)}\n")
-        write(f"lights {len(scene.lights)}\n")
+        write(f"lights {len(scene.lights) + len(scene.suns)}\n")
         for position, color in scene.lights:
-            write(f"{triple(position)} {triple(color)}\n")
+            write(f"{triple(position)} {triple(color)} 0\n")
+        for direction, color in scene.suns:
+            write(f"{triple([-part for part in direction])} {triple(color)} 1\n")
         write(f"materials {len(names)}\n")
         for material in scene.materials.values():
             color = material.get("color", [1, 1, 1])
@@ -43,11 +35,11 @@ def write_scene(scene, path, _size=None):
             write(f"{triple(center)} {radius:.9g} {names[material]}\n")
         write(f"meshes {len(scene.meshes)}\n")
         for mesh in scene.meshes:
-            vertices, normals, faces = (mesh.vertices, mesh.normals, mesh.faces) if mesh.normals else flat(mesh)
-            write(f"vertices {len(vertices)}\n")
-            for vertex, normal in zip(vertices, normals):
-                write(f"{triple(vertex)} {triple(normal)}\n")
-            write(f"faces {len(faces)}\n")
-            for face in faces:
+            for name, items in ("vertices", mesh.vertices), ("normals", mesh.normals):
+                write(f"{name} {len(items)}\n")
+                for item in items:
+                    write(triple(item) + "\n")
+            write(f"faces {len(mesh.faces)}\n")
+            for face in mesh.faces:
                 write("%d %d %d\n" % tuple(face))
             write(f"{names[mesh.material]}\n")

@@ -68,6 +68,9 @@ def write_scene(scene, path, size):
               f"up {vector([tall * part for part in up])} }}\n")
         for position, color in scene.lights:
             write(f"light_source {{ {vector(position)} rgb {vector(color)} }}\n")
+        for direction, color in scene.suns:
+            write(f"light_source {{ {vector([-1e6 * part for part in unit(direction)])} rgb {vector(color)} parallel "
+                  "point_at <0, 0, 0> }\n")
         for name, material in scene.materials.items():
             write(material_text(name, material, scene.ambient))
         glass = {name for name, material in scene.materials.items() if material.get("transmission", 0) > 0}

@@ -31,6 +31,7 @@ class Scene:
     spheres: list = field(default_factory=list)  # of (center, radius, material)
     planes: list = field(default_factory=list)   # of (point, normal, material)
     meshes: list = field(default_factory=list)
+    suns: list = field(default_factory=list)     # directional lights, of (direction of the light, color)
     cones: list = field(default_factory=list)    # open, of (from, its radius, to, its radius, material)
 
     def half_tangent(self):
@@ -137,14 +138,15 @@ def read_scene(path):
     refuse_other_keys("a camera", data["camera"], ["position", "look_at", "up", "fov"])
     for material in data["materials"].values():
         refuse_other_keys("a material", material, ["color", "ambient", "diffuse", "specular", "shininess", "reflection"])
-    lights = []
+    scene = Scene(data["camera"], data.get("background", [0, 0, 0]), data.get("ambient", [0, 0, 0]), [], data["materials"])
     for light in data["lights"]:
-        refuse_other_keys("a light", light, ["point"])
-        point = light["point"]
-        color = [part * point.get("intensity", 1) for part in point.get("color", [1, 1, 1])]
-        lights.append((point["position"], color))
-    scene = Scene(data["camera"], data.get("background", [0, 0, 0]), data.get("ambient", [0, 0, 0]), lights,
-                  data["materials"])
+        refuse_other_keys("a light", light, ["point", "directional"])
+        ((kind, keys),) = light.items()
+        color = [part * keys.get("intensity", 1) for part in keys.get("color", [1, 1, 1])]
+        if kind == "point":
+            scene.lights.append((keys["position"], color))
+        else:
+            scene.suns.append((keys["direction"], color))
     for text in item_texts(objects):
         quick = SPHERE.match(text.strip())  # yaml takes minutes for a million
         if quick:

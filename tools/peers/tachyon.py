@@ -50,6 +50,8 @@ def write_scene(scene, path, size):
               f"Frustum {triple(frustum(scene, size))}\nEnd_Camera\nBackground {triple(scene.background)}\n")
         for position, color in scene.lights:
             write(f"Light Center {place(position)} Rad 0.01 Color {triple(color)}\n")
+        for direction, color in scene.suns:
+            write(f"Directional_Light Direction {place(direction)} Color {triple(color)}\n")
         for name, material in scene.materials.items():
             write(f"TexDef {name} {texture(material, scene.ambient[0] * material.get('ambient', 1))}\n")
         for point, normal, material in scene.planes:

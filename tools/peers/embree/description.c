@@ -89,10 +89,12 @@ static Mesh read_mesh(Reader *reader, size_t material_count)
 {
     Mesh mesh = {.vertex_count = read_list(reader, "vertices")};
     mesh.vertices = memory_get(3 * mesh.vertex_count, sizeof *mesh.vertices);
-    mesh.normals = memory_get(3 * mesh.vertex_count, sizeof *mesh.normals);
-    for (size_t i = 0; i < mesh.vertex_count; i++) {
-        read_numbers(reader, 3, &mesh.vertices[3 * i]);
-        read_numbers(reader, 3, &mesh.normals[3 * i]);
+    read_numbers(reader, 3 * mesh.vertex_count, mesh.vertices);
+    size_t normal_count = read_list(reader, "normals");
+    if (normal_count > 0) {
+        if (normal_count != mesh.vertex_count) reader_fail(reader, "a normal for each vertex");
+        mesh.normals = memory_get(3 * normal_count, sizeof *mesh.normals);
+        read_numbers(reader, 3 * normal_count, mesh.normals);
     }
     mesh.face_count = read_list(reader, "faces");
     mesh.faces = memory_get(3 * mesh.face_count, sizeof *mesh.faces);
@@ -121,6 +123,7 @@ Description description_read(const char *path)
     for (size_t i = 0; i < scene.light_count; i++) {
         scene.lights[i].position = read_vector(&reader);
         scene.lights[i].color = read_vector(&reader);
+        scene.lights[i].is_directional = read_index(&reader, 2);
     }
     scene.material_count = read_list(&reader, "materials");
     scene.materials = memory_get(MATERIAL_PARTS * scene.material_count, sizeof *scene.materials);

@@ -2,6 +2,7 @@
 // has.
 #pragma once
 
+#include <stdbool.h>
 #include <stddef.h>
 
 typedef struct {
@@ -14,7 +15,8 @@ typedef struct {
 } Camera;
 
 typedef struct {
-    Vector position, color;
+    Vector position, color; // of a directional light the position is the direction to it
+    bool is_directional;
 } Light;
 
 // Flat arrays, here and in a mesh: only from those do compilers gather.
@@ -37,7 +39,7 @@ typedef struct {
 } Sphere;
 
 typedef struct {
-    float *vertices, *normals; // three numbers of each
+    float *vertices, *normals; // three numbers of each; no normals: flat
     int *faces;                // three vertices of each
     size_t vertex_count, face_count;
     int material;

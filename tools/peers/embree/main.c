@@ -2,6 +2,8 @@
 #include "packet.h"
 #include "spheres.h"
 
+#include "host/render/sample_pattern.h"
+
 #include <getopt.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -24,6 +26,7 @@ static const char usage[] =
     "  --tile N        pixels along the side of a thread's share of work, a multiple of 4 (default: 32)\n"
     "  --threads N     default: one a core\n"
     "  --size WxH      of the image (default: 1920x1080)\n"
+    "  --samples N     of a pixel, in glint's pattern (default: 1)\n"
     "  --seconds MAX   stop after so long (default: 2), but not before 5 frames\n"
     "  -o FILE         the image as .ppm, cut at white, or .npy\n";
 
@@ -31,7 +34,7 @@ typedef struct {
     const char *description, *output;
     bool one_by_one, incoherent, user_spheres;
     enum RTCBuildQuality quality;
-    unsigned tile, threads, width, height;
+    unsigned tile, threads, width, height, samples;
     double seconds;
 } Options;
 
@@ -220,19 +223,17 @@ static enum RTCBuildQuality quality_named(const char *name)
 
 static Options options_read(int count, char **words)
 {
-    static const struct option names[] = {{"single", no_argument, NULL, 's'},
-                                          {"incoherent", no_argument, NULL, 'i'},
-                                          {"user-spheres", no_argument, NULL, 'u'},
-                                          {"quality", required_argument, NULL, 'q'},
-                                          {"tile", required_argument, NULL, 't'},
-                                          {"threads", required_argument, NULL, 'j'},
-                                          {"size", required_argument, NULL, 'w'},
-                                          {"seconds", required_argument, NULL, 'm'},
-                                          {0}};
+    static const struct option names[] = {
+        {"single", no_argument, NULL, 's'},        {"incoherent", no_argument, NULL, 'i'},
+        {"user-spheres", no_argument, NULL, 'u'},  {"quality", required_argument, NULL, 'q'},
+        {"tile", required_argument, NULL, 't'},    {"threads", required_argument, NULL, 'j'},
+        {"size", required_argument, NULL, 'w'},    {"seconds", required_argument, NULL, 'm'},
+        {"samples", required_argument, NULL, 'n'}, {0}};
     Options options = {.quality = RTC_BUILD_QUALITY_HIGH,
                        .tile = 32,
                        .width = 1920,
                        .height = 1080,
+                       .samples = 1,
                        .seconds = 2,
                        .threads = (unsigned)sysconf(_SC_NPROCESSORS_ONLN)};
     char *end;
@@ -264,6 +265,9 @@ static Options options_read(int count, char **words)
         case 'm':
             options.seconds = strtod(optarg, NULL);
             break;
+        case 'n':
+            options.samples = (unsigned)strtoul(optarg, NULL, 10);
+            break;
         case 'o':
             options.output = optarg;
             break;
@@ -272,7 +276,8 @@ static Options options_read(int count, char **words)
         }
     }
     bool sound = options.tile >= PACKET_SIDE && options.tile % PACKET_SIDE == 0 && options.threads >= 1 &&
-                 options.width >= 1 && options.height >= 1 && !(options.one_by_one && options.user_spheres);
+                 options.width >= 1 && options.height >= 1 && options.samples >= 1 &&
+                 !(options.one_by_one && options.user_spheres);
     if (optind != count - 1 || !sound) options_fail();
     options.description = words[optind];
     return options;
@@ -316,6 +321,8 @@ int main(int argument_count, char **arguments)
                                                          : RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
                          .width = options.width,
                          .height = options.height,
+                         .samples = options.samples,
+                         .offsets = sample_pattern(options.samples, false),
                          .film = memory_get(3 * (size_t)options.width * options.height, sizeof(float))};
     Crew crew = {.renderer = &renderer, .tile = options.tile};
     pthread_barrier_init(&crew.begin, NULL, options.threads);

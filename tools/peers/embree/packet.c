@@ -26,8 +26,8 @@ typedef struct {
     float specular[LANES], shininess[LANES];
 } Surfaces;
 
-static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, struct RTCRayHit16 *rays,
-                        int *valid)
+static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, const float *offset,
+                        struct RTCRayHit16 *rays, int *valid)
 {
     const Camera *camera = &renderer->description->camera;
     const int width = (int)renderer->width, height = (int)renderer->height;
@@ -35,7 +35,8 @@ static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, s
     FOR_LANES
     {
         int column = (int)left + i % PACKET_SIDE, row = (int)top + i / PACKET_SIDE;
-        float x = scale * (float)(2 * column + 1 - width), y = scale * (float)(height - 1 - 2 * row);
+        float x = scale * ((float)(2 * column + 1 - width) + offset[0]);
+        float y = scale * ((float)(height - 1 - 2 * row) + offset[1]);
         float direction_x = camera->forward.x + x * camera->right.x + y * camera->up.x;
         float direction_y = camera->forward.y + x * camera->right.y + y * camera->up.y;
         float direction_z = camera->forward.z + x * camera->right.z + y * camera->up.z;
@@ -228,8 +229,10 @@ static void surfaces_place(const Description *scene, const struct RTCRayHit16 *r
     }
     normals_face(&outward, flip);
     surfaces->normal = outward;
-    for (size_t k = 0; k < scene->mesh_count; k++)
-        mesh_smooth(&scene->meshes[k], mesh_geometry(scene, k), &rays->hit, flip, &surfaces->normal);
+    for (size_t k = 0; k < scene->mesh_count; k++) {
+        if (scene->meshes[k].normals)
+            mesh_smooth(&scene->meshes[k], mesh_geometry(scene, k), &rays->hit, flip, &surfaces->normal);
+    }
     const Vector eye = scene->camera.eye;
     FOR_LANES
     {
@@ -300,13 +303,15 @@ static void surfaces_color(const Description *scene, const int *material, Surfac
 }
 
 // Takes the lanes out of `lit` between whose surface and the light a plane stands.
-static void planes_occlude(const Description *scene, const Surfaces *surfaces, Vector light, int *lit)
+static void planes_occlude(const Description *scene, const Surfaces *surfaces, const Light *light, int *lit)
 {
+    const Vector place = light->position;
+    const float near = light->is_directional ? 0 : 1;
     for (size_t k = 0; k < scene->plane_count; k++) {
         Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
         const int geometry = FIRST_PLANE + (int)k;
-        float light_height =
-            normal.x * (light.x - point.x) + normal.y * (light.y - point.y) + normal.z * (light.z - point.z);
+        float light_height = normal.x * (place.x - near * point.x) + normal.y * (place.y - near * point.y) +
+                             normal.z * (place.z - near * point.z);
         FOR_LANES
         {
             float height = normal.x * (surfaces->start.x[i] - point.x) +
@@ -321,6 +326,7 @@ static void planes_occlude(const Description *scene, const Surfaces *surfaces, V
 static void light_add(const Renderer *renderer, const Light *light, Surfaces *surfaces)
 {
     const Vector place = light->position;
+    const float near = light->is_directional ? 0 : 1;
     const Vectors *normal = &surfaces->normal, *to_eye = &surfaces->to_eye;
     alignas(64) int lit[LANES];
     alignas(64) float facing[LANES];
@@ -328,10 +334,10 @@ static void light_add(const Renderer *renderer, const Light *light, Surfaces *su
     Vectors to_light;
     FOR_LANES
     {
-        float x = place.x - surfaces->position.x[i], y = place.y - surfaces->position.y[i],
-              z = place.z - surfaces->position.z[i];
+        float x = place.x - near * surfaces->position.x[i], y = place.y - near * surfaces->position.y[i],
+              z = place.z - near * surfaces->position.z[i];
         float squared = x * x + y * y + z * z, inverse_length = 1 / sqrtf(squared);
-        distance[i] = squared * inverse_length;
+        distance[i] = light->is_directional ? far_away : squared * inverse_length;
         to_light.x[i] = inverse_length * x;
         to_light.y[i] = inverse_length * y;
         to_light.z[i] = inverse_length * z;
@@ -339,7 +345,7 @@ static void light_add(const Renderer *renderer, const Light *light, Surfaces *su
             normal->x[i] * to_light.x[i] + normal->y[i] * to_light.y[i] + normal->z[i] * to_light.z[i];
         lit[i] = facing[i] > 0 ? surfaces->found[i] : 0;
     }
-    planes_occlude(renderer->description, surfaces, place, lit);
+    planes_occlude(renderer->description, surfaces, light, lit);
     if (!lanes_any(lit)) return;
 
     struct RTCRay16 shadow;
@@ -401,12 +407,12 @@ static void film_store(const Renderer *renderer, unsigned left, unsigned top, co
     }
 }
 
-void packet_render(const Renderer *renderer, unsigned x, unsigned y)
+static void sample_add(const Renderer *renderer, unsigned x, unsigned y, const float *offset, Vectors *sum)
 {
     const Description *scene = renderer->description;
     struct RTCRayHit16 rays;
     alignas(64) int valid[LANES];
-    camera_rays(renderer, x, y, &rays, valid);
+    camera_rays(renderer, x, y, offset, &rays, valid);
     planes_meet(scene, &rays);
     rays_intersect(renderer, valid, &rays);
 
@@ -419,5 +425,19 @@ void packet_render(const Renderer *renderer, unsigned x, unsigned y)
         for (size_t i = 0; i < scene->light_count; i++)
             light_add(renderer, &scene->lights[i], &surfaces);
     }
-    film_store(renderer, x, y, &surfaces.color);
+    const float weight = 1 / (float)renderer->samples;
+    FOR_LANES
+    {
+        sum->x[i] += weight * surfaces.color.x[i];
+        sum->y[i] += weight * surfaces.color.y[i];
+        sum->z[i] += weight * surfaces.color.z[i];
+    }
+}
+
+void packet_render(const Renderer *renderer, unsigned x, unsigned y)
+{
+    Vectors color = {.x = {0}, .y = {0}, .z = {0}};
+    for (unsigned i = 0; i < renderer->samples; i++)
+        sample_add(renderer, x, y, renderer->offsets + 2 * (size_t)i, &color);
+    film_store(renderer, x, y, &color);
 }

@@ -25,8 +25,9 @@ typedef struct {
     RTCScene scene;  // geometry 0 is the spheres, if there are any; then come the meshes
     bool one_by_one; // not in packets of 16
     enum RTCIntersectContextFlags coherence;
-    unsigned width, height;
-    float *film; // height * width * 3, from the top left
+    unsigned width, height, samples;
+    const float *offsets; // x and y of each sample, from -1 to 1 across the pixel
+    float *film;          // height * width * 3, from the top left
 } Renderer;
 
 // Of the pixels from x, y on that are in the image.
