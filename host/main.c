@@ -4,6 +4,7 @@
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
 #include "host/cli/version.h"
+#include "host/import/mesh/foreign.h"
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -74,6 +75,8 @@ static int command_run(int argument_count, char **arguments)
 
 int main(int argument_count, char **arguments)
 {
+    const int child_status = foreign_child_main(argument_count, arguments);
+    if (child_status >= 0) return child_status;
     // a failed write is reported like a full disk, and no partial output is left
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);

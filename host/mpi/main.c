@@ -8,6 +8,7 @@
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/cli/ranks.h"
+#include "host/import/mesh/foreign.h"
 #include <errno.h>
 #include <mpi.h>
 #include <signal.h>
@@ -427,6 +428,8 @@ static int first_rank_run(Ranks *ranks, int argument_count, char **arguments)
 
 int main(int argument_count, char **arguments)
 {
+    const int child_status = foreign_child_main(argument_count, arguments);
+    if (child_status >= 0) return child_status;
     int level, rank, size, local_rank, status = EXIT_DONE;
     MPI_Comm local;
     MPI_Init_thread(&argument_count, &arguments, MPI_THREAD_FUNNELED, &level);

@@ -4,7 +4,7 @@
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "host/import/load.h"
-#include "host/import/mesh/mesh_import.h"
+#include "host/import/mesh/foreign.h"
 #include "host/measure/baseline.h"
 #include "host/opencl/cache.h"
 #include "host/render/checkpoint.h"
@@ -47,6 +47,28 @@ static void mtl_fuzz(const char *path, const Source *source, MessageList *messag
     if (!file || fputs(obj, file) < 0 || fclose(file) != 0) abort();
     mesh_fuzz(obj_path, source, messages);
     unlink(obj_path);
+}
+
+// What a process that runs assimp may write.
+static void reply_fuzz(const char *path, const Source *source, MessageList *messages)
+{
+    (void)source;
+    const Source scene_source = {.file = "scene.yaml", .bytes = "", .length = 0};
+    Report report = report_open(&scene_source, messages);
+    const MeshImport import = {
+        .path = "a.fbx", .transform.scale = {1, 1, 1}, .own_materials = true, .report = &report};
+    Scene scene = {0};
+    MeshDraft draft = {.import = &import, .scene = &scene, .source = scene_source, .places = DRAFT_NO_PLACES};
+    Mesh mesh = {0};
+    bool read;
+    FILE *file = fopen(path, "rb");
+    if (!file) abort();
+    if (foreign_reply_read(&draft, file, &read) && draft_check(&draft)) draft_finish(&draft, &mesh);
+    fclose(file);
+    mesh_free(&mesh);
+    draft_free(&draft);
+    report_close(&report);
+    scene_free(&scene);
 }
 
 static const SceneOptions scene_options = {.lenient = true};
@@ -132,14 +154,23 @@ static const struct {
     const char *name, *file;
     void (*read)(const char *path, const Source *source, MessageList *messages);
 } readers[] = {
-    {"png", "a.png", image_fuzz}, {"jpeg", "a.jpg", image_fuzz},
-    {"ppm", "a.ppm", image_fuzz}, {"exr", "a.exr", image_fuzz},
-    {"npy", "a.npy", image_fuzz}, {"obj", "a.obj", mesh_fuzz},
-    {"mtl", "a.mtl", mtl_fuzz},   {"ply", "a.ply", mesh_fuzz},
-    {"stl", "a.stl", mesh_fuzz},  {"yaml", "a.yaml", yaml_fuzz},
-    {"rt", "a.rt", rt_fuzz},      {"cfg", "a.cfg", cfg_fuzz},
-    {"nff", "a.nff", nff_fuzz},   {"checkpoint", "a", checkpoint_fuzz},
-    {"cache", "a", cache_fuzz},   {"baseline", "a.json", baseline_fuzz},
+    {"png", "a.png", image_fuzz},
+    {"jpeg", "a.jpg", image_fuzz},
+    {"ppm", "a.ppm", image_fuzz},
+    {"exr", "a.exr", image_fuzz},
+    {"npy", "a.npy", image_fuzz},
+    {"obj", "a.obj", mesh_fuzz},
+    {"mtl", "a.mtl", mtl_fuzz},
+    {"ply", "a.ply", mesh_fuzz},
+    {"reply", "a", reply_fuzz},
+    {"stl", "a.stl", mesh_fuzz},
+    {"yaml", "a.yaml", yaml_fuzz},
+    {"rt", "a.rt", rt_fuzz},
+    {"cfg", "a.cfg", cfg_fuzz},
+    {"nff", "a.nff", nff_fuzz},
+    {"checkpoint", "a", checkpoint_fuzz},
+    {"cache", "a", cache_fuzz},
+    {"baseline", "a.json", baseline_fuzz},
 };
 
 static size_t reader;

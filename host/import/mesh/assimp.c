@@ -1,9 +1,10 @@
 // Meshes by assimp, without its post-processing: joining vertices and generating normals there use absolute
 // distances, which distorts small meshes; its triangulation reads missing vertices and drops parts of concave
 // polygons.
+#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/affine.h"
-#include "host/import/mesh/draft.h"
+#include "host/import/mesh/foreign.h"
 #include "host/import/number.h"
 
 #include <assimp/cimport.h>
@@ -195,12 +196,18 @@ static bool file_add(Importer *importer)
     return added;
 }
 
-bool foreign_read(MeshDraft *draft)
+bool assimp_read(MeshDraft *draft)
 {
-    char fault[200];
-    if (gltf_find_fault(draft->import->path, fault, sizeof fault)) return draft_refuse(draft, "%s", fault);
-    Importer importer = {.draft = draft, .file = aiImportFile(draft->import->path, 0)};
-    if (!importer.file) return draft_refuse(draft, "%s", aiGetErrorString());
+    const char *path = draft->import->path, *ending = strrchr(path, '.');
+    if (!ending || !aiIsExtensionSupported(ending))
+        return draft_refuse(draft,
+                            "no mesh that is known by its ending: .obj, .ply, .stl, .gltf, .fbx, .dae, …");
+    Importer importer = {.draft = draft, .file = aiImportFile(path, 0)};
+    if (!importer.file) {
+        const char *error = aiGetErrorString();
+        if (strstr(error, "bad_alloc")) exit(EXIT_MACHINE);
+        return draft_refuse(draft, "%.*s", (int)strcspn(error, "\r\n"), error);
+    }
     const bool added = file_add(&importer);
     aiReleaseImport(importer.file);
     return added;

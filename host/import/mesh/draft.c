@@ -3,8 +3,6 @@
 #include <stdarg.h>
 #include <stdlib.h>
 
-enum { POLYGON_MAX = 1 << 14 };
-
 const char *const draft_part_names[DRAFT_PART_COUNT] = {
     [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
 
@@ -40,7 +38,8 @@ bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    if (draft->is_binary) return draft_refuse(draft, "byte %zu: %s", offset, text);
+    if (draft->places == DRAFT_NO_PLACES) return draft_refuse(draft, "%s", text);
+    if (draft->places == DRAFT_BYTES) return draft_refuse(draft, "byte %zu: %s", offset, text);
     report_error(&draft->report, offset, "%s", text);
     return false;
 }
@@ -68,8 +67,8 @@ void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner)
 bool draft_end_face(MeshDraft *draft, size_t offset)
 {
     const size_t first = draft->face_start, count = draft->corners[DRAFT_POSITION].count - first;
-    if (count > POLYGON_MAX)
-        return draft_fails(draft, offset, "a face of %zu corners; %d is the most", count, POLYGON_MAX);
+    if (count > DRAFT_POLYGON_MAX)
+        return draft_fails(draft, offset, "a face of %zu corners; %d is the most", count, DRAFT_POLYGON_MAX);
     if (count < 3) {
         for (int part = 0; part < DRAFT_PART_COUNT; part++)
             if (draft->corners[part].count > first) draft->corners[part].count = first;

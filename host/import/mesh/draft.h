@@ -21,6 +21,8 @@ typedef struct {
     uint32_t material; // of the scene
 } DraftMaterialRun;
 
+enum { DRAFT_POLYGON_MAX = 1 << 14 }; // corners of a face
+
 // A face of more than three corners.
 typedef struct {
     size_t first_corner, corner_count;
@@ -31,12 +33,15 @@ typedef struct {
     size_t index, offset;
 } DraftPlace;
 
+// What messages name: the lines of a text, the bytes of a binary file, or neither.
+typedef enum { DRAFT_LINES, DRAFT_BYTES, DRAFT_NO_PLACES } DraftPlaces;
+
 typedef struct {
     const MeshImport *import;
     Scene *scene;
-    Source source;  // the file
-    bool is_binary; // messages name bytes, not lines
-    Report report;  // of the file
+    Source source; // the file
+    DraftPlaces places;
+    Report report; // of the file
 
     struct {
         Vector3 *items;

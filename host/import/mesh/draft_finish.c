@@ -40,7 +40,9 @@ static bool position_fails(MeshDraft *draft, uint32_t position)
 {
     const DraftPlace wanted = {.index = position};
     const DraftPlace *place =
-        bsearch(&wanted, draft->unread.items, draft->unread.count, sizeof wanted, places_compare);
+        draft->unread.count > 0
+            ? bsearch(&wanted, draft->unread.items, draft->unread.count, sizeof wanted, places_compare)
+            : NULL;
     if (!place)
         return draft_refuse(draft, "vertex %zu (from %zu) is not finite or too large",
                             position + draft->first_index, draft->first_index);

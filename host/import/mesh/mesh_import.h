@@ -27,6 +27,4 @@ typedef struct {
 // Adds the file's triangles to the scene as one mesh and sets *index to its index. Reports an error and
 // returns false if the file cannot be read as a mesh, or if a vertex of a face is missing, not finite or
 // beyond NUMBER_MAX. Where no triangle has a material of the file, the mesh has none.
-bool gltf_find_fault(const char *path, char *fault, size_t size);
-
 bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index);

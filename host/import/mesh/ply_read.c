@@ -386,9 +386,9 @@ static bool element_start(PlyReader *reader, const PlyElement *element)
 static bool element_read(PlyReader *reader, const PlyElement *element)
 {
     MeshDraft *draft = reader->reading.draft;
-    draft->is_binary = false; // the header's lines
+    draft->places = DRAFT_LINES; // of the header
     if (!element_start(reader, element)) return false;
-    draft->is_binary = is_binary(reader);
+    if (is_binary(reader)) draft->places = DRAFT_BYTES;
     // without properties there are no rows, whatever their number
     const size_t count = element->property_count > 0 ? element->count : 0;
     for (reader->row = 0; reader->row < count; reader->row++)

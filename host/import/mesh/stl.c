@@ -89,7 +89,7 @@ static size_t facet_count(const Source *source)
 static bool binary_read(MeshDraft *draft)
 {
     const Source *source = &draft->source;
-    draft->is_binary = true;
+    draft->places = DRAFT_BYTES;
     if (source->length < HEADER_SIZE)
         return draft_fails(draft, source->length,
                            "no STL file, which starts with 'solid' or has %d bytes before its facets",

@@ -1,0 +1,326 @@
+#include "host/import/mesh/foreign.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/import/number.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { REPLY_DESCRIPTOR = 3, MESSAGES_MAX = 64, MATERIALS_MAX = 1 << 20 };
+
+static const char command[] = "--read-mesh";
+static const char magic[8] = "glntmsh";
+
+typedef struct {
+    char magic[8];
+    uint64_t is_read, message_count, material_count, has_normals, has_uvs;
+    uint64_t counts[6]; // of the arrays
+} ReplyHeader;
+
+typedef struct {
+    uint64_t is_error;
+    char text[512];
+} ReplyMessage;
+
+typedef struct {
+    double color[3], specular, shininess, transmission, ior;
+    char name[64];
+} ReplyMaterial;
+
+typedef struct {
+    void **items;
+    size_t *count, *capacity, size;
+} ReplyArray;
+
+#define REPLY_ARRAY(array)                                                                                   \
+    {                                                                                                        \
+        (void **)&(array).items, &(array).count, &(array).capacity, sizeof *(array).items                    \
+    }
+
+typedef struct {
+    ReplyArray items[6];
+} ReplyArrays;
+
+static ReplyArrays arrays_of(MeshDraft *draft)
+{
+    return (ReplyArrays){{REPLY_ARRAY(draft->positions), REPLY_ARRAY(draft->normals), REPLY_ARRAY(draft->uvs),
+                          REPLY_ARRAY(draft->corners[DRAFT_POSITION]), REPLY_ARRAY(draft->polygons),
+                          REPLY_ARRAY(draft->materials)}};
+}
+
+static void limit(__rlimit_resource_t resource, rlim_t most)
+{
+    struct rlimit now;
+    if (getrlimit(resource, &now) != 0 || now.rlim_cur <= most) return;
+    now.rlim_cur = most;
+    setrlimit(resource, &now);
+}
+
+void foreign_child_limit(void)
+{
+#ifndef __SANITIZE_ADDRESS__ // whose shadow is larger
+    limit(RLIMIT_AS, (rlim_t)FOREIGN_MEBIBYTES_MAX << 20);
+#endif
+    limit(RLIMIT_CPU, FOREIGN_PROCESSOR_SECONDS_MAX);
+    limit(RLIMIT_CORE, 0);
+    alarm(FOREIGN_SECONDS_MAX);
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+}
+
+static void messages_write(FILE *reply, const MessageList *messages)
+{
+    for (size_t i = 0; i < messages->count; i++) {
+        ReplyMessage message = {.is_error = messages->items[i].severity == MESSAGE_ERROR};
+        snprintf(message.text, sizeof message.text, "%s", messages->items[i].text);
+        fwrite(&message, sizeof message, 1, reply);
+    }
+}
+
+static void materials_write(FILE *reply, const Scene *scene)
+{
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *from = &scene->materials.items[i];
+        ReplyMaterial material = {.color = {from->color.x, from->color.y, from->color.z},
+                                  .specular = from->specular,
+                                  .shininess = from->shininess,
+                                  .transmission = from->transmission,
+                                  .ior = from->ior};
+        snprintf(material.name, sizeof material.name, "%s", scene->material_names.items[i]);
+        fwrite(&material, sizeof material, 1, reply);
+    }
+}
+
+static void reply_write(FILE *reply, MeshDraft *draft, bool is_read)
+{
+    ReplyHeader header = {.is_read = is_read,
+                          .message_count = draft->import->report->messages->count,
+                          .material_count = draft->scene->materials.count,
+                          .has_normals = draft->is_shared[DRAFT_NORMAL],
+                          .has_uvs = draft->is_shared[DRAFT_UV]};
+    const ReplyArrays arrays = arrays_of(draft);
+    memcpy(header.magic, magic, sizeof magic);
+    for (size_t i = 0; i < 6; i++)
+        header.counts[i] = is_read ? *arrays.items[i].count : 0;
+    fwrite(&header, sizeof header, 1, reply);
+    messages_write(reply, draft->import->report->messages);
+    materials_write(reply, draft->scene);
+    for (size_t i = 0; i < 6; i++)
+        if (header.counts[i] > 0)
+            fwrite(*arrays.items[i].items, arrays.items[i].size, header.counts[i], reply);
+    fwrite(magic, sizeof magic, 1, reply);
+}
+
+int foreign_child_main(int argument_count, char **arguments)
+{
+    if (argument_count != 4 || strcmp(arguments[1], command) != 0) return -1;
+    foreign_child_limit();
+    FILE *reply = fdopen(REPLY_DESCRIPTOR, "wb");
+    if (!reply) return EXIT_FAILURE;
+    MessageList messages = {0};
+    const Source source = {.file = arguments[2], .bytes = ""};
+    Report report = report_open(&source, &messages);
+    Scene scene = {0};
+    const MeshImport import = {
+        .path = arguments[2], .own_materials = strcmp(arguments[3], "own") == 0, .report = &report};
+    MeshDraft draft = {.import = &import, .scene = &scene, .source = source, .places = DRAFT_NO_PLACES};
+    const bool is_read = assimp_read(&draft);
+    report_close(&report);
+    reply_write(reply, &draft, is_read);
+    // what assimp's destructors would still do is of no use
+    _exit(fflush(reply) == 0 ? EXIT_SUCCESS : EXIT_FAILURE);
+}
+
+static bool messages_read(MeshDraft *draft, FILE *reply, uint64_t count)
+{
+    if (count > MESSAGES_MAX) return false;
+    for (uint64_t i = 0; i < count; i++) {
+        ReplyMessage message;
+        if (fread(&message, sizeof message, 1, reply) != 1) return false;
+        message.text[sizeof message.text - 1] = '\0';
+        (message.is_error ? report_error : report_warning)(draft->import->report, draft->import->offset, "%s",
+                                                           message.text);
+    }
+    return true;
+}
+
+static bool number_is_sound(double number)
+{
+    return number >= 0 && number <= NUMBER_MAX;
+}
+
+static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count)
+{
+    if (count > MATERIALS_MAX) return false;
+    for (uint64_t i = 0; i < count; i++) {
+        ReplyMaterial from;
+        if (fread(&from, sizeof from, 1, reply) != 1 || !number_is_sound(from.color[0]) ||
+            !number_is_sound(from.color[1]) || !number_is_sound(from.color[2]) ||
+            !number_is_sound(from.specular) || !number_is_sound(from.shininess) ||
+            !(from.transmission >= 0 && from.transmission <= 1) || !(from.ior > 0 && from.ior <= NUMBER_MAX))
+            return false;
+        from.name[sizeof from.name - 1] = '\0';
+        Material material = material_default();
+        material.color = (Color){from.color[0], from.color[1], from.color[2]};
+        material.specular = from.specular;
+        material.shininess = from.shininess;
+        material.transmission = from.transmission;
+        material.ior = from.ior;
+        scene_add_material(draft->scene, &material, from.name);
+    }
+    return true;
+}
+
+// Memory grows with what arrives.
+static bool arrays_read(MeshDraft *draft, FILE *reply, const uint64_t counts[6])
+{
+    enum { CHUNK = 1 << 16 };
+    const ReplyArrays arrays = arrays_of(draft);
+    for (size_t i = 0; i < 6; i++) {
+        const ReplyArray *array = &arrays.items[i];
+        while (*array->count < counts[i]) {
+            const uint64_t left = counts[i] - *array->count;
+            const size_t count = left < CHUNK ? (size_t)left : CHUNK;
+            if (*array->count + count > *array->capacity)
+                *array->items =
+                    array_grow(*array->items, array->capacity, *array->count + count, array->size);
+            if (fread((char *)*array->items + *array->count * array->size, array->size, count, reply) !=
+                count)
+                return false;
+            *array->count += count;
+        }
+    }
+    return true;
+}
+
+// Each follows the one before, and whole triangles lie between them.
+static bool polygons_are_sound(const MeshDraft *draft)
+{
+    const size_t corner_count = draft->corners[DRAFT_POSITION].count;
+    size_t at = 0;
+    for (size_t i = 0; i < draft->polygons.count; i++) {
+        const DraftPolygon *polygon = &draft->polygons.items[i];
+        if (polygon->first_corner < at || polygon->first_corner > corner_count ||
+            (polygon->first_corner - at) % 3 > 0 || polygon->corner_count < 4 ||
+            polygon->corner_count > DRAFT_POLYGON_MAX ||
+            polygon->corner_count > corner_count - polygon->first_corner)
+            return false;
+        at = polygon->first_corner + polygon->corner_count;
+    }
+    return (corner_count - at) % 3 == 0;
+}
+
+static bool runs_are_sound(MeshDraft *draft, uint64_t material_count)
+{
+    const uint32_t first_material = (uint32_t)(draft->scene->materials.count - material_count);
+    size_t at = 0;
+    for (size_t i = 0; i < draft->materials.count; i++) {
+        DraftMaterialRun *run = &draft->materials.items[i];
+        if ((i == 0 && run->first_corner > 0) || run->first_corner < at ||
+            run->first_corner > draft->corners[DRAFT_POSITION].count || run->material >= material_count)
+            return false;
+        at = run->first_corner;
+        run->material += first_material;
+    }
+    return true;
+}
+
+static bool draft_is_sound(MeshDraft *draft, const ReplyHeader *header)
+{
+    const size_t position_count = draft->positions.count;
+    if (position_count >= DRAFT_NONE || draft->normals.count != (header->has_normals ? position_count : 0) ||
+        draft->uvs.count != (header->has_uvs ? position_count : 0))
+        return false;
+    draft->is_shared[DRAFT_NORMAL] = header->has_normals != 0;
+    draft->is_shared[DRAFT_UV] = header->has_uvs != 0;
+    const DraftIndices *corners = &draft->corners[DRAFT_POSITION];
+    for (size_t i = 0; i < corners->count; i++)
+        if (corners->items[i] >= position_count) return false;
+    return polygons_are_sound(draft) && runs_are_sound(draft, header->material_count);
+}
+
+bool foreign_reply_read(MeshDraft *draft, FILE *reply, bool *read)
+{
+    ReplyHeader header;
+    char end[sizeof magic];
+    if (fread(&header, sizeof header, 1, reply) != 1 || memcmp(header.magic, magic, sizeof magic) != 0 ||
+        !messages_read(draft, reply, header.message_count) ||
+        !materials_read(draft, reply, header.material_count) || !arrays_read(draft, reply, header.counts) ||
+        fread(end, sizeof end, 1, reply) != 1 || memcmp(end, magic, sizeof magic) != 0 ||
+        !draft_is_sound(draft, &header))
+        return false;
+    *read = header.is_read != 0;
+    return true;
+}
+
+// Starts the process. Returns an error of errno, or 0 and its end of the pipe.
+static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
+{
+    extern char **environ;
+    char *arguments[] = {"glint", (char *)command, (char *)draft->import->path,
+                         draft->import->own_materials ? "own" : "none", NULL};
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) return errno;
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    sigset_t none, defaults;
+    sigemptyset(&none);
+    sigemptyset(&defaults);
+    sigaddset(&defaults, SIGPIPE);
+    sigaddset(&defaults, SIGXFSZ);
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], REPLY_DESCRIPTOR);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setsigdefault(&attributes, &defaults);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    const int error = posix_spawn(process, "/proc/self/exe", &actions, &attributes, arguments, environ);
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    close(ends[1]);
+    if (error != 0)
+        close(ends[0]);
+    else
+        *reply = ends[0];
+    return error;
+}
+
+static bool child_fails(MeshDraft *draft, int status)
+{
+    const int by = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    if (by == SIGXCPU || by == SIGALRM)
+        return draft_refuse(draft, "assimp needs more than %d s to read it", FOREIGN_PROCESSOR_SECONDS_MAX);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_MACHINE)
+        return draft_refuse(draft, "assimp needs more than %d MiB to read it", FOREIGN_MEBIBYTES_MAX);
+    if (by == SIGINT || by == SIGTERM || by == SIGHUP) return draft_refuse(draft, "reading was interrupted");
+    return draft_refuse(draft, "assimp %s on it", by != 0 ? "crashes" : "fails");
+}
+
+bool foreign_read(MeshDraft *draft)
+{
+    draft->places = DRAFT_NO_PLACES;
+    pid_t process;
+    int descriptor, status = 0;
+    const int error = child_start(draft, &process, &descriptor);
+    if (error != 0) return draft_refuse(draft, "no process to read it in: %s", strerror(error));
+    FILE *reply = fdopen(descriptor, "rb");
+    bool read = false;
+    const bool is_whole = reply && foreign_reply_read(draft, reply, &read);
+    if (reply)
+        fclose(reply);
+    else
+        close(descriptor);
+    while (waitpid(process, &status, 0) < 0 && errno == EINTR) {
+    }
+    return is_whole ? read : child_fails(draft, status);
+}
