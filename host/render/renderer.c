@@ -141,9 +141,9 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
         kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
 }
 
-static bool settings_certify(const RenderSettings *settings)
+static bool certifies(const Renderer *renderer, const RenderSettings *settings)
 {
-    return settings->precision == PRECISION_CERTIFIED || settings->repeats == REPEATS_IN_DOUBT;
+    return settings->precision == PRECISION_CERTIFIED || renderer->repeats == REPEATS_IN_DOUBT;
 }
 
 static CompileSettings compile_settings(const RenderSettings *settings, uint32_t lanes)
@@ -154,7 +154,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
         .precision = settings->precision,
-        .certifies = settings_certify(settings),
+        .certifies = settings->precision == PRECISION_CERTIFIED,
         .lanes = lanes,
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
@@ -217,6 +217,7 @@ static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSet
     const uint32_t lanes =
         settings->lanes ? settings->lanes : device_lanes(renderer->compute->device, is_double);
     CompileSettings compiling = compile_settings(settings, lanes);
+    compiling.certifies = certifies(renderer, settings);
     compiling.textures = renderer->compiled.textures;
     return compile(renderer, scene, &compiling, messages) &&
            compiled_upload(renderer, settings, lanes, scene->lights.count);
@@ -269,8 +270,8 @@ static void variant_set(Renderer *renderer)
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
-    text_appendf(text, "#define IS_CERTIFIED %d\n", settings_certify(&renderer->settings));
-    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->settings.repeats != REPEATS_NONE);
+    text_appendf(text, "#define IS_CERTIFIED %d\n", certifies(renderer, &renderer->settings));
+    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->repeats != REPEATS_NONE);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
     text_appendf(text, "#define HAS_FMA %d\n", has_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
@@ -301,10 +302,11 @@ static void variant_set(Renderer *renderer)
             scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
 }
 
-static Renderer *renderer_make(Compute *compute)
+static Renderer *renderer_make(Compute *compute, PixelRepeats repeats)
 {
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
+    renderer->repeats = repeats;
     renderer->report.device = compute->device;
     renderer->report.build_from_cache = true;
     renderer->report.scene_hash = HASH_START;
@@ -327,27 +329,29 @@ static RenderSettings repeat_settings(const RenderSettings *settings)
 {
     RenderSettings repeat = *settings;
     repeat.precision = PRECISION_DOUBLE;
-    repeat.repeats = settings->repeats == REPEATS_NONE ? REPEATS_IN_DOUBT : REPEATS_UNDECIDED;
     repeat.counting = repeat.hashes_scene = false;
     return repeat;
 }
 
-// False as renderer_open returns NULL.
-static bool repeat_open(Renderer *renderer, const Scene *scene, MessageList *messages)
+// As renderer_open; with the renderer that repeats what this one leaves in doubt.
+static Renderer *renderer_open_for(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                                   PixelRepeats repeats, MessageList *messages)
 {
-    const RenderSettings settings = repeat_settings(&renderer->settings);
-    renderer->repeat = renderer_open(renderer->compute, scene, &settings, messages);
-    return renderer->repeat != NULL;
+    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
+    Renderer *renderer = renderer_make(compute, repeats);
+    bool is_ready = scene_assign(renderer, scene, settings, messages);
+    if (is_ready && certifies(renderer, settings)) {
+        const RenderSettings repeat = repeat_settings(settings);
+        renderer->repeat = renderer_open_for(compute, scene, &repeat, repeats + 1, messages);
+        is_ready = renderer->repeat != NULL;
+    }
+    return renderer_finish(renderer, is_ready);
 }
 
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
-    Renderer *renderer = renderer_make(compute);
-    bool is_ready = scene_assign(renderer, scene, settings, messages);
-    if (is_ready && settings_certify(settings)) is_ready = repeat_open(renderer, scene, messages);
-    return renderer_finish(renderer, is_ready);
+    return renderer_open_for(compute, scene, settings, REPEATS_NONE, messages);
 }
 
 Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
@@ -362,7 +366,7 @@ Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size
         compiled_scene_free(compiled);
         return NULL;
     }
-    Renderer *renderer = renderer_make(compute);
+    Renderer *renderer = renderer_make(compute, REPEATS_NONE);
     const bool is_double = settings->precision == PRECISION_DOUBLE;
     return renderer_finish(renderer, compiled_take(renderer, compiled, is_double, messages) &&
                                          compiled_upload(renderer, settings, settings->lanes, light_count));

@@ -12,10 +12,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// Of which pixels a renderer at `double` renders lists, for a renderer at `certified`: none; those in doubt,
-// with bounds of its own; those that these leave undecided, which so look as they do at `double`.
-typedef enum { REPEATS_NONE, REPEATS_IN_DOUBT, REPEATS_UNDECIDED } PixelRepeats;
-
 typedef struct {
     uint32_t width, height;                                   // of the whole image
     uint32_t region_x, region_y, region_width, region_height; // the part to render
@@ -37,11 +33,10 @@ typedef struct {
     // roundings are then relative to that eye's distance from the surfaces.
     bool is_preview;
     bool no_cache;
-    double band_seconds;  // target duration of a launch; 0: 0.1
-    bool (*stop)(void);   // called between launches; true ends the render; NULL: never
-    bool hashes_scene;    // for the report
-    uint32_t band_rows;   // fixed rows per band, for tests; 0: by time
-    PixelRepeats repeats; // within this room, at `double`
+    double band_seconds; // target duration of a launch; 0: 0.1
+    bool (*stop)(void);  // called between launches; true ends the render; NULL: never
+    bool hashes_scene;   // for the report
+    uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
 } RenderSettings;
 
 // 8192 ulp, the largest error (kernels/numerics/perturb.h), times this is below 2^23 ulp: an injected error

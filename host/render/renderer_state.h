@@ -19,9 +19,14 @@ typedef struct {
     KernelSlot kernels[KERNEL_COUNT];
 } KernelVariant;
 
+// Of which pixels a renderer at `double` renders lists, for a renderer at `certified`: none; those in doubt,
+// with bounds of its own; those that these leave undecided, which so look as they do at `double`.
+typedef enum { REPEATS_NONE, REPEATS_IN_DOUBT, REPEATS_UNDECIDED } PixelRepeats;
+
 struct Renderer {
     Compute *compute;
     RenderSettings settings;
+    PixelRepeats repeats;
     RenderReport report;
     CompiledScene compiled; // without the arrays that are only on the device
     cl_mem arrays[FLAT_COUNT];
