@@ -18,11 +18,12 @@ static void reply_with(const char *text, size_t size)
 
 static void misbehave(const char *name)
 {
-    static const struct rlimit few_seconds = {1, RLIM_INFINITY}, few_bytes = {1 << 28, RLIM_INFINITY};
+    const struct rlimit few_seconds = {1, RLIM_INFINITY};
     if (!strcmp(name, "hang.fbx")) setrlimit(RLIMIT_CPU, &few_seconds);
 #ifdef __SANITIZE_ADDRESS__ // no limit of address space then
     if (!strcmp(name, "bloat.fbx")) _exit(EXIT_MACHINE);
 #else
+    const struct rlimit few_bytes = {1 << 28, RLIM_INFINITY};
     if (!strcmp(name, "bloat.fbx")) setrlimit(RLIMIT_AS, &few_bytes);
 #endif
     foreign_child_limit();

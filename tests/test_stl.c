@@ -86,7 +86,8 @@ static void binary_fill(char bytes[WHOLE], const char *title)
     static const float corners[2][3][3] = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
                                            {{0, 1, 0}, {1, 0, 0}, {1, 1, 0}}};
     memset(bytes, 0, WHOLE);
-    memcpy(bytes, title, strlen(title));
+    for (size_t i = 0; title[i] != '\0'; i++)
+        bytes[i] = title[i];
     bytes[80] = 2;
     for (size_t i = 0; i < 2; i++)
         memcpy(bytes + HEADER + i * FACET_SIZE + 12, corners[i], sizeof corners[i]);

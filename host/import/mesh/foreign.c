@@ -263,7 +263,6 @@ bool foreign_reply_read(MeshDraft *draft, FILE *reply, bool *read)
 // Starts the process. Returns an error of errno, or 0 and its end of the pipe.
 static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
 {
-    extern char **environ;
     char *arguments[] = {"glint", (char *)command, (char *)draft->import->path,
                          draft->import->own_materials ? "own" : "none", NULL};
     int ends[2];
