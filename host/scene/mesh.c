@@ -1,5 +1,6 @@
 #include "host/scene/mesh.h"
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -109,25 +110,53 @@ static double angle_between(Vector3 a, Vector3 b)
     return atan2(vector_length(vector_cross(a, b)), vector_dot(a, b));
 }
 
+// What a triangle adds to the normals of its vertices.
+typedef struct {
+    Vector3 unit;
+    double angles[3];
+} NormalPart;
+
+typedef struct {
+    const Mesh *mesh;
+    size_t first; // triangle
+    NormalPart *parts;
+} NormalParts;
+
+static void parts_make(void *context, size_t begin, size_t end)
+{
+    const NormalParts *parts = context;
+    for (size_t i = begin; i < end; i++) {
+        Vector3 corners[3];
+        corners_of(parts->mesh, parts->first + i, corners);
+        NormalPart *part = &parts->parts[i];
+        part->unit = vector_normalize(
+            vector_cross(vector_subtract(corners[1], corners[0]), vector_subtract(corners[2], corners[0])));
+        for (int corner = 0; corner < 3; corner++)
+            part->angles[corner] = angle_between(vector_subtract(corners[(corner + 1) % 3], corners[corner]),
+                                                 vector_subtract(corners[(corner + 2) % 3], corners[corner]));
+    }
+}
+
 // Weighted by the angle at the vertex, which makes the normal independent of how a polygon was cut into
 // triangles (Thuermer, Wuethrich, Computing vertex normals from polygonal facets, Journal of Graphics Tools
-// 3(1), 1998).
+// 3(1), 1998). The triangles' parts are made by threads, some at a time, and added in order: the sums are the
+// same on any machine.
 void mesh_make_normals(Mesh *mesh)
 {
+    enum { PARTS_MAX = 1 << 16, PARTS_OF_THREAD_MIN = 1 << 10 };
     free(mesh->normals);
     mesh->normals = memory_allocate_zeroed(mesh->vertex_count, sizeof *mesh->normals);
-    for (size_t i = 0; i < mesh->triangle_count; i++) {
-        Vector3 corners[3];
-        corners_of(mesh, i, corners);
-        Vector3 unit = vector_normalize(
-            vector_cross(vector_subtract(corners[1], corners[0]), vector_subtract(corners[2], corners[0])));
-        for (int corner = 0; corner < 3; corner++) {
-            Vector3 *normal = &mesh->normals[mesh->triangles[i][corner]];
-            double angle = angle_between(vector_subtract(corners[(corner + 1) % 3], corners[corner]),
-                                         vector_subtract(corners[(corner + 2) % 3], corners[corner]));
-            *normal = vector_add(*normal, vector_scale(unit, angle));
+    NormalParts parts = {.mesh = mesh, .parts = memory_allocate(PARTS_MAX, sizeof *parts.parts)};
+    for (; parts.first < mesh->triangle_count; parts.first += PARTS_MAX) {
+        const size_t left = mesh->triangle_count - parts.first, count = left < PARTS_MAX ? left : PARTS_MAX;
+        parallel_run(count, PARTS_OF_THREAD_MIN, parts_make, &parts);
+        for (size_t i = 0; i < 3 * count; i++) {
+            const NormalPart *part = &parts.parts[i / 3];
+            Vector3 *normal = &mesh->normals[mesh->triangles[parts.first + i / 3][i % 3]];
+            *normal = vector_add(*normal, vector_scale(part->unit, part->angles[i % 3]));
         }
     }
+    free(parts.parts);
     for (size_t i = 0; i < mesh->vertex_count; i++)
         mesh->normals[i] = vector_normalize(mesh->normals[i]);
 }
