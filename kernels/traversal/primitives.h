@@ -21,10 +21,35 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
         memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
+// Tests one primitive and records its hit. Returns whether any lane hits it, or may.
+#if IS_CERTIFIED
+#define INTERSECT_SHAPE(feature, Type, name, names)                                                          \
+    static inline bool intersect_##name(Traversal *traversal, const Scene *scene, const Ray *ray,            \
+                                        Type shape)                                                          \
+    {                                                                                                        \
+        CertainHit hit = name##_certain_hit(&shape, ray);                                                    \
+        if (!lanes_any(hit.found | hit.doubt)) return false;                                                 \
+        traversal_record_certain(traversal, scene, &hit, shape.id.x);                                        \
+        return true;                                                                                         \
+    }
+#else
+#define INTERSECT_SHAPE(feature, Type, name, names)                                                          \
+    static inline bool intersect_##name(Traversal *traversal, const Scene *scene, const Ray *ray,            \
+                                        Type shape)                                                          \
+    {                                                                                                        \
+        real t = ray->tmax;                                                                                  \
+        mask found = name##_hit(&shape, ray, &t);                                                            \
+        if (!lanes_any(found)) return false;                                                                 \
+        traversal_record(traversal, scene, found, t, shape.id.x);                                            \
+        if (traversal->query != OCCLUSION) object_prefetch(scene, KIND_##feature, shape.id);                 \
+        return true;                                                                                         \
+    }
+#endif
+SHAPE_LIST(INTERSECT_SHAPE)
+
 // Intersects primitives first .. last - 1 of one kind; `cull_spheres`, if not 0, are theirs. One function per
 // kind: if one function tested all kinds, Mesa, which inlines before it knows the kind asked for, would
 // compile them all at each call.
-#if IS_CERTIFIED
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
     static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
                                          uint first, uint last, global const CullSphere *cull_spheres)       \
@@ -33,38 +58,12 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
         for (uint i = first; i < last; i++) {                                                                \
             if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
             if (i == last) break;                                                                            \
-            Type shape = scene->names[i];                                                                    \
-            CertainHit hit = name##_certain_hit(&shape, ray);                                                \
-            if (!lanes_any(hit.found | hit.doubt)) continue;                                                 \
+            if (!intersect_##name(traversal, scene, ray, scene->names[i])) continue;                         \
             found_any = true;                                                                                \
-            traversal_record_certain(traversal, scene, &hit, shape.id.x);                                    \
             if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;                       \
         }                                                                                                    \
         return found_any;                                                                                    \
     }
-#else
-#define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
-    static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
-                                         uint first, uint last, global const CullSphere *cull_spheres)       \
-    {                                                                                                        \
-        bool found_any = false;                                                                              \
-        for (uint i = first; i < last; i++) {                                                                \
-            if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
-            if (i == last) break;                                                                            \
-            Type shape = scene->names[i];                                                                    \
-            real t = ray->tmax;                                                                              \
-            mask found = name##_hit(&shape, ray, &t);                                                        \
-            if (!lanes_any(found)) continue;                                                                 \
-            found_any = true;                                                                                \
-            traversal_record(traversal, scene, found, t, shape.id.x);                                        \
-            if (traversal->query != OCCLUSION)                                                               \
-                object_prefetch(scene, KIND_##feature, shape.id);                                            \
-            else if (!lanes_any(traversal->active))                                                          \
-                break;                                                                                       \
-        }                                                                                                    \
-        return found_any;                                                                                    \
-    }
-#endif
 SHAPE_LIST(INTERSECT_SHAPES)
 
 // A leaf is count << 8 | kind (BvhNode.child_kind) and its first primitive.
