@@ -78,7 +78,7 @@ static Vector3 vector_from(const double parts[3])
 static double moved_beyond(const Scene *scene, bool has_eye_powers, const ReferenceHit *hit, double u,
                            double size, double eye_distance)
 {
-    const int kind = scene->objects.items[hit->object].kind;
+    const ShapeKind kind = scene->objects.items[hit->object].kind;
     if (kind != SHAPE_CYLINDER && kind != SHAPE_CONE) return 0;
     if (hit->curvature_radius == LDBL_MAX) return 2 * u * size;
     if (!has_eye_powers || kind != SHAPE_CONE) return 0;
