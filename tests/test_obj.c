@@ -92,8 +92,8 @@ static void layouts_are_read(void **state)
     static const char *const texts[] = {
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4",
-        "# a square\n\n  v\t0  0 0 \nv 1. -0 +0.0 # no color\nv 100e-2 1 0\nv .0 1E0 0\no a\ns off\nf  1 "
-        "2\t3 4  \n",
+        ("# a square\n\n  v\t0  0 0 \nv 1. -0 +0.0 # no color\nv 100e-2 1 0\nv .0 1E0 0\no a\ns off\n"
+         "f  1 2\t3 4  \n"),
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n",
         // faces may stand before what they name
         "f 1 2 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
