@@ -72,6 +72,9 @@ void foreign_child_limit(void)
     limit(RLIMIT_CPU, FOREIGN_PROCESSOR_SECONDS_MAX);
     limit(RLIMIT_CORE, 0);
     alarm(FOREIGN_SECONDS_MAX);
+    // a terminal's go to the parent too, which ends this process when it ends
+    signal(SIGINT, SIG_IGN);
+    signal(SIGHUP, SIG_IGN);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
 }
 
@@ -301,7 +304,6 @@ static bool child_fails(MeshDraft *draft, int status)
         return draft_refuse(draft, "assimp needs more than %d s to read it", FOREIGN_PROCESSOR_SECONDS_MAX);
     if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_MACHINE)
         return draft_refuse(draft, "assimp needs more than %d MiB to read it", FOREIGN_MEBIBYTES_MAX);
-    if (by == SIGINT || by == SIGTERM || by == SIGHUP) return draft_refuse(draft, "reading was interrupted");
     return draft_refuse(draft, "assimp %s on it", by != 0 ? "crashes" : "fails");
 }
 
