@@ -316,6 +316,27 @@ static void what_is_not_used_is_reported_once(void **state)
     scene_free(&scene);
 }
 
+// Nine times the most corners a face may have: to cut them would take half a minute.
+static void many_large_polygons_are_refused(void **state)
+{
+    (void)state;
+    Text text = {0};
+    text_appendf(&text, CORNERS);
+    for (int face = 0; face < 9; face++) {
+        text_appendf(&text, "f");
+        for (int i = 0; i < 16384; i++)
+            text_append(&text, " 1", 2);
+        text_append(&text, "\n", 1);
+    }
+    Scene scene;
+    file_write("a.obj", text_c(&text));
+    text_free(&text);
+    assert_false(
+        scene_read(&scene, SCENE_OF(""),
+                   "scene.yaml:4:18: error: a.obj: polygons of too many corners: the sum of their squares is "
+                   "2415919104, more than 2147483648\n"));
+}
+
 static void faults_have_their_place(void **state)
 {
     (void)state;
@@ -378,6 +399,7 @@ int main(void)
         cmocka_unit_test(missing_materials_are_reported),
         cmocka_unit_test(images_of_materials_are_used),
         cmocka_unit_test(what_is_not_used_is_reported_once),
+        cmocka_unit_test(many_large_polygons_are_refused),
         cmocka_unit_test(faults_have_their_place),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);

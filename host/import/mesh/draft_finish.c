@@ -12,6 +12,9 @@
 
 enum { TRIANGLES_MAX = 1 << 28 };
 
+// Cutting a polygon takes time with the square of its corners: some 30 s for this sum.
+static const size_t squared_corners_max = (size_t)1 << 31;
+
 static bool is_in_range(Vector3 v)
 {
     return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
@@ -317,10 +320,16 @@ static void materials_expand(const MeshDraft *draft, Mesh *mesh)
 
 static bool triangles_fit(MeshDraft *draft)
 {
-    size_t corner_count = draft->corners[DRAFT_POSITION].count;
-    for (size_t i = 0; i < draft->polygons.count; i++)
-        corner_count +=
-            2 * draft->polygons.items[i].corner_count - 6; // n - 2 triangles in place of n corners
+    size_t corner_count = draft->corners[DRAFT_POSITION].count, squared_corners = 0;
+    for (size_t i = 0; i < draft->polygons.count; i++) {
+        const size_t count = draft->polygons.items[i].corner_count;
+        corner_count += 2 * count - 6; // n - 2 triangles in place of n corners
+        squared_corners += count * count;
+    }
+    if (squared_corners > squared_corners_max)
+        return draft_refuse(draft,
+                            "polygons of too many corners: the sum of their squares is %zu, more than %zu",
+                            squared_corners, squared_corners_max);
     if (corner_count == 0) return draft_refuse(draft, "no triangles");
     return corner_count / 3 <= TRIANGLES_MAX ||
            draft_refuse(draft, "%zu triangles, more than %d", corner_count / 3, TRIANGLES_MAX);
