@@ -95,15 +95,6 @@ static inline GroupBounds group_bounds(const BoxRays *rays, const Ray *ray, uint
     return bounds;
 }
 
-// For a divergent group, of which only tmin and tmax are used.
-static inline GroupBounds group_unbounded(uint lanes, real tmax)
-{
-    GroupBounds bounds;
-    bounds.tmin = -LARGEST;
-    bounds.tmax = lanes_largest(mask_of_bits(lanes), tmax);
-    return bounds;
-}
-
 static inline real children_plane(global const scalar *boxes, uint plane)
 {
     return real_load(boxes + plane * BVH_WIDTH);
@@ -121,7 +112,7 @@ static inline real axis_bounds_leave(const AxisBounds *bounds, global const scal
 
 // The children whose boxes a ray of the group may intersect, a lane per child; *entry is a lower bound.
 static inline mask bounds_intersect_children(const GroupBounds *bounds, global const scalar *boxes,
-                                             scalar tmax, real *entry)
+                                             real *entry)
 {
     Octant octant = bounds->octant;
     *entry = real_max(real_max(axis_bounds_enter(&bounds->x, boxes, octant.near_x),
@@ -129,7 +120,7 @@ static inline mask bounds_intersect_children(const GroupBounds *bounds, global c
                       real_max(axis_bounds_enter(&bounds->z, boxes, octant.near_z), (real)(bounds->tmin)));
     real far = real_min(real_min(axis_bounds_leave(&bounds->x, boxes, octant.far_x),
                                  axis_bounds_leave(&bounds->y, boxes, octant.far_y)),
-                        real_min(axis_bounds_leave(&bounds->z, boxes, octant.far_z), (real)(tmax)));
+                        real_min(axis_bounds_leave(&bounds->z, boxes, octant.far_z), (real)(bounds->tmax)));
     return *entry <= far;
 }
 
@@ -172,7 +163,6 @@ typedef struct {
     GroupBounds bounds; // if coherent
     uint active;        // lanes still searching, as bits
     real tmax;          // of each lane; -LARGEST for those that are done
-    scalar largest_tmax;
 } RayGroup;
 
 // For each child the lanes whose rays intersect its box, as bits, and the first entry distance.
@@ -193,57 +183,90 @@ static inline integer rays_intersect_children(const RayGroup *group, uint lanes,
     return hit_by;
 }
 
-// Pushes the children of a node that any of the lanes intersects.
-static inline void visit_node(TraversalStack *stack, const Scene *scene, global const BvhNode *node,
-                              const RayGroup *group, uint lanes)
+// After a leaf with hits.
+static inline void group_shrink(RayGroup *group, const Traversal *traversal)
+{
+    group->active = lanes_bits(traversal->active);
+    group->tmax = traversal_tmax(traversal);
+    if (group->coherent) group->bounds.tmax = lanes_largest(traversal->active, group->tmax);
+}
+
+// The children of a node that lanes of a group may intersect.
+typedef struct {
+    uint children;       // as bits
+    RealLanes entry;     // of each child the first entry distance
+    bool by_ray;         // each ray was tested; else the group's bounds
+    IntegerLanes hit_by; // if by_ray, for each child the lanes, as bits
+} MetChildren;
+
+// By ray or by child: the loop costs a test per ray or per child that passes the bounds; the shorter one
+// runs.
+static inline MetChildren group_meets_children(const RayGroup *group, uint lanes, global const scalar *boxes)
+{
+    MetChildren met;
+    met.children = 0;
+    met.by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
+    if (!met.by_ray) {
+        met.children = lanes_bits(bounds_intersect_children(&group->bounds, boxes, &met.entry.all));
+        met.by_ray = popcount(met.children) > popcount(lanes);
+    }
+    if (met.by_ray) {
+        met.hit_by.all = rays_intersect_children(group, lanes, boxes, &met.entry.all);
+        met.children = lanes_bits(met.hit_by.all != (integer)(0));
+    }
+    return met;
+}
+
+// The lanes that intersect the box of one of them before their tmax, as bits.
+static inline uint child_lanes(const RayGroup *group, const MetChildren *met, uint child,
+                               global const scalar *boxes)
+{
+    real entry = (real)(met->entry.each[child]);
+    if (met->by_ray) return (uint)met->hit_by.each[child] & lanes_bits(entry <= group->tmax);
+    return lanes_bits(
+        box_rays_intersect_child(group->rays, group->bounds.octant, boxes + child, group->tmax, &entry));
+}
+
+// The children that are leaves, as bits.
+static inline uint node_leaves(global const BvhNode *node)
+{
+    integer kinds = LANES_CONVERT(INTEGER_BASE)(JOIN(vload, LANES)(0, (global const uint *)node->child_kind));
+    return lanes_bits(kinds != (integer)(BVH_NODE));
+}
+
+// Intersects what is in the leaves among a node's children that any of the lanes intersects, and pushes the
+// other children. A leaf on the stack costs more than the tests that its order spares.
+static inline void visit_node(Traversal *traversal, TraversalStack *stack, const Scene *scene, const Ray *ray,
+                              global const BvhNode *node, RayGroup *group, uint lanes)
 {
     global const scalar *boxes = (global const scalar *)node->planes;
+    MetChildren met = group_meets_children(group, lanes, boxes);
+    const uint leaves = met.children & node_leaves(node);
+    for (uint left = leaves; left != 0; left &= left - 1) {
+        uint leaf = lowest_bit(left);
+        if (child_lanes(group, &met, leaf, boxes) == 0) continue;
+        uint first = ((global const uint *)node->child_index)[leaf];
+        uint kind = ((global const uint *)node->child_kind)[leaf];
+        if (intersect_leaf(traversal, scene, ray, kind, first)) group_shrink(group, traversal);
+        if (group->active == 0) return;
+    }
     const uint bottom = stack->count;
-    RealLanes entry;
-    IntegerLanes hit_by;
-    uint children = 0;
-    // By ray or by child: the loop costs a test per ray or per child that passes the bounds; the shorter one
-    // runs.
-    bool by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
-    if (!by_ray) {
-        children =
-            lanes_bits(bounds_intersect_children(&group->bounds, boxes, group->largest_tmax, &entry.all));
-        by_ray = popcount(children) > popcount(lanes);
-    }
-    if (by_ray) {
-        hit_by.all = rays_intersect_children(group, lanes, boxes, &entry.all);
-        children = lanes_bits(hit_by.all != (integer)(0));
-    }
-    for (; children != 0; children &= children - 1) {
-        uint child = lowest_bit(children);
-        real unused;
-        uint child_lanes = by_ray ? (uint)hit_by.each[child]
-                                  : lanes_bits(box_rays_intersect_child(group->rays, group->bounds.octant,
-                                                                        boxes + child, group->tmax, &unused));
-        if (child_lanes != 0)
-            stack_push_child(stack, bottom, scene, node, child, child_lanes, entry.each[child]);
+    for (uint left = met.children & ~leaves; left != 0; left &= left - 1) {
+        uint child = lowest_bit(left), hit_by = child_lanes(group, &met, child, boxes);
+        if (hit_by != 0) stack_push_child(stack, bottom, scene, node, child, hit_by, met.entry.each[child]);
     }
 }
 
 // Traverses the BVH with a group; visits what any of its active lanes intersects.
 static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
 {
-    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)group->active, group->bounds.tmin};
+    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)group->active, -LARGEST};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
-        uint lanes = next.lanes & group->active;
-        if (next.entry <= group->largest_tmax && lanes != 0) {
-            if (next.child_kind == BVH_NODE) {
-                visit_node(&stack, scene, &scene->nodes[next.child_index], group, lanes);
-            } else {
-                intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
-                group->active = lanes_bits(traversal->active);
-                if (group->active == 0) return;
-                group->tmax = traversal_tmax(traversal);
-                group->largest_tmax = lanes_largest(traversal->active, group->tmax);
-            }
-        }
-        if (stack.count == 0) return;
+        uint lanes = next.lanes & lanes_bits((real)(next.entry) <= group->tmax);
+        if (lanes != 0)
+            visit_node(traversal, &stack, scene, ray, &scene->nodes[next.child_index], group, lanes);
+        if (stack.count == 0 || group->active == 0) return;
     }
 }
 
@@ -258,7 +281,6 @@ static inline RayGroup next_group(const BoxRays *rays, SpilledRays *spilled, con
         if (popcount(group.active) > 2 * FEW_LANES) {
             group.coherent = true;
             group.bounds = group_bounds(rays, ray, group.active, tmax);
-            group.largest_tmax = group.bounds.tmax;
             return group;
         }
         *divergent |= group.active;
@@ -266,8 +288,6 @@ static inline RayGroup next_group(const BoxRays *rays, SpilledRays *spilled, con
     group.active = *divergent;
     *divergent = 0;
     group.coherent = false;
-    group.bounds = group_unbounded(group.active, tmax);
-    group.largest_tmax = group.bounds.tmax;
     return group;
 }
 
