@@ -157,15 +157,22 @@ SPD           ?=
 PEERS_SCENES  ?= $(BUILD)/peers/scenes
 PEERS_OPTIONS ?= --whole --seconds 1
 PEERS_JSON    ?= docs/measurements/bench-peers.json
+spd_options := --seconds 1 --size 1024x1024 --precisions single,double --only glint,Tachyon,POV-Ray
 has_embree := $(wildcard /usr/include/embree3/rtcore.h)
 peers_python := $(BUILD)/peers/python/bin/python
 peers_bench = $(peers_python) tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree)
 
 bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
-	$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS)
-	$(if $(SPD),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) --seconds 1 --size 1024x1024 \
-	    --precisions single,double --only glint,Tachyon,POV-Ray --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
+	$(if $(RUNGS),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS))
+	$(if $(SPD),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(spd_options) \
+	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
 	tools/report README.md docs/performance.md
+
+# How times grow with the number of triangles and of spheres, up to ten million: half an hour, 10 GB of memory and of disk.
+bench-growth: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
+	$(peers_python) tools/peers/growth --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
+	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS)
+	tools/report docs/performance.md
 
 # With PyYAML: Debian's, if it is there.
 $(peers_python):
@@ -243,7 +250,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(BUILD)/host/mpi/main.d $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
