@@ -26,7 +26,10 @@ WRONG_COMMAND_LINES = [
     ('"rendr".*did you mean render', "rendr sphere.yaml"),
     ('unknown command "zzzzzz"$', "zzzzzz"),
     ("scene.*--help", "{render|trace|check}"),
-    ("one scene", "{render|trace|check} sphere.yaml other.yaml"),
+    ("one scene", "{trace|check} sphere.yaml other.yaml"),
+    ("would both be 'sphere.png'", "render sphere.yaml ./sphere.yaml"),
+    ("--checkpoint is for one scene", "render sphere.yaml other.yaml --checkpoint saved"),
+    (r"nowhere/sphere\.png", f"render sphere.yaml other.yaml {SMALL} -o nowhere"),
     ("'--nonsense'", "{render sphere.yaml|trace sphere.yaml|check sphere.yaml|devices} --nonsense"),
     ("rays", "trace sphere.yaml"),
     ("requires an argument", "render sphere.yaml --size"),
@@ -45,7 +48,7 @@ WRONG_COMMAND_LINES = [
     (r'device.* "(toaster|99)".*: 0 \(', "{render|trace --rays rays} sphere.yaml --device {toaster|99}"),
     (r"missing\.yaml.*No such file", "{render|trace --rays rays|check} missing.yaml"),
     (r"sphere\.txt", "{render|trace --rays rays|check} sphere.txt"),
-    (r"one scene, not also 'b\.yaml'", "{render|trace --rays rays|check} sphere.yaml b.yaml"),
+    (r"one scene, not also 'b\.yaml'", "{trace --rays rays|check} sphere.yaml b.yaml"),
     (r"writes CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
     ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
     (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o image.{jpg|PNGX|}"),
@@ -275,6 +278,16 @@ class Failures(CliTestCase):
 
 
 class Images(CliTestCase):
+    def test_several_scenes(self):
+        self.glint(f"render sphere.yaml {SMALL} -o one.png")
+        write("other.yaml", SPHERE)
+        write("bad.yaml", "camera: 5\n")
+        os.mkdir("frames")
+        self.refuses(f"render sphere.yaml other.yaml bad.yaml missing.nff {SMALL} -o frames", "bad.yaml:1")
+        self.assertEqual(sorted(os.listdir("frames")), ["other.png", "sphere.png"])
+        self.assertEqual(png_read("frames/sphere.png")[:2], png_read("one.png")[:2])
+        self.assertEqual(png_read("frames/other.png")[2]["Scene"], "other.yaml")
+
     def test_png(self):
         self.glint(f"render sphere.yaml {SMALL}")
         head, rows, texts, chunks = png_read("sphere.png")

@@ -123,6 +123,17 @@ class Mpi(TestCase):
         subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "faults.so", *flags], input=FAULTS, text=True, check=True)
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
+    def test_several_scenes(self):
+        """Each is rendered by all ranks, and a checkpoint that is refused ends them."""
+        Path("frame.yaml").write_text((ROOT / "scenes/boxes.yaml").read_text())
+        os.mkdir("frames")
+        self.glint("render frame.yaml --size 160x120 -o one.png", env=POCL)
+        self.mpirun(f"-n 3 {RANKS} render {ROOT}/scenes/spheres16.yaml frame.yaml --size 160x120 -o frames")
+        self.assertEqual(sorted(os.listdir("frames")), ["frame.png", "spheres16.png"])
+        self.glint("diff one.png frames/frame.png", env=POCL)
+        Path("saved").write_text("no checkpoint")
+        self.mpirun(f"-n 2 {RANKS} render frame.yaml --size 160x120 --checkpoint saved", status=1)
+
     def mpirun_faulty(self, *faults, status=0):
         """Each rank is faulty as its variables say."""
         parts = []

@@ -15,11 +15,12 @@ typedef struct Ranks {
     Rank *items;
     WorkerShare *shares;
     FilmHeader film; // of the image, once it is rendered
-    // Sends all of them what they need to render. False with a message.
+    // Asks all of them for their devices. False with a message: one of them has none, and all go no further.
     bool (*begin)(struct Ranks *ranks, const Scene *scene, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);
+    // Sends them the scene, after which they are to be served; or, unless they `can_start`, ends their job.
+    void (*go_on)(const Scene *scene, const RenderSettings *settings, bool can_start, MessageList *messages);
     void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker); // see RemoteWorkers
-    bool has_begun;
 } Ranks;
 
 // glint render, with other ranks' devices.

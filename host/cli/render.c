@@ -51,8 +51,10 @@ static const struct option long_options[] = {
 #define HELP_LAYER(NAME, name, type, components, note) "                          " #name ": " note "\n"
 
 static const char help_text[] =
-    "usage: glint render SCENE [OPTIONS]\n\n"
-    "  -o, --output FILE     .png, .ppm, .exr or .npy (default: the scene's name with .png)\n"
+    "usage: glint render SCENE... [OPTIONS]\n\n"
+    "  -o, --output FILE     .png, .ppm, .exr or .npy; of several scenes their folder (default: each "
+    "scene's\n"
+    "                        name with .png)\n"
     "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
     "      --region X,Y,W,H  render these pixels of the image only\n"
@@ -73,9 +75,12 @@ static const char help_text[] =
 
 typedef struct {
     CommonOptions common;
-    const char *scene, *checkpoint;
-    ImageOutputOptions output;
-    uint32_t width, height; // 0: not given
+    char **scenes;
+    size_t scene_count;
+    const char *scene; // the one that is rendered
+    const char *checkpoint;
+    ImageOutputOptions output; // path: of several scenes, their folder
+    uint32_t width, height;    // 0: not given
     uint32_t sample_count, bounce_count;
     uint32_t region[4]; // x, y, width, height
     bool has_region, has_transfer, quiet;
@@ -157,14 +162,17 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
         if (option == 'h') return option_help(help_text);
         if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
     }
-    if (!option_only_scene("render", argument_count, arguments)) return EXIT_USER;
+    if (optind == argument_count) return option_usage_fault("render", "no scene given");
     if (options->budget.limit > 0 && options->common.has_precision)
         return option_usage_fault("render", "--max-error chooses the precision: leave out --precision");
     if (options->budget.limit > 0 && options->checkpoint)
         return option_usage_fault("render",
                                   "--max-error may choose otherwise when a checkpoint is continued: "
                                   "name its choice with --precision");
-    options->scene = arguments[optind];
+    options->scenes = arguments + optind;
+    options->scene_count = (size_t)(argument_count - optind);
+    if (options->scene_count > 1 && options->checkpoint)
+        return option_usage_fault("render", "--checkpoint is for one scene");
     return OPTIONS_READ;
 }
 
@@ -308,8 +316,10 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
                         HostTimes *times, MessageList *messages)
 {
     Checkpoint *checkpoint;
-    if (!checkpoint_start(&checkpoint, options, settings, renderers, devices->count, ranks, messages))
-        return EXIT_USER;
+    const bool can_start =
+        checkpoint_start(&checkpoint, options, settings, renderers, devices->count, ranks, messages);
+    if (ranks) ranks->go_on(scene, settings, can_start, messages);
+    if (!can_start) return EXIT_USER;
     Progress progress;
     progress_open(&progress, options->quiet);
     ImageOutput *output = image_output_open(&options->output, options->scene, scene, settings, renderers,
@@ -355,7 +365,8 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     if (!whole) rest_print(options);
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderers, devices->count, ranks, settings, times);
-    if (whole) fault_output_is_complete(status);
+    const bool is_last = options->scene == options->scenes[options->scene_count - 1];
+    if (whole && is_last) fault_output_is_complete(status);
     return status;
 }
 
@@ -423,19 +434,15 @@ int command_render(int argument_count, char **arguments)
     return command_render_on(NULL, argument_count, arguments);
 }
 
-int command_render_on(Ranks *ranks, int argument_count, char **arguments)
+// Renders one of the scenes into a file.
+static int file_render(RenderOptions options, const char *path, Ranks *ranks)
 {
-    RenderOptions options;
-    int status = options_read(&options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    char *default_path = image_output_default_path(options.scene);
-    if (!options.output.path) options.output.path = default_path;
-
     Scene scene = {0};
     OpenDevices devices;
+    options.output.path = path;
     double start = clock_seconds();
-    status = EXIT_USER;
-    if (image_output_path_known(options.output.path) && scene_open(&scene, options.scene, &options.common) &&
+    int status = EXIT_USER;
+    if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
         if (render_devices_open(&devices, options.common.device, ranks)) {
@@ -444,6 +451,51 @@ int command_render_on(Ranks *ranks, int argument_count, char **arguments)
         }
     }
     scene_free(&scene);
-    free(default_path);
+    return status;
+}
+
+// Where a scene's image goes, to be freed.
+static char *path_make(const RenderOptions *options, const char *scene)
+{
+    const char *output = options->output.path;
+    if (output && options->scene_count == 1) return memory_copy_text(output);
+    char *name = image_output_default_path(scene);
+    if (!output) return name;
+    Text path = {0};
+    text_appendf(&path, "%s/%s", output, name);
+    free(name);
+    return path.items;
+}
+
+// False with a message.
+static bool paths_differ(char *const *paths, const RenderOptions *options)
+{
+    for (size_t i = 0; i < options->scene_count; i++)
+        for (size_t k = 0; k < i; k++) {
+            if (strcmp(paths[i], paths[k]) != 0) continue;
+            fprintf(stderr, "glint render: the images of '%s' and '%s' would both be '%s'\n",
+                    options->scenes[k], options->scenes[i], paths[i]);
+            return false;
+        }
+    return true;
+}
+
+int command_render_on(Ranks *ranks, int argument_count, char **arguments)
+{
+    RenderOptions options;
+    int status = options_read(&options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
+    const size_t count = options.scene_count;
+    char **paths = memory_allocate(count, sizeof *paths);
+    for (size_t i = 0; i < count; i++)
+        paths[i] = path_make(&options, options.scenes[i]);
+    status = paths_differ(paths, &options) ? EXIT_DONE : EXIT_USER;
+    for (size_t i = 0; i < count && status == EXIT_DONE; i++) {
+        options.scene = options.scenes[i];
+        status = file_render(options, paths[i], ranks);
+    }
+    for (size_t i = 0; i < count; i++)
+        free(paths[i]);
+    free(paths);
     return status;
 }

@@ -111,7 +111,6 @@ static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *
                .light_count = scene->lights.count,
                .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
     job.settings.stop = NULL;
-    ranks->has_begun = true;
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
     Rank *all = memory_allocate_zeroed(ranks->count + 1, sizeof *all);
@@ -119,30 +118,36 @@ static bool ranks_begin(Ranks *ranks, const Scene *scene, const RenderSettings *
     for (size_t i = 0; i < ranks->count; i++)
         ranks->items[i] = rank_of_message(&all[i + 1]);
     free(all);
-    bool go_on = true;
+    bool all_fit = true;
     for (size_t i = 0; i < ranks->count; i++) {
         const Rank *rank = &ranks->items[i];
         if (rank->failure[0] == '\0') continue;
         message_add(messages, MESSAGE_ERROR, "rank %zu on %s: %s", i + 1, rank->host, rank->failure);
-        go_on = false;
+        all_fit = false;
     }
-    broadcast(&go_on, sizeof go_on, MPI_COMM_WORLD);
-    for (size_t i = 0; i < LANES_CHOICE_COUNT && go_on; i++) {
+    if (!all_fit) broadcast(&all_fit, sizeof all_fit, MPI_COMM_WORLD); // can_start of ranks_go_on
+    return all_fit;
+}
+
+static void ranks_go_on(const Scene *scene, const RenderSettings *settings, bool can_start,
+                        MessageList *messages)
+{
+    RenderSettings of_lanes = *settings;
+    broadcast(&can_start, sizeof can_start, MPI_COMM_WORLD);
+    for (size_t i = 0; i < LANES_CHOICE_COUNT && can_start; i++) {
         MPI_Comm receivers = ranks_of_lanes(0, 0, lanes_choice_values[i]);
         int size;
         MPI_Comm_size(receivers, &size);
         if (size > 1) {
             CompiledScene compiled;
-            job.settings.lanes = lanes_choice_values[i];
+            of_lanes.lanes = lanes_choice_values[i];
             // this rank's renderer has compiled it for its own lanes: no error is left
-            if (!renderer_compile(&compiled, scene, &job.settings, messages))
-                fault("the scene does not compile");
+            if (!renderer_compile(&compiled, scene, &of_lanes, messages)) fault("the scene does not compile");
             compiled_broadcast(&compiled, true, receivers);
             compiled_scene_free(&compiled);
         }
         MPI_Comm_free(&receivers);
     }
-    return go_on;
 }
 
 typedef struct {
@@ -250,12 +255,11 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
               "it sent what is not a band of its rows; the others go on without it");
 }
 
-// Answers a rank that wants rows, and tells the others when the render has ended. False: there is nothing to
+// Answers a rank that wants rows, and tells each once that the render has ended. False: there is nothing to
 // do.
 static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, int rank)
 {
-    if (state->is_done) return false;
-    if (state->wants_rows) {
+    if (state->wants_rows && !state->is_done) {
         bool waits = false;
         BandRows rows = {0};
         if (!state->is_rejected)
@@ -266,7 +270,7 @@ static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, i
         state->wants_rows = false;
         return true;
     }
-    if (state->end_sent || !scheduler_has_ended(scheduler)) return false;
+    if (state->end_sent || !(state->is_done || scheduler_has_ended(scheduler))) return false;
     send_bytes(NULL, 0, rank, TAG_END);
     state->end_sent = true;
     return true;
@@ -284,7 +288,7 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
         done_count = 0;
         for (size_t i = 0; i < ranks->count; i++) {
             is_busy |= rank_answer(&states[i], scheduler, first_worker + i, (int)i + 1);
-            done_count += states[i].is_done;
+            done_count += states[i].is_done && states[i].end_sent;
         }
         if (!is_busy) rest();
     }
@@ -338,7 +342,8 @@ static Rank rank_describe(const Device *device, const RenderSettings *settings)
     return rank;
 }
 
-// Renders until the first rank has no more rows. `failure` says why the device could not.
+// Renders until the first rank has no more rows. `failure` says why the device could not. Before the next job
+// it waits for this one's end, which would end that.
 static void rank_render(Compute *compute, CompiledScene *compiled, const Job *job, char *failure, size_t size)
 {
     MessageList messages = {0};
@@ -357,6 +362,8 @@ static void rank_render(Compute *compute, CompiledScene *compiled, const Job *jo
     }
     message_list_free(&messages);
     renderer_close(renderer);
+    send_bytes(failure, size, 0, TAG_DONE);
+    if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
 }
 
 // An interrupt reaches all ranks: the first one ends the render, and the job.
@@ -367,41 +374,49 @@ static void signals_ignore(void)
         signal(signals[i], SIG_IGN);
 }
 
-static void rank_run(int rank, size_t local_rank)
+static void job_run(const Job *job, int rank, size_t local_rank)
 {
-    signals_ignore();
-    Job job;
-    broadcast(&job, sizeof job, MPI_COMM_WORLD);
-    if (!job.is_there) return;
-    char *selector = memory_allocate_zeroed(job.selector_size + 1, 1);
-    broadcast(selector, job.selector_size, MPI_COMM_WORLD);
+    char *selector = memory_allocate_zeroed(job->selector_size + 1, 1);
+    broadcast(selector, job->selector_size, MPI_COMM_WORLD);
     OpenDevices devices;
     MessageList messages = {0};
     Rank own = {0};
-    bool is_open = devices_open_one(&devices, job.selector_size > 0 ? selector : NULL, local_rank, &messages);
+    bool is_open =
+        devices_open_one(&devices, job->selector_size > 0 ? selector : NULL, local_rank, &messages);
     if (is_open)
-        own = rank_describe(devices.items[0].compute.device, &job.settings);
+        own = rank_describe(devices.items[0].compute.device, &job->settings);
     else
         snprintf(own.failure, sizeof own.failure, "%s", messages.items[0].text);
     gethostname(own.host, sizeof own.host - 1);
     MPI_Gather(&own, sizeof own, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
-    bool go_on;
-    broadcast(&go_on, sizeof go_on, MPI_COMM_WORLD);
+    bool can_start;
+    broadcast(&can_start, sizeof can_start, MPI_COMM_WORLD);
     CompiledScene compiled = {0};
-    for (size_t i = 0; i < LANES_CHOICE_COUNT && go_on; i++) {
+    for (size_t i = 0; i < LANES_CHOICE_COUNT && can_start; i++) {
         MPI_Comm ranks = ranks_of_lanes(rank, own.lanes, lanes_choice_values[i]);
         if (ranks == MPI_COMM_NULL) continue;
         compiled_broadcast(&compiled, false, ranks);
         MPI_Comm_free(&ranks);
     }
-    if (go_on) {
-        job.settings.lanes = own.lanes;
-        rank_render(&devices.items[0].compute, &compiled, &job, own.failure, sizeof own.failure);
-        send_bytes(own.failure, sizeof own.failure, 0, TAG_DONE);
+    if (can_start) {
+        Job own_job = *job;
+        own_job.settings.lanes = own.lanes;
+        rank_render(&devices.items[0].compute, &compiled, &own_job, own.failure, sizeof own.failure);
     }
     message_list_free(&messages);
     if (is_open) devices_abandon(&devices);
     free(selector);
+}
+
+static void rank_run(int rank, size_t local_rank)
+{
+    signals_ignore();
+    Job job;
+    for (;;) {
+        broadcast(&job, sizeof job, MPI_COMM_WORLD);
+        if (!job.is_there) return;
+        job_run(&job, rank, local_rank);
+    }
 }
 
 static int first_rank_run(Ranks *ranks, int argument_count, char **arguments)
@@ -412,7 +427,7 @@ static int first_rank_run(Ranks *ranks, int argument_count, char **arguments)
     fault_catch_crashes();
     int status = EXIT_USER;
     if (argument_count < 2 || strcmp(arguments[1], "render") != 0) {
-        fprintf(stderr, "usage: mpirun -n RANKS glint-mpi render SCENE [OPTIONS]\n"
+        fprintf(stderr, "usage: mpirun -n RANKS glint-mpi render SCENE... [OPTIONS]\n"
                         "The options are those of glint render; each rank renders on a device of its own.\n");
     } else {
         char name[] = "glint-mpi render"; // which getopt's messages begin with
@@ -420,7 +435,7 @@ static int first_rank_run(Ranks *ranks, int argument_count, char **arguments)
         status = command_render_on(ranks, argument_count - 1, arguments + 1);
     }
     Job none = {.is_there = false};
-    if (!ranks->has_begun) broadcast(&none, sizeof none, MPI_COMM_WORLD);
+    broadcast(&none, sizeof none, MPI_COMM_WORLD);
     if (fflush(stdout) == 0 && !ferror(stdout)) return status;
     fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
     return EXIT_MACHINE;
@@ -444,6 +459,7 @@ int main(int argument_count, char **arguments)
                        .items = memory_allocate_zeroed(count, sizeof *ranks.items),
                        .shares = memory_allocate_zeroed(count, sizeof *ranks.shares),
                        .begin = ranks_begin,
+                       .go_on = ranks_go_on,
                        .serve = ranks_serve};
         status = first_rank_run(&ranks, argument_count, arguments);
         free(ranks.items);
