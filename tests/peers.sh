@@ -43,6 +43,16 @@ check "spheres, meshes, a directional light and samples by Embree and glint are 
     bench "$build/peers/embree" spheres-16 bunny-2000 sun-2000x4 soup-500
 check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 check "an image of other work makes the run fail" other_work_is_reported
+
+growth_has_rows_and_lines() {
+    "$python" tools/peers/growth --glint "$GLINT" --embree "$build/peers/embree" --scenes "$scratch/scenes" --rounds 1 \
+        --seconds 0.02 --size 96x54 --counts 100,1000 --embree-most 100 --json "$scratch/growth.json" \
+        --svg "$scratch/growth.svg" &&
+        [ "$(grep -c '"frame_ms"' "$scratch/growth.json")" = 6 ] && grep -q '"count": 1000,' "$scratch/growth.json" &&
+        [ "$(grep -c '<polyline points="[0-9]' "$scratch/growth.svg")" = 8 ]
+}
+check "growth is measured and plotted" growth_has_rows_and_lines
+
 # Mirrors, a cylinder, a concave polygon and a smooth one.
 cat >"$scratch/mirrors.nff" <<'NFF'
 v
