@@ -1,9 +1,7 @@
 #include "host/verify/reference_color.h"
 
-#include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include <math.h>
-#include <stdlib.h>
 
 // A shadow ray leaves out this fraction of its length at either end: far over the rounding of quadruple
 // precision, far under any gap that a scene's doubles can express at its own scale.
@@ -24,47 +22,6 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
     Quad y = -((Quad)2 * row + 1 - height) * half_pixel;
     Quad3 sideways = quad3_add(quad3_scale(right, x), quad3_scale(up, y));
     return (ReferenceRay){quad3(camera->position), quad3_add(forward, sideways), 0, (Quad)FLT_MAX};
-}
-
-// A scene, and its objects' bounding spheres or NULL.
-typedef struct {
-    const Scene *scene;
-    const BoundingSphere *spheres;
-} World;
-
-// Whether the ray certainly misses a sphere, or reaches it only outside its interval. The slack is far over
-// what rounding to double leaves.
-static bool sphere_is_missed(const BoundingSphere *sphere, const ReferenceRay *ray)
-{
-    if (!isfinite(sphere->radius)) return false;
-    const Vector3 from = vector_subtract(sphere->center, quad3_rounded(ray->origin));
-    const Vector3 direction = quad3_rounded(ray->direction);
-    const double length = vector_length(direction), distance = vector_length(from);
-    const double along = vector_dot(from, direction) / length;
-    const double radius = sphere->radius * (1 + 1e-6) + 1e-6 * distance;
-    return distance * distance - along * along > radius * radius ||
-           along + radius < (double)ray->tmin * length || along - radius > (double)ray->tmax * length;
-}
-
-// Of one object of the world; a miss where its bounding sphere is missed.
-static ReferenceHit object_hit(const World *world, size_t index, const ReferenceRay *ray)
-{
-    if (world->spheres && sphere_is_missed(&world->spheres[index], ray)) return reference_miss();
-    return reference_hit_object(&world->scene->objects.items[index], ray);
-}
-
-// `left`: the object that the ray leaves, UINT32_MAX for the eye. On its surface a margin is 0 although
-// nothing is open, so that its own does not count.
-static ReferenceHit world_hit(const World *world, const ReferenceRay *ray, uint32_t left)
-{
-    ReferenceHit nearest = reference_miss();
-    const Quad unbounded = nearest.margin;
-    for (size_t i = 0; i < world->scene->objects.count; i++) {
-        ReferenceHit hit = object_hit(world, i, ray);
-        if (i == left) hit.margin = unbounded;
-        reference_hit_take(&nearest, hit, (uint32_t)i, ray);
-    }
-    return nearest;
 }
 
 // A point of a surface, the unit normal that faces the eye and the unit direction to the eye.
@@ -123,9 +80,10 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
 }
 
 // Returns whether the light reaches the surface.
-static bool add_light(const World *world, const Light *light, const Surface *surface, ReferenceColor *sum)
+static bool add_light(const ReferenceScene *world, const Light *light, const Surface *surface,
+                      ReferenceColor *sum)
 {
-    const Scene *scene = world->scene;
+    const Scene *scene = &world->scene;
     const Material *material = surface->material;
     Color base = surface->base;
     bool directional = light->kind == LIGHT_DIRECTIONAL;
@@ -144,7 +102,7 @@ static bool add_light(const World *world, const Light *light, const Surface *sur
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Material *medium = &scene->materials.items[object->material];
-        ReferenceHit blocker = object_hit(world, i, &shadow);
+        ReferenceHit blocker = reference_scene_hit_object(world, i, &shadow);
         // The surface itself always has margin 0; `facing` says where it shadows itself.
         if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
         if (blocker.found) strength *= medium->full_shadow ? 0 : medium->transmission;
@@ -194,9 +152,10 @@ static Surface surface_at(const Scene *scene, const ReferenceRay *ray, Reference
 }
 
 // `shadows`: see reference_pixel; or NULL.
-static ReferenceColor surface_color(const World *world, const Surface *surface, double margin, bool *shadows)
+static ReferenceColor surface_color(const ReferenceScene *world, const Surface *surface, double margin,
+                                    bool *shadows)
 {
-    const Scene *scene = world->scene;
+    const Scene *scene = &world->scene;
     Color base = surface->base;
     Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
     ReferenceColor sum = {vector_scale(ambient, surface->material->ambient), margin};
@@ -212,7 +171,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     ReferenceHit hit = reference_hit(scene, ray);
     if (!hit.found) return (ReferenceColor){scene->background, (double)hit.margin};
     Surface surface = surface_at(scene, ray, &hit, 0, NULL);
-    return surface_color(&(World){scene, NULL}, &surface, (double)hit.margin, NULL);
+    return surface_color(&(ReferenceScene){*scene, NULL}, &surface, (double)hit.margin, NULL);
 }
 
 // Snell's law: with the sine behind the surface eta times that before it. False where that is more than 1.
@@ -230,9 +189,9 @@ static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted, d
 // Tie rule: an opaque surface within CONTACT_PART * distance of a transparent one is the visible one.
 #define CONTACT_PART ((Quad)1e-9L)
 
-static void hit_take_opaque(const World *world, const ReferenceRay *ray, ReferenceHit *hit)
+static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit)
 {
-    const Scene *scene = world->scene;
+    const Scene *scene = &world->scene;
     Quad length = quad3_length(ray->direction), reach = CONTACT_PART * hit->t * length;
     const ReferenceHit transparent = *hit;
     const ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
@@ -242,8 +201,8 @@ static void hit_take_opaque(const World *world, const ReferenceRay *ray, Referen
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (scene->materials.items[object->material].transmission > 0) continue;
-        if (!object_hit(world, i, &inward).found) continue;
-        ReferenceHit opaque = object_hit(world, i, &around);
+        if (!reference_scene_hit_object(world, i, &inward).found) continue;
+        ReferenceHit opaque = reference_scene_hit_object(world, i, &around);
         if (!opaque.found || (hit->object != transparent.object && opaque.t >= hit->t)) continue;
         *hit = opaque;
         hit->object = (uint32_t)i;
@@ -252,7 +211,7 @@ static void hit_take_opaque(const World *world, const ReferenceRay *ray, Referen
 
 // What the rays of a tree have in common.
 typedef struct {
-    World world;
+    const ReferenceScene *world;
     double blur;
     Random random;
     Color sum;
@@ -272,8 +231,8 @@ static void signature_add(Tree *tree, uint32_t object, uint32_t events)
 
 static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double weight, unsigned bounces_left)
 {
-    const Scene *scene = tree->world.scene;
-    ReferenceHit hit = world_hit(&tree->world, ray, left);
+    const Scene *scene = &tree->world->scene;
+    ReferenceHit hit = reference_scene_hit(tree->world, ray, left);
     if (!hit.found) {
         tree->has_first = true;
         tree->margin = fmin(tree->margin, (double)hit.margin);
@@ -282,7 +241,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
         return;
     }
     if (scene->materials.items[scene->objects.items[hit.object].material].transmission > 0)
-        hit_take_opaque(&tree->world, ray, &hit);
+        hit_take_opaque(tree->world, ray, &hit);
     if (!tree->has_first) {
         tree->object = hit.object;
         tree->distance = (double)(hit.t * quad3_length(ray->direction));
@@ -290,7 +249,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
     tree->has_first = true;
     Surface surface = surface_at(scene, ray, &hit, tree->blur, &tree->random);
     const Material *material = surface.material;
-    const ReferenceColor own = surface_color(&tree->world, &surface, (double)hit.margin, tree->shadows);
+    const ReferenceColor own = surface_color(tree->world, &surface, (double)hit.margin, tree->shadows);
     tree->shadows = NULL;
     tree->sum = vector_add(tree->sum, vector_scale(own.color, weight));
     tree->margin = fmin(tree->margin, own.margin);
@@ -321,7 +280,8 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
 
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
 {
-    Tree tree = {.world = {scene, NULL}, .blur = path->blur, .random = {path->seed}};
+    const ReferenceScene world = {*scene, NULL};
+    Tree tree = {.world = &world, .blur = path->blur, .random = {path->seed}};
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
@@ -329,67 +289,10 @@ Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const Re
     return tree.sum;
 }
 
-// A normal that is zero is that of the triangle.
-static Object mesh_triangle(const Mesh *mesh, size_t part, uint32_t material)
-{
-    const uint32_t *corners = mesh->triangles[part];
-    Object object = {.kind = SHAPE_TRIANGLE, .material = material};
-    Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
-    for (int i = 0; i < 3; i++)
-        vertices[i] = mesh->vertices[corners[i]];
-    const Vector3 flat =
-        vector_cross(vector_subtract(vertices[1], vertices[0]), vector_subtract(vertices[2], vertices[0]));
-    for (int i = 0; i < 3; i++) {
-        normals[i] = mesh->normals ? mesh->normals[corners[i]] : flat;
-        if (vector_dot(normals[i], normals[i]) == 0) normals[i] = flat;
-    }
-    object.as.triangle.smooth = mesh->normals != NULL;
-    return object;
-}
-
-ReferenceScene reference_scene_open(const Scene *scene)
-{
-    const size_t count = scene_primitive_count(scene);
-    ReferenceScene made = {.scene = *scene,
-                           .spheres = memory_allocate_zeroed(count + 1, sizeof *made.spheres)};
-    Object *objects = memory_allocate_zeroed(count + 1, sizeof *objects);
-    size_t next = 0;
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        if (object->kind != SHAPE_MESH) {
-            objects[next++] = *object;
-            continue;
-        }
-        const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
-        for (size_t k = 0; k < mesh->triangle_count; k++)
-            objects[next++] = mesh_triangle(mesh, k, mesh->materials ? mesh->materials[k] : object->material);
-    }
-    made.scene.objects.items = objects;
-    made.scene.objects.count = made.scene.objects.capacity = count;
-    for (size_t i = 0; i < count; i++) {
-        Bounds bounds;
-        made.spheres[i].radius = INFINITY;
-        if (!shape_ops[objects[i].kind]->bounds(&made.scene, &objects[i], &bounds)) continue;
-        made.spheres[i].center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
-        made.spheres[i].radius = vector_length(vector_subtract(bounds.max, made.spheres[i].center));
-    }
-    return made;
-}
-
-void reference_scene_close(ReferenceScene *scene)
-{
-    free(scene->scene.objects.items);
-    free(scene->spheres);
-    *scene = (ReferenceScene){0};
-}
-
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray, unsigned bounce_count,
                                bool *shadows)
 {
-    Tree tree = {.world = {&scene->scene, scene->spheres},
-                 .object = UINT32_MAX,
-                 .signature = PATH_START,
-                 .margin = INFINITY};
+    Tree tree = {.world = scene, .object = UINT32_MAX, .signature = PATH_START, .margin = INFINITY};
     tree.shadows = shadows;
     add_path(&tree, ray, UINT32_MAX, 1, bounce_count);
     const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;

@@ -2,8 +2,7 @@
 // refractions over the closest hits of host/verify/reference.h. `glint certify` and tests compare with it.
 #pragma once
 
-#include "host/compile/shapes.h"
-#include "host/verify/reference.h"
+#include "host/verify/reference_scene.h"
 #include <stdbool.h>
 
 // The ray through the center of a pixel, row 0 at the top (docs/scene-format.md).
@@ -30,16 +29,6 @@ typedef struct {
     uint64_t seed;
 } ReferencePath;
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);
-
-// A scene made ready for many rays: the triangles of its meshes as objects, so that an object's index is its
-// id, and a bounding sphere of each object, outside of which it is not intersected.
-typedef struct {
-    Scene scene; // its lights, materials and textures are those of the scene it was made of
-    BoundingSphere *spheres;
-} ReferenceScene;
-
-ReferenceScene reference_scene_open(const Scene *scene); // which must outlive it
-void reference_scene_close(ReferenceScene *scene);
 
 // What the AOVs of the same names hold.
 typedef struct {

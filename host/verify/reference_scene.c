@@ -1,0 +1,91 @@
+#include "host/verify/reference_scene.h"
+
+#include "host/base/memory.h"
+#include <math.h>
+#include <stdlib.h>
+
+// A normal that is zero is that of the triangle.
+static Object mesh_triangle(const Mesh *mesh, size_t part, uint32_t material)
+{
+    const uint32_t *corners = mesh->triangles[part];
+    Object object = {.kind = SHAPE_TRIANGLE, .material = material};
+    Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
+    for (int i = 0; i < 3; i++)
+        vertices[i] = mesh->vertices[corners[i]];
+    const Vector3 flat =
+        vector_cross(vector_subtract(vertices[1], vertices[0]), vector_subtract(vertices[2], vertices[0]));
+    for (int i = 0; i < 3; i++) {
+        normals[i] = mesh->normals ? mesh->normals[corners[i]] : flat;
+        if (vector_dot(normals[i], normals[i]) == 0) normals[i] = flat;
+    }
+    object.as.triangle.smooth = mesh->normals != NULL;
+    return object;
+}
+
+ReferenceScene reference_scene_open(const Scene *scene)
+{
+    const size_t count = scene_primitive_count(scene);
+    ReferenceScene made = {.scene = *scene,
+                           .spheres = memory_allocate_zeroed(count + 1, sizeof *made.spheres)};
+    Object *objects = memory_allocate_zeroed(count + 1, sizeof *objects);
+    size_t next = 0;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        if (object->kind != SHAPE_MESH) {
+            objects[next++] = *object;
+            continue;
+        }
+        const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+        for (size_t k = 0; k < mesh->triangle_count; k++)
+            objects[next++] = mesh_triangle(mesh, k, mesh->materials ? mesh->materials[k] : object->material);
+    }
+    made.scene.objects.items = objects;
+    made.scene.objects.count = made.scene.objects.capacity = count;
+    for (size_t i = 0; i < count; i++) {
+        Bounds bounds;
+        made.spheres[i].radius = INFINITY;
+        if (!shape_ops[objects[i].kind]->bounds(&made.scene, &objects[i], &bounds)) continue;
+        made.spheres[i].center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+        made.spheres[i].radius = vector_length(vector_subtract(bounds.max, made.spheres[i].center));
+    }
+    return made;
+}
+
+void reference_scene_close(ReferenceScene *scene)
+{
+    free(scene->scene.objects.items);
+    free(scene->spheres);
+    *scene = (ReferenceScene){0};
+}
+
+// Whether the ray certainly misses a sphere, or reaches it only outside its interval. The slack is far over
+// what rounding to double leaves.
+static bool sphere_is_missed(const BoundingSphere *sphere, const ReferenceRay *ray)
+{
+    if (!isfinite(sphere->radius)) return false;
+    const Vector3 from = vector_subtract(sphere->center, quad3_rounded(ray->origin));
+    const Vector3 direction = quad3_rounded(ray->direction);
+    const double length = vector_length(direction), distance = vector_length(from);
+    const double along = vector_dot(from, direction) / length;
+    const double radius = sphere->radius * (1 + 1e-6) + 1e-6 * distance;
+    return distance * distance - along * along > radius * radius ||
+           along + radius < (double)ray->tmin * length || along - radius > (double)ray->tmax * length;
+}
+
+ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray)
+{
+    if (scene->spheres && sphere_is_missed(&scene->spheres[index], ray)) return reference_miss();
+    return reference_hit_object(&scene->scene.objects.items[index], ray);
+}
+
+ReferenceHit reference_scene_hit(const ReferenceScene *scene, const ReferenceRay *ray, uint32_t left)
+{
+    ReferenceHit nearest = reference_miss();
+    const Quad unbounded = nearest.margin;
+    for (size_t i = 0; i < scene->scene.objects.count; i++) {
+        ReferenceHit hit = reference_scene_hit_object(scene, i, ray);
+        if (i == left) hit.margin = unbounded;
+        reference_hit_take(&nearest, hit, (uint32_t)i, ray);
+    }
+    return nearest;
+}
