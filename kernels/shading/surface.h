@@ -52,6 +52,38 @@ static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, ui
     return surface_point_make(ray->origin, ray->direction, (real)(0));
 }
 
+#if IS_CERTIFIED
+// Sets a point's errors, of shapes that do not do it themselves; lanes that may be at an edge.
+static inline mask shape_set_errors(const Scene *scene, uint4 entry, const Ray *ray, real t, real place_error,
+                                    SurfacePoint *point)
+{
+    if (HAS_BOXES && entry.x == KIND_BOXES) {
+        Box box = scene->boxes[entry.y];
+        return box_edge_is_near(&box, point->position, point->normal, place_error + place_error);
+    }
+    if (HAS_CYLINDERS && entry.x == KIND_CYLINDERS) {
+        Cylinder cylinder = scene->cylinders[entry.y];
+        const RoundSolid solid = round_of_revolution(&cylinder, false, ray);
+        return round_set_errors(&solid, cylinder.id.y, ray, t, place_error, point);
+    }
+    if (HAS_CONES && entry.x == KIND_CONES) {
+        Cone cone = scene->cones[entry.y];
+        const RoundSolid solid = round_of_revolution(&cone, true, ray);
+        return round_set_errors(&solid, cone.id.y, ray, t, place_error, point);
+    }
+    if (HAS_PARABOLOIDS && entry.x == KIND_PARABOLOIDS) {
+        Paraboloid paraboloid = scene->paraboloids[entry.y];
+        const RoundSolid solid = round_of_paraboloid(&paraboloid, ray);
+        return round_set_errors(&solid, paraboloid.id.y, ray, t, place_error, point);
+    }
+    if (HAS_TORI && entry.x == KIND_TORI) {
+        Torus torus = scene->tori[entry.y];
+        torus_set_errors(&torus, ray, t, point);
+    }
+    return mask_none();
+}
+#endif
+
 // The surface points of the lanes that hit the same object, or triangles of the same material.
 typedef struct {
     mask lanes;
@@ -267,19 +299,16 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         pending = lanes_select(found.lanes, NO_OBJECT, pending);
         // the exact hit lies as near to the ray's own point as place_error says
         if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
+        mask at_edge = mask_none();
+#if IS_CERTIFIED
+        at_edge = shape_set_errors(scene, entry, ray, hit->t, surface.place_error, &found.point);
+#endif
         surface_point_replace(&point, found.lanes, &found.point);
         Material material = scene->materials[entry.z];
         mask doubt;
         Color3 color = object_color(scene, entry, &material, &found, ray, surface.travelled,
                                     surface.place_error, &doubt);
-#if IS_CERTIFIED
-        if (HAS_BOXES && entry.x == KIND_BOXES) {
-            Box box = scene->boxes[entry.y];
-            doubt = doubt | box_edge_is_near(&box, found.point.position, found.point.normal,
-                                             surface.place_error + surface.place_error);
-        }
-        surface.doubt = surface.doubt | (found.lanes & doubt);
-#endif
+        if (IS_CERTIFIED) surface.doubt = surface.doubt | (found.lanes & (doubt | at_edge));
         surface_set_material(&surface, found.lanes, &material, color);
     }
     surface_set_point(&surface, &point, ray);

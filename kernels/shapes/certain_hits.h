@@ -5,18 +5,18 @@
 #define CERTAIN_HITS_H
 
 #include "shapes/certain.h"
+#include "shapes/certain_round.h"
+#include "shapes/certain_torus.h"
 #include "shapes/disc.h"
-#include "shapes/paraboloid.h"
 #include "shapes/plane.h"
-#include "shapes/revolution.h"
 #include "shapes/sphere.h"
-#include "shapes/torus.h"
 #include "shapes/triangle.h"
 
 #if IS_CERTIFIED
 
 static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
 {
+    if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray);
     CertainSphere crossed =
         certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray);
     if (!lanes_any(crossed.perhaps)) return certain_miss();
@@ -249,52 +249,6 @@ static inline mask box_edge_is_near(const Box *box, Vector position, Vector norm
     real z = real_min(fabs(position.z - low.z), fabs(position.z - high.z));
     return ((normal.x == zero) & (x <= error)) | ((normal.y == zero) & (y <= error)) |
            ((normal.z == zero) & (z <= error));
-}
-
-// Shapes without bounds of their own yet: in doubt wherever a ray meets their bounding sphere.
-static inline CertainHit doubtful_in_sphere(Vector center, real radius, const Ray *ray)
-{
-    CertainSphere bounding = certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray);
-    return certain_crossing(ray, mask_none(), bounding.perhaps, bounding.near_t - bounding.t_error,
-                            bounding.far_t + bounding.t_error);
-}
-
-static inline CertainHit doubtful_everywhere(const Ray *ray)
-{
-    return (CertainHit){mask_none(), RAY_ACTIVE(ray), ray->tmin, ray->tmin, ray->tmax};
-}
-
-static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
-{
-    return doubtful_in_sphere(vector_of(torus->center_major),
-                              (real)(torus->center_major.w + torus->axis_minor.w), ray);
-}
-
-static inline CertainHit revolution_certain_hit(const Revolution *shape, const Ray *ray)
-{
-    if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return doubtful_everywhere(ray);
-    const scalar base = shape->base_radius.w, top = fma(shape->axis_slope.w, shape->range.x, base);
-    real inverse = real_divide((real)(1), (real)(shape->range.y));
-    real half_height = (real)(0.5f * shape->range.x) * inverse;
-    Vector middle =
-        vector_fma(vector_of(shape->axis_slope), half_height * inverse, vector_of(shape->base_radius));
-    return doubtful_in_sphere(middle, real_fma((real)(fmax(base, top)), inverse, half_height), ray);
-}
-
-static inline CertainHit cylinder_certain_hit(const Cylinder *cylinder, const Ray *ray)
-{
-    return revolution_certain_hit(cylinder, ray);
-}
-
-static inline CertainHit cone_certain_hit(const Cone *cone, const Ray *ray)
-{
-    return revolution_certain_hit(cone, ray);
-}
-
-static inline CertainHit paraboloid_certain_hit(const Paraboloid *shape, const Ray *ray)
-{
-    (void)shape;
-    return doubtful_everywhere(ray);
 }
 
 #endif
