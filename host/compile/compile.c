@@ -21,7 +21,8 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
         !textures_load(compiled, scene, settings, messages))
         return false;
     const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye};
+    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye,
+                               settings->certifies};
     compiled->eye = rounding.eye;
     objects_flatten(compiled, scene, &rounding);
     materials_flatten(compiled, scene, &rounding);
@@ -57,7 +58,8 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
                      MessageList *messages)
 {
     const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye};
+    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye,
+                               settings->certifies};
     compiled->eye = (Vector3){NAN, NAN, NAN}; // equal to no eye, so that the next move sets all
     compiled->eye_offset = (Vector3){0};
     objects_move(compiled, scene, &rounding);
@@ -77,8 +79,8 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
 // Sets the eye's offset from that of the arrays: of a preview any, else 0. False if they must move.
 static bool eye_shift(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
-    const Rounding rounding = {compiled->eye, settings->precision == PRECISION_DOUBLE,
-                               settings->shift_to_eye};
+    const Rounding rounding = {compiled->eye, settings->precision == PRECISION_DOUBLE, settings->shift_to_eye,
+                               settings->certifies};
     const Vector3 offset = point_from_eye(&rounding, eye_of(scene, settings));
     const bool is_same = vector_is_zero(offset) && vectors_equal(compiled->eye, eye_of(scene, settings));
     const bool fits = isfinite(offset.x) && isfinite(offset.y) && isfinite(offset.z);

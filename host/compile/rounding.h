@@ -9,7 +9,11 @@ typedef struct {
     Vector3 eye;
     bool is_double; // the kernel's precision is double: numbers stay
     bool has_eye;   // rays start there, or where they lead; else anywhere
+    bool certifies; // bounds are by the eye's power where the eye is near, for the shape's size
 } Rounding;
+
+// The eye is near a shape within this part of its numbers.
+#define NEAR_EYE 0x1p-6
 
 // GCC 12 at -O2 drops a conversion to float and back where it merges stores (-ftree-slp-vectorize); volatile
 // keeps it.

@@ -115,7 +115,9 @@ static void revolution_take_power(Revolution *shape, Flattening *flattening, con
     // the radius at the foot is up to the slope times the distance, and displaces a flat cone's rims by its
     // rounding
     const double tolerance = roundoff_of(rounding) * fmax(1, fabs((double)exact.slope));
-    if (!revolution_moves(given, &exact, &stored, tolerance)) return;
+    const double size = (double)(quad3_length(exact.foot) + quad_absolute(exact.radius));
+    const bool is_near = rounding->certifies && fabs((double)exact.outside) < NEAR_EYE * size;
+    if (!is_near && !revolution_moves(given, &exact, &stored, tolerance)) return;
     const Vector3 axis = vector_rounded(rounding, axis_scaled(given->axis));
     const Quad3 wide_axis = quad3(axis);
     const Quad squared = quad3_dot(wide_axis, wide_axis), length = quad_root(squared);

@@ -39,8 +39,9 @@ static void sphere_take_power(Sphere *sphere, Flattening *flattening, const Obje
 {
     const Rounding *rounding = &flattening->rounding;
     const EyePower eye = eye_power(rounding, object, center);
-    const double distance = fabs(eye.power) / (vector_length(center) + object->as.sphere.radius);
-    if (eye.moved > 4 * roundoff_of(rounding) * distance)
+    const double size = vector_length(center) + object->as.sphere.radius, distance = fabs(eye.power) / size;
+    if (eye.moved > 4 * roundoff_of(rounding) * distance ||
+        (rounding->certifies && distance < NEAR_EYE * size))
         primitive_take_power(flattening, eye.power, &sphere->id);
 }
 
