@@ -1,7 +1,7 @@
 // Images at `certified` of scenes that nearly touch the rays of pixels: round shapes and boxes that rays
 // graze, edges of triangles and rims through pixels' centers, faces that all but coincide, bodies of glass,
 // ground that is a planet's; shadows of all of them. Each object, shadow and path must be the reference's,
-// where `single` errs, and errs at `certified` with all bounds 0.
+// where `single` errs.
 // run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
