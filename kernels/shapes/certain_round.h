@@ -249,8 +249,8 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     return interval;
 }
 
-// Where slope t >= least, for t >= 0; *least_t and *greatest_t bound it.
-static inline Interval half_line(real slope, real least)
+// Where slope t >= least.
+static inline Interval interval_above(real slope, real least)
 {
     mask rises = slope > (real)(SMALLEST_RATIO), falls = slope < (real)(-SMALLEST_RATIO);
     real t = real_divide(least, lanes_select(rises | falls, slope, (real)(1)));
@@ -259,7 +259,7 @@ static inline Interval half_line(real slope, real least)
     return (Interval){none, lanes_select(falls, t, (real)(LARGEST))};
 }
 
-static inline Interval interval_join(Interval a, Interval b)
+static inline Interval intervals_common(Interval a, Interval b)
 {
     return (Interval){real_max(a.near, b.near), real_min(a.far, b.far)};
 }
@@ -273,10 +273,10 @@ static inline CertainInterval round_slab(const Round *round, const Ray *ray, rea
          high_error = real_fma(few, fabs(high), round->place0);
     real place1 = round->place1;
     CertainInterval slab;
-    slab.outer = interval_join(half_line(rise + place1, low - z - low_error),
-                               half_line(place1 - rise, z - high - high_error));
-    slab.inner = interval_join(half_line(rise - place1, low - z + low_error),
-                               half_line(-rise - place1, z - high + high_error));
+    slab.outer = intervals_common(interval_above(rise + place1, low - z - low_error),
+                                  interval_above(place1 - rise, z - high - high_error));
+    slab.inner = intervals_common(interval_above(rise - place1, low - z + low_error),
+                                  interval_above(-rise - place1, z - high + high_error));
     slab.certain = slab.inner.near < slab.inner.far;
     slab.perhaps = slab.outer.near <= slab.outer.far;
     return slab;
@@ -289,8 +289,8 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
 {
     const real never = (real)(LARGEST / 8);
     if (flags & REVOLUTION_CAPPED) {
-        Interval outer = interval_join(side->outer, slab->outer),
-                 inner = interval_join(side->inner, slab->inner);
+        Interval outer = intervals_common(side->outer, slab->outer),
+                 inner = intervals_common(side->inner, slab->inner);
         mask perhaps = side->perhaps & slab->perhaps & (outer.near <= outer.far);
         mask certain = perhaps & side->certain & slab->certain & (inner.near < inner.far);
         real near_high = lanes_select(certain, inner.near, never);
@@ -465,7 +465,7 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
     CertainInterval slab = round_unbounded();
     if (solid->is_finite) {
         slab = round_slab(round, ray, solid->low, solid->high);
-        slab.outer = interval_join(slab.outer, (Interval){from, to});
+        slab.outer = intervals_common(slab.outer, (Interval){from, to});
         slab.perhaps = slab.outer.near <= slab.outer.far;
         lanes = lanes & slab.perhaps;
         if (!lanes_any(lanes)) return certain_miss();
