@@ -242,11 +242,15 @@ class View(TestCase):
             "arrows": lambda: window.key("Left", "Up"),
         }
         cameras = {"first": first}
+        camera = first
         for name, act in steps.items():
             with self.subTest(name):
-                act()
-                cameras[name] = window.check()
-        self.assertEqual(len(set(cameras.values())), len(cameras), "a step does not move the camera")
+                for _ in range(3):  # on a busy machine the clicks of a double click may come too far apart
+                    act()
+                    if window.camera() != camera:
+                        break
+                self.assertNotEqual(window.camera(), camera, "the step does not move the camera")
+                cameras[name] = camera = window.check()
         self.assertEqual(numbers(cameras["look around"], "position"), numbers(cameras["look at"], "position"))
         self.assertEqual(numbers(cameras["arrows"], "look_at"), numbers(cameras["look around"], "look_at"))
         window.key("r")
