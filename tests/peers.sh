@@ -39,8 +39,10 @@ other_work_is_reported() {
     [ $? = 3 ]
 }
 
-check "spheres, meshes, a directional light and samples by Embree and glint are timed" \
-    bench "$build/peers/embree" spheres-16 bunny-2000 sun-2000x4 soup-500
+# A kernel for each further rung, where the tests are long.
+rungs=(spheres-16 bunny-2000)
+is_long && rungs+=(sun-2000x4 soup-500)
+check "spheres and meshes, a directional light and samples by Embree and glint are timed" bench "$build/peers/embree" "${rungs[@]}"
 check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 check "an image of other work makes the run fail" other_work_is_reported
 
@@ -51,7 +53,7 @@ growth_has_rows_and_lines() {
         [ "$(grep -c '"frame_ms"' "$scratch/growth.json")" = 6 ] && grep -q '"count": 1000,' "$scratch/growth.json" &&
         [ "$(grep -c '<polyline points="[0-9]' "$scratch/growth.svg")" = 8 ]
 }
-check "growth is measured and plotted" growth_has_rows_and_lines
+is_long && check "growth is measured and plotted" growth_has_rows_and_lines
 
 # Mirrors, a cylinder, a concave polygon and a smooth one.
 cat >"$scratch/mirrors.nff" <<'NFF'
@@ -83,10 +85,12 @@ NFF
 sed 's/0\.3 20 0 0/0 20 0 0/; s/0\.4 30 0 0/0 30 0 0/; /^c/d' "$scratch/mirrors.nff" >"$scratch/dull.nff"
 bench_nff() {
     "$python" tools/peers/bench --glint "$GLINT" --embree "$build/peers/embree" --scenes "$scratch/scenes" --rounds 1 \
-        --seconds 0.02 --size 240x136 --precisions single,double --json "$scratch/bench.json" "$scratch"/{dull,mirrors}.nff
+        --seconds 0.02 --size 240x136 --precisions single,double --json "$scratch/bench.json" "$@"
 }
 
-check "NFF files are drawn by the programs that are installed" bench_nff
+nff=("$scratch/dull.nff")
+is_long && nff+=("$scratch/mirrors.nff")
+check "NFF files are drawn by the programs that are installed" bench_nff "${nff[@]}"
 check "Embree's images of polygons are glint's" agree_within 0.05 "Embree packets" "Embree single rays"
 [ -z "$(command -v tachyon)" ] || check "Tachyon's images of mirrors are glint's" agree_within 0.6 Tachyon
 [ -z "$(command -v povray)" ] || check "POV-Ray's images of mirrors are glint's" agree_within 0.05 POV-Ray
