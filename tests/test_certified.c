@@ -224,6 +224,10 @@ static Answer answer(const Scene *scene, const CertifySample *reference, const R
 
 enum { BOUNCES = 2 };
 
+// Of these crowded scenes' samples, a little above what was measured: 0.41, 0.24, 0.54 and 0.004, 0.06, 0.03.
+static const double repeated_max[FAMILY_COUNT] = {0.5, 0.35, 0.65},
+                    undecided_max[FAMILY_COUNT] = {0.01, 0.09, 0.06};
+
 static void check_family(Family family)
 {
     if (!probe_compute.device->fp64) skip();
@@ -255,12 +259,15 @@ static void check_family(Family family)
         certify_sample_close(&reference);
         scene_free(&scene);
     }
-    print_message("%s: %zu pixels, of which single has %zu wrong; per pixel and run %.4f samples repeated, "
-                  "%.5f undecided\n",
-                  family_names[family], compared, single_wrong,
-                  (double)repeated / (double)(compared * (tests_are_long() ? 3 : 2)),
-                  (double)undecided / (double)(compared * (tests_are_long() ? 3 : 2)));
+    const double samples = (double)(compared * (tests_are_long() ? 3 : 2)),
+                 repeated_share = (double)repeated / samples, undecided_share = (double)undecided / samples;
+    print_message("%s: %zu pixels, of which single has %zu wrong; of the samples %.4f repeated, %.5f "
+                  "undecided\n",
+                  family_names[family], compared, single_wrong, repeated_share, undecided_share);
     assert_true(single_wrong >= scene_count);
+    // a bound that doubts all would be right, and of no use
+    assert_true(repeated_share < repeated_max[family]);
+    assert_true(undecided_share < undecided_max[family]);
 }
 
 static void flat_shapes_are_decided(void **state)
