@@ -1,6 +1,6 @@
-// Hits with bounds of a torus. The quartic's derivative separates intervals where the distance to the tube is
-// monotonic (shapes/torus.h); the distance at their ends and around its zero, beyond all errors, says what
-// is certain.
+// Hits with bounds of a torus. The quartic's derivative separates intervals where the distance to the tube
+// has at most one zero (shapes/torus.h); the distance at their ends and around its zero, beyond all errors,
+// says what is certain.
 #ifndef CERTAIN_TORUS_H
 #define CERTAIN_TORUS_H
 

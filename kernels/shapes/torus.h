@@ -4,8 +4,8 @@
 // no large numbers: in s, the length along the ray from there, it is
 //     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
 // for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
-// The quartic's derivative only separates the intervals where the distance to the surface is monotonic;
-// within each the distance itself,
+// The quartic's derivative only separates the intervals where the quartic is monotonic: in each the distance
+// to the surface, whose sign is the quartic's, has at most one zero. There the distance itself,
 //     sqrt((rho - R)^2 + z^2) - r,
 // which is exact to a few u where the quartic cancels, is solved for its one zero. All by + - * / sqrt and
 // bracketing, so that axis-parallel and equatorial rays need no case of their own.
