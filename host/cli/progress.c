@@ -41,6 +41,11 @@ void progress_open(Progress *progress, bool quiet)
     is_flag_read = 1;
 }
 
+void progress_release_signals(void)
+{
+    is_flag_read = 0;
+}
+
 double progress_seconds_left(Progress *progress, double fraction_done)
 {
     static const double SECONDS_MIN = 1; // before and of the time that is extrapolated

@@ -18,5 +18,7 @@ void progress_open(Progress *progress, bool quiet);
 // yet. What is done in the first second does not count: a kernel's build, or a checkpoint's bands.
 double progress_seconds_left(Progress *progress, double fraction_done);
 void progress_show(Progress *progress, double fraction_done);
+// Signals end the process at once again, until progress_open.
+void progress_release_signals(void);
 void progress_close(Progress *progress); // erases the line; signals still only set the flag
 bool progress_interrupted(void);

@@ -14,6 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum {
     OPTION_SIZE = OPTION_OWN,
@@ -151,6 +152,27 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     }
 }
 
+static bool is_folder(const char *path)
+{
+    struct stat status;
+    return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
+}
+
+// What suits one scene alone. False with a message.
+static bool several_fit(const RenderOptions *options)
+{
+    const char *const folder = options->output.path;
+    if (options->checkpoint)
+        option_usage_fault("render", "--checkpoint is for one scene");
+    else if (options->timing == TIMING_JSON)
+        option_usage_fault("render", "--timing=json is for one scene");
+    else if (folder && !is_folder(folder))
+        option_usage_fault("render", "--output of several scenes must be a folder");
+    else
+        return true;
+    return false;
+}
+
 static int options_read(RenderOptions *options, int argument_count, char **arguments)
 {
     *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
@@ -171,9 +193,7 @@ static int options_read(RenderOptions *options, int argument_count, char **argum
                                   "name its choice with --precision");
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
-    if (options->scene_count > 1 && options->checkpoint)
-        return option_usage_fault("render", "--checkpoint is for one scene");
-    return OPTIONS_READ;
+    return options->scene_count == 1 || several_fit(options) ? OPTIONS_READ : EXIT_USER;
 }
 
 static bool settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
@@ -492,7 +512,8 @@ int command_render_on(Ranks *ranks, int argument_count, char **arguments)
     status = paths_differ(paths, &options) ? EXIT_DONE : EXIT_USER;
     for (size_t i = 0; i < count && status == EXIT_DONE; i++) {
         options.scene = options.scenes[i];
-        status = file_render(options, paths[i], ranks);
+        progress_release_signals(); // while a scene is read none asks for them
+        status = progress_interrupted() ? EXIT_INTERRUPTED : file_render(options, paths[i], ranks);
     }
     for (size_t i = 0; i < count; i++)
         free(paths[i]);
