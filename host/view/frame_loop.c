@@ -54,8 +54,8 @@ struct FrameLoop {
     bool has_preview; // its first frame, coarse or of arrays that another eye saw
     uint32_t divisor; // of that
     double move_seconds, render_start;
-    double slowest_move; // to another eye, of the scene as it is
-    Film film;           // of the image or the coarse frame: sums of samples, at the end their mean
+    double expected_move; // to another eye, in seconds: of the scene as it is, little by little forgotten
+    Film film;            // of the image or the coarse frame: sums of samples, at the end their mean
     Frame frame;
     Preview preview;
 };
@@ -293,14 +293,14 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
         if (!loop->compute.context) compute_open(&loop->compute, loop->options.device);
         loop->renderer = renderer_open(&loop->compute, &loop->scene, settings, &messages);
         prepared = loop->renderer != NULL;
-        if (prepared) loop->slowest_move = move_guess(loop->renderer);
+        if (prepared) loop->expected_move = move_guess(loop->renderer);
         start = clock_seconds();
     }
     messages_publish(loop, &messages);
     if (!compute_ok(&loop->compute)) failure_publish(loop);
     loop->render_start = clock_seconds();
     loop->move_seconds = loop->render_start - start;
-    if (!is_preview) loop->slowest_move = fmax(loop->slowest_move, loop->move_seconds);
+    if (!is_preview) loop->expected_move = fmax(0.7 * loop->expected_move, loop->move_seconds);
     return prepared;
 }
 
@@ -308,9 +308,9 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
 // False: one came.
 static bool camera_rests(FrameLoop *loop)
 {
-    if (loop->slowest_move > PREVIEW_SECONDS) {
+    if (loop->expected_move > PREVIEW_SECONDS) {
         struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
+        clock_gettime(CLOCK_MONOTONIC, &until);
         until.tv_nsec += REST_NANOSECONDS;
         until.tv_sec += until.tv_nsec / 1000000000;
         until.tv_nsec %= 1000000000;
@@ -373,7 +373,7 @@ static bool request_render(FrameLoop *loop)
     const unsigned aovs = AOV_T | view_aovs[view];
     const bool is_moving = loop->current.is_moving;
     loop->divisor = is_moving ? preview_divisor(&loop->preview, size.width, size.height) : 1;
-    loop->has_preview = is_moving && (loop->divisor > 1 || loop->slowest_move > PREVIEW_SECONDS);
+    loop->has_preview = is_moving && (loop->divisor > 1 || loop->expected_move > PREVIEW_SECONDS);
     const uint32_t samples = view == VIEW_COLOR ? loop->options.settings.sample_count : 1;
     bool complete = (!loop->has_preview || preview_render(loop)) && renderer_prepare(loop, 1, samples, false);
     if (complete) {
@@ -464,7 +464,7 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     if (!renderer && compute_ok(&loop->compute)) return false;
     renderers_close(loop);
     loop->renderer = renderer;
-    if (renderer) loop->slowest_move = move_guess(renderer);
+    if (renderer) loop->expected_move = move_guess(renderer);
     if (!renderer) compute_close(&loop->compute); // the image, which is due, opens it again or says why not
     return true;
 }
@@ -575,7 +575,11 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     atomic_store(&has_news, false);
     atomic_store(&ends, false);
     pthread_mutex_init(&loop->mutex, NULL);
-    pthread_cond_init(&loop->changed, NULL);
+    pthread_condattr_t steady;
+    pthread_condattr_init(&steady);
+    pthread_condattr_setclock(&steady, CLOCK_MONOTONIC);
+    pthread_cond_init(&loop->changed, &steady);
+    pthread_condattr_destroy(&steady);
     loop->watch = watch_open(files_changed, loop);
     if (pthread_create(&loop->thread, NULL, loop_run, loop) != 0) fault("cannot start a thread");
     return loop;
