@@ -255,8 +255,7 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
               "it sent what is not a band of its rows; the others go on without it");
 }
 
-// Answers a rank that wants rows, and tells each once that the render has ended. False: there is nothing to
-// do.
+// Answers a rank that wants rows, and reports the end to each once. False: there is nothing to do.
 static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, int rank)
 {
     if (state->wants_rows && !state->is_done) {
