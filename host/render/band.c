@@ -1,0 +1,147 @@
+#include "host/render/band.h"
+
+// The pixels of a work-item: a macro-tile.
+static TileShape item_shape(uint32_t lanes)
+{
+    TileShape tile = {TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
+    return (TileShape){tile.width * MACRO_TILE_COLUMNS_OF(lanes), tile.height * MACRO_TILE_ROWS_OF(lanes)};
+}
+
+// Work-items along each side of a group, before the device's limits. Square groups are coherent: neighboring
+// pixels hit the same objects. But a work-item with whole tiles is a group of its own: PoCL places the
+// private variables of a group's items side by side, and 64 sets of them, each with the rays waiting behind
+// glass, exceed the cache.
+static size_t group_side(const Renderer *renderer)
+{
+    bool on_cpu = renderer->compute->device->type & CL_DEVICE_TYPE_CPU;
+    return renderer->report.lanes > 1 && on_cpu ? 1 : 8;
+}
+
+TileShape group_shape(const Renderer *renderer)
+{
+    const TileShape item = item_shape(renderer->report.lanes);
+    const uint32_t side = (uint32_t)group_side(renderer);
+    return (TileShape){item.width * side, item.height * side};
+}
+
+Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count)
+{
+    return (Film){.width = renderer->settings.region_width,
+                  .height = row_count,
+                  .light_count = (uint32_t)renderer->light_count,
+                  .first_row = first_row,
+                  .is_double = renderer->report.is_double,
+                  .real_size = renderer_scalar_size(renderer)};
+}
+
+static cl_mem film_buffer(Renderer *renderer, size_t size)
+{
+    return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
+}
+
+void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
+{
+    // a kernel fills all of its layers, but computes shadows only on request
+    unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & AOVS_OF_PATH);
+    buffers->rows = film.height;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        bool empty = layer == LAYER_SHADOW && !(aovs & AOV_SHADOW);
+        if (layer_in(filled, layer))
+            buffers->layers[layer] = film_buffer(renderer, empty ? 0 : film_layer_size(&film, layer));
+    }
+    buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
+    buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
+    const bool is_list = renderer->repeats != REPEATS_NONE;
+    const size_t pixels_size = renderer->repeat || is_list ? film_pixel_count(&film) * sizeof(uint32_t) : 0;
+    const size_t doubts_size = renderer->repeat ? pixels_size : 0;
+    buffers->doubts = film_buffer(renderer, doubts_size);
+    buffers->center_doubts = film_buffer(renderer, doubts_size);
+    buffers->pixels = film_buffer(renderer, is_list ? 2 * pixels_size : 0);
+}
+
+void band_buffers_close(BandBuffers *buffers)
+{
+    buffer_release(buffers->ray_counts);
+    buffer_release(buffers->compensation);
+    buffer_release(buffers->doubts);
+    buffer_release(buffers->center_doubts);
+    buffer_release(buffers->pixels);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        buffer_release(buffers->layers[layer]);
+    *buffers = (BandBuffers){0};
+}
+
+Place band_place(const Renderer *renderer, BandRows rows)
+{
+    const RenderSettings *settings = &renderer->settings;
+    TileShape item = item_shape(renderer->report.lanes);
+    size_t side = group_side(renderer);
+    return (Place){
+        .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
+                  settings->region_width, rows.row_count}},
+        .items = {(settings->region_width + item.width - 1) / item.width,
+                  (rows.row_count + item.height - 1) / item.height},
+        .group = {side, side}};
+}
+
+Place list_place(const Renderer *renderer, uint32_t count)
+{
+    const uint32_t of_item = renderer->report.lanes * renderer->report.lanes;
+    size_t side = group_side(renderer);
+    return (Place){
+        .band = {{0, 0, count, 1}}, .items = {(count + of_item - 1) / of_item, 1}, .group = {side * side, 1}};
+}
+
+_Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");
+
+static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
+{
+    const uint32_t zeros[RAYS_COUNT] = {0};
+    buffer_write(renderer->compute, buffers->ray_counts, sizeof zeros, zeros);
+}
+
+static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
+{
+    uint32_t counts[RAYS_COUNT] = {0};
+    buffer_read(renderer->compute, buffers->ray_counts, sizeof counts, counts);
+    for (size_t i = 0; i < RAYS_COUNT; i++)
+        renderer->report.rays[i] += counts[i];
+}
+
+double band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
+                   uint32_t last)
+{
+    cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &renderer->offsets);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->compensation);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 3, sizeof place->band, &place->band);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &buffers->ray_counts);
+    const uint32_t cell = settings_cell(&renderer->settings);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 7, sizeof cell, &cell);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 8, sizeof(cl_mem), &buffers->doubts);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 9, sizeof(cl_mem), &buffers->pixels);
+    if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
+    LaunchTime time = renderer_launch(renderer, KERNEL_RENDER, 2, place->items, place->group);
+    if (renderer->settings.counting) ray_counts_add(renderer, buffers);
+    return time.trusted ? time.event_seconds : time.host_seconds;
+}
+
+void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
+               unsigned aovs, const Place *place)
+{
+    cl_kernel kernel = renderer_kernel(renderer, kind);
+    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof place->band, &place->band);
+    cl_uint argument = FLAT_COUNT + 1;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (layer_in(layers, layer))
+            kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->layers[layer]);
+    cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
+    if (layers & AOV_SHADOW)
+        kernel_argument(renderer->compute, kernel, argument++, sizeof shadow_count, &shadow_count);
+    kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->center_doubts);
+    kernel_argument(renderer->compute, kernel, argument, sizeof(cl_mem), &buffers->pixels);
+    renderer_launch(renderer, kind, 2, place->items, place->group);
+}

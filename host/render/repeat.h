@@ -1,0 +1,8 @@
+// At `certified`: the pixels of a band that are in doubt, rendered anew in double.
+#pragma once
+
+#include "host/render/band.h"
+
+// Renders again in double what a kernel has left in doubt, and as at `double` what that leaves undecided.
+void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
+                 unsigned aovs, BandRows rows);
