@@ -214,9 +214,8 @@ static Answer answer(const Scene *scene, const CertifySample *reference, const R
     Film film;
     assert_true(renderer_render_film(renderer, AOVS, &film));
     const CertifyErrors errors = certify_compare(reference, &film);
-    const Answer counted = {errors.object + errors.shadow + errors.path,
-                            renderer_report(renderer)->repeats.repeated,
-                            renderer_report(renderer)->repeats.undecided};
+    const Answer counted = {errors.object + errors.shadow + errors.path, film.repeats.repeated,
+                            film.repeats.undecided};
     film_free(&film);
     renderer_close(renderer);
     return counted;

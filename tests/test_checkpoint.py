@@ -9,7 +9,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, SPHERE, TestCase, find_icd, has_device, main, skip_all, write
+from glint import IS_LONG, PROGRAM, SPHERE, TestCase, find_icd, has_device, main, png_read, skip_all, write
 
 # one compute unit: bands are short
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
@@ -49,12 +49,12 @@ class Checkpoints(TestCase):
     def share_saved(self):
         """Of the rows, in whole records."""
         data = Path("saved").read_bytes()
-        head = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQ16s")  # of the file and of a record
+        head = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQQQ16s")  # of the file and of a record
         if len(data) < head[0].size:
             return 0
         at, rows = head[0].size + head[0].unpack_from(data)[2], 0
         while at + head[1].size <= len(data):
-            _, _, row_count, _, _, _, _, size, _ = head[1].unpack_from(data, at)
+            _, _, row_count, *_, size, _ = head[1].unpack_from(data, at)
             at += head[1].size + size
             rows += row_count if at <= len(data) else 0
         return rows / ROWS
@@ -69,6 +69,19 @@ class Checkpoints(TestCase):
     def test_two_devices(self):
         self.end_early("--device all", TWO)
         self.assertTrue(0 < self.go_on("--device all", TWO) < 1)
+
+    def test_counts_of_certified(self):
+        """The pixels of saved bands that were repeated in double count as in an undisturbed render."""
+        command = f"{RENDER} --precision certified --timing=json"
+        self.end_early("--precision certified --device all", TWO)
+        whole = self.json(f"{command} -o whole.png", env=TWO)
+        resumed = self.json(f"{command} -o image.npy --device all --checkpoint saved", env=TWO)
+        self.assertSameBytes("image.npy", "whole.npy")
+        self.assertTrue(0 < sum(device["share"] for device in resumed["by_device"]) < 1)
+        self.assertGreater(whole["repeated_samples"], 0)
+        for key in "repeated_samples", "undecided_samples":
+            self.assertEqual(resumed[key], whole[key])
+        self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['repeated_samples']} samples repeated in double, ")
 
     def test_another_device(self):
         """At strict any device may go on."""

@@ -40,7 +40,8 @@ struct ImageOutput {
     Scratch layers[LAYER_COUNT]; // that it points to
     double seconds;
 
-    // At `certified` all bands, since the files' headers tell what came of all.
+    RepeatCounts repeats; // of all bands so far
+    // All bands, where what came of all of them is noted before their pixels.
     struct {
         Film *items;
         size_t count, capacity;
@@ -109,6 +110,21 @@ static bool is_mixed(const ImageOutput *output)
     return differs && output->settings->precision != PRECISION_STRICT;
 }
 
+static const char certified_key[] = "Certified";
+
+static void certified_describe(Text *text, const ImageOutput *output)
+{
+    text_appendf(text, "%llu samples repeated in double, %llu undecided",
+                 (unsigned long long)output->repeats.repeated, (unsigned long long)output->repeats.undecided);
+}
+
+// At `certified` EXR's notes, which stand before its pixels, tell what came of all of them.
+static bool keeps_bands(const ImageOutput *output)
+{
+    return output->settings->precision == PRECISION_CERTIFIED &&
+           image_format_of(output->options->path) == IMAGE_EXR;
+}
+
 // The settings that made the image: enough to make it again.
 static void notes_write(Notes *notes, const ImageOutput *output)
 {
@@ -142,10 +158,10 @@ static void notes_write(Notes *notes, const ImageOutput *output)
         pilot_describe(&value, pilot);
         notes_add(notes, "Pilot", text_c(&value));
     }
-    if (settings->precision == PRECISION_CERTIFIED) {
-        const RepeatCounts counts = renderers_repeats(output->renderers, output->renderer_count);
-        NOTE("Certified", "%llu samples repeated in double, %llu undecided",
-             (unsigned long long)counts.repeated, (unsigned long long)counts.undecided);
+    if (keeps_bands(output)) {
+        text_free(&value);
+        certified_describe(&value, output);
+        notes_add(notes, certified_key, text_c(&value));
     }
     NOTE_EACH("Lanes", "%u", report->lanes);
     NOTE("Samples", "%u", settings->sample_count);
@@ -339,7 +355,8 @@ static bool band_output(ImageOutput *output, const Film *band, MessageList *mess
 
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
 {
-    if (output->settings->precision != PRECISION_CERTIFIED) return band_output(output, band, messages);
+    output->repeats = repeat_counts_add(output->repeats, band->repeats);
+    if (!keeps_bands(output)) return band_output(output, band, messages);
     array_push(output->kept, film_copy(band));
     return true;
 }
@@ -350,6 +367,23 @@ static bool kept_write(ImageOutput *output, MessageList *messages)
     for (size_t i = 0; i < output->kept.count && written; i++)
         written = band_output(output, &output->kept.items[i], messages);
     return written;
+}
+
+// The notes that stand behind the pixels.
+static bool late_notes_write(ImageOutput *output, MessageList *messages)
+{
+    if (output->settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
+    Text text = {0};
+    certified_describe(&text, output);
+    const ImageNote note = {certified_key, text_c(&text)};
+    const bool written = image_writer_note(output->image, &note, messages);
+    text_free(&text);
+    return written;
+}
+
+RepeatCounts image_output_repeats(const ImageOutput *output)
+{
+    return output->repeats;
 }
 
 static void image_output_free(ImageOutput *output)
@@ -365,7 +399,7 @@ static void image_output_free(ImageOutput *output)
 
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
 {
-    if (!kept_write(output, messages) || !band_written(output)) {
+    if (!kept_write(output, messages) || !band_written(output) || !late_notes_write(output, messages)) {
         image_output_abandon(output);
         return false;
     }

@@ -35,6 +35,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages);
 // Estimated bytes of all files; 0 before the second band.
 double image_output_bytes(const ImageOutput *output);
+// At `certified`, of all bands so far.
+RepeatCounts image_output_repeats(const ImageOutput *output);
 // Puts all files in place; frees the output. False with a message if one could not be. *seconds: spent on
 // encoding and writing, beside other work or not.
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds);

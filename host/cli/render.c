@@ -306,11 +306,6 @@ static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *optio
 {
     *checkpoint = NULL;
     if (!options->checkpoint) return true;
-    if (settings->precision == PRECISION_CERTIFIED) {
-        message_add(messages, MESSAGE_ERROR,
-                    "--checkpoint does not keep what --precision certified counts; use either");
-        return false;
-    }
     Text key = {0};
     checkpoint_key(&key, settings, options->output.aovs, renderers, count, ranks);
     const FilmHeader film = renderer_film_header(renderers[0], options->output.aovs);
@@ -366,16 +361,16 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     double start = clock_seconds();
     bool whole = render_job_run(&job);
     times->render_seconds = clock_seconds() - start;
+    times->repeats = image_output_repeats(output);
     if (whole)
         whole = image_output_commit(output, messages, &times->encode_seconds);
     else
         image_output_abandon(output);
     progress_close(&progress);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
-    const RepeatCounts repeats = renderers_repeats(renderers, devices->count);
-    if (whole && repeats.undecided > 0)
+    if (whole && times->repeats.undecided > 0)
         message_add(messages, MESSAGE_WARNING, "%llu samples are undecided, and are as at precision double",
-                    (unsigned long long)repeats.undecided);
+                    (unsigned long long)times->repeats.undecided);
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
     messages_print(messages, NULL);
     int status = whole                    ? EXIT_DONE

@@ -110,10 +110,9 @@ static void pilot_print(const Pilot *pilot)
 }
 
 // How much of the image `certified` rendered in double, and what that left in doubt.
-static void repeats_print(Renderer *const *renderers, size_t count, const RenderSettings *settings)
+static void repeats_print(RepeatCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    const RepeatCounts counts = renderers_repeats(renderers, count);
     fprintf(stderr, "certified: %llu samples repeated in double, %llu undecided\n",
             (unsigned long long)counts.repeated, (unsigned long long)counts.undecided);
 }
@@ -124,7 +123,7 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
     fprintf(stderr, "%ux%u, %u %s per pixel, precision %s\n", settings->region_width, settings->region_height,
             settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
             precision_names[settings->precision]);
-    repeats_print(renderers, count, settings);
+    repeats_print(host->repeats, settings);
     line_print("parse", host->parse_seconds, "");
     if (host->pilot) pilot_print(host->pilot);
     for (size_t i = 0; i < count; i++) {
@@ -249,9 +248,8 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     json_integer(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     if (settings->precision == PRECISION_CERTIFIED) {
-        const RepeatCounts repeats = renderers_repeats(renderers, count);
-        json_integer(json, "repeated_samples", (int64_t)repeats.repeated);
-        json_integer(json, "undecided_samples", (int64_t)repeats.undecided);
+        json_integer(json, "repeated_samples", (int64_t)host->repeats.repeated);
+        json_integer(json, "undecided_samples", (int64_t)host->repeats.undecided);
     }
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);

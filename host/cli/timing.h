@@ -12,6 +12,7 @@ typedef struct {
     double parse_seconds, encode_seconds;
     const Pilot *pilot;    // that chose the precision, or NULL
     double render_seconds; // from the first band to the last, builds included
+    RepeatCounts repeats;  // at `certified`
 } HostTimes;
 
 // Of all renderers of the image; `ranks`, which rendered as well, may be NULL. Text goes to stderr, JSON to

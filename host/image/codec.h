@@ -20,6 +20,8 @@ typedef struct Encoder {
     bool (*rows)(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
     bool (*end)(ImageWriter *writer, MessageList *messages); // after the last row; may be NULL
     void (*free)(ImageWriter *writer); // frees `state`, which may be incomplete or NULL; may be NULL
+    // after any row; NULL: notes are lost
+    bool (*note)(ImageWriter *writer, const ImageNote *note, MessageList *messages);
 } Encoder;
 
 extern const Encoder png_encoder, ppm_encoder, exr_encoder, npy_encoder;

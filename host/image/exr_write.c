@@ -194,4 +194,4 @@ static void exr_free(ImageWriter *writer)
     free(state);
 }
 
-const Encoder exr_encoder = {exr_begin, exr_rows, exr_end, exr_free};
+const Encoder exr_encoder = {exr_begin, exr_rows, exr_end, exr_free, NULL};

@@ -105,6 +105,13 @@ bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_cou
     return true;
 }
 
+bool image_writer_note(ImageWriter *writer, const ImageNote *note, MessageList *messages)
+{
+    if (writer->failed || (writer->encoder->note && !writer->encoder->note(writer, note, messages)))
+        writer->failed = true;
+    return !writer->failed;
+}
+
 static void writer_free(ImageWriter *writer)
 {
     if (writer->encoder->free) writer->encoder->free(writer);

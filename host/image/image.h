@@ -34,6 +34,9 @@ ImageWriter *image_writer_open(const char *path, const ImageHeader *header, Mess
 // false with an error message if they cannot be written; the writer must still be committed, which then fails
 // silently, or abandoned. More rows than the image has are a bug.
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
+// Adds a note that is known only once rows are written: to a PNG alone, whose text chunks may follow its
+// rows. False as image_writer_rows.
+bool image_writer_note(ImageWriter *writer, const ImageNote *note, MessageList *messages);
 uint64_t image_writer_bytes(const ImageWriter *writer); // so far; 0 where that is unknown
 // Completes the file so that only the rename is left: of several files none is put in place before all are
 // complete. False with an error message on failure; the writer must still be committed or abandoned.

@@ -52,7 +52,7 @@ static bool npy_rows(ImageWriter *writer, const void *pixels, uint32_t row_count
     return output_write(&writer->output, pixels, row_size * row_count, messages);
 }
 
-const Encoder npy_encoder = {npy_begin, npy_rows, NULL, NULL};
+const Encoder npy_encoder = {npy_begin, npy_rows, NULL, NULL, NULL};
 
 // The value of `'key':` in the header's dictionary, or NULL.
 static const char *npy_entry(const char *dictionary, const char *key)

@@ -108,7 +108,15 @@ static bool png_end(ImageWriter *writer, MessageList *messages)
 {
     PngState *state = writer->state;
     if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
-    png_write_end(state->png, NULL);
+    png_write_end(state->png, state->info); // with the notes that are not written yet
+    return true;
+}
+
+static bool png_late_note(ImageWriter *writer, const ImageNote *note, MessageList *messages)
+{
+    PngState *state = writer->state;
+    if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
+    png_note(state, note);
     return true;
 }
 
@@ -121,7 +129,7 @@ static void png_free_writer(ImageWriter *writer)
     free(state);
 }
 
-const Encoder png_encoder = {png_begin, png_rows, png_end, png_free_writer};
+const Encoder png_encoder = {png_begin, png_rows, png_end, png_free_writer, png_late_note};
 
 typedef struct {
     PngState state;

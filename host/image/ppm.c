@@ -35,7 +35,7 @@ static void ppm_free(ImageWriter *writer)
     free(writer->state);
 }
 
-const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, ppm_free};
+const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, ppm_free, NULL};
 
 // Reads the number at `*at` after white space and comments; false unless it is below 2^31.
 static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)

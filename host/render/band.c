@@ -3,8 +3,8 @@
 // The pixels of a work-item: a macro-tile.
 static TileShape item_shape(uint32_t lanes)
 {
-    TileShape tile = {TILE_WIDTH_OF(lanes), TILE_HEIGHT_OF(lanes)};
-    return (TileShape){tile.width * MACRO_TILE_COLUMNS_OF(lanes), tile.height * MACRO_TILE_ROWS_OF(lanes)};
+    const uint32_t width = TILE_WIDTH_OF(lanes), height = TILE_HEIGHT_OF(lanes);
+    return (TileShape){width * MACRO_TILE_COLUMNS_OF(lanes), height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
 // Work-items along each side of a group, before the device's limits. Square groups are coherent: neighboring
@@ -71,16 +71,20 @@ void band_buffers_close(BandBuffers *buffers)
     *buffers = (BandBuffers){0};
 }
 
+static size_t divide_up(uint32_t count, uint32_t by)
+{
+    return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
+}
+
 Place band_place(const Renderer *renderer, BandRows rows)
 {
     const RenderSettings *settings = &renderer->settings;
-    TileShape item = item_shape(renderer->report.lanes);
-    size_t side = group_side(renderer);
+    const TileShape item = item_shape(renderer->report.lanes);
+    const size_t side = group_side(renderer);
     return (Place){
         .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
                   settings->region_width, rows.row_count}},
-        .items = {(settings->region_width + item.width - 1) / item.width,
-                  (rows.row_count + item.height - 1) / item.height},
+        .items = {divide_up(settings->region_width, item.width), divide_up(rows.row_count, item.height)},
         .group = {side, side}};
 }
 
@@ -89,7 +93,7 @@ Place list_place(const Renderer *renderer, uint32_t count)
     const uint32_t of_item = renderer->report.lanes * renderer->report.lanes;
     size_t side = group_side(renderer);
     return (Place){
-        .band = {{0, 0, count, 1}}, .items = {(count + of_item - 1) / of_item, 1}, .group = {side * side, 1}};
+        .band = {{0, 0, count, 1}}, .items = {divide_up(count, of_item), 1}, .group = {side * side, 1}};
 }
 
 _Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");

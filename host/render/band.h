@@ -9,6 +9,7 @@ typedef struct {
     cl_mem doubts;        // at `certified`: of each pixel's color, how many of its samples are in doubt
     cl_mem center_doubts; // likewise of its AOVs, 0 or 1
     cl_mem pixels;        // where a list is rendered: x and y of each
+    RepeatCounts repeats; // of the band, since its last delivery
 } BandBuffers;
 
 // For as many pixels as the film has.

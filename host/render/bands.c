@@ -50,10 +50,12 @@ static bool deliver(const Delivery *delivery, const Film *band)
                            : delivery->pass_sink(delivery->context, band, delivery->samples);
 }
 
-static bool band_deliver(Renderer *renderer, const BandBuffers *buffers, unsigned layers, BandRows rows,
+static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned layers, BandRows rows,
                          const Delivery *delivery)
 {
     Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
+    band.repeats = buffers->repeats;
+    buffers->repeats = (RepeatCounts){0};
     void *mapped[LAYER_COUNT] = {NULL};
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         size_t size = film_layer_size(&band, layer);
@@ -111,8 +113,8 @@ static bool is_stopped(const Renderer *renderer, const Delivery *delivery)
 }
 
 // Samples first..end-1 of a band, in launches of the pace. False: failed or stopped.
-static bool band_sample(Renderer *renderer, const BandBuffers *buffers, BandRows rows, Pace *pace,
-                        uint32_t first, uint32_t end, const Delivery *delivery)
+static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows, Pace *pace, uint32_t first,
+                        uint32_t end, const Delivery *delivery)
 {
     const RenderSettings *settings = &renderer->settings;
     uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
@@ -132,7 +134,7 @@ static bool band_sample(Renderer *renderer, const BandBuffers *buffers, BandRows
 }
 
 // One ray per pixel.
-static void band_fill_aovs(Renderer *renderer, const BandBuffers *buffers, unsigned aovs, BandRows rows)
+static void band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
     const Place place = band_place(renderer, rows);
     const struct {
@@ -209,7 +211,7 @@ static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, 
     const RenderSettings *settings = &renderer->settings;
     bool go_on = true;
     for (size_t i = 0; go_on && i < bands->count; i++) {
-        const PassBand *band = &bands->items[i];
+        PassBand *band = &bands->items[i];
         band_fill_aovs(renderer, &band->buffers, aovs, band->rows);
         go_on = band_deliver(renderer, &band->buffers, aovs, band->rows, delivery) &&
                 !(settings->stop && settings->stop());
@@ -232,7 +234,7 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
         delivery.samples += (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
         start = clock_seconds();
         for (size_t i = 0; go_on && i < bands.count; i++) {
-            const PassBand *band = &bands.items[i];
+            PassBand *band = &bands.items[i];
             go_on = band_sample(renderer, &band->buffers, band->rows, &pace, first, delivery.samples,
                                 &delivery) &&
                     band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);

@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 static const char file_magic[16] = "glint checkpoint";
-static const uint64_t file_format = 1;
+static const uint64_t file_format = 2;
 static const double SYNC_SECONDS = 1; // at least, between two syncs, which are slow
 
 enum { HASH_BYTES = 16, KEY_BYTES_MAX = 1 << 16, CHUNK_BYTES = 1 << 20 };

@@ -29,6 +29,17 @@ extern const LayerType layer_types[LAYER_COUNT];
 #define FILM_INTEGER                      uint32_t
 #define FILM_LAYER(NAME, name, type, ...) FILM_##type *name;
 
+// At `certified`, of samples and of AOVs' rays: those of the pixels that were rendered in double, and of
+// these the ones that double left in doubt.
+typedef struct {
+    uint64_t repeated, undecided;
+} RepeatCounts;
+
+static inline RepeatCounts repeat_counts_add(RepeatCounts a, RepeatCounts b)
+{
+    return (RepeatCounts){a.repeated + b.repeated, a.undecided + b.undecided};
+}
+
 // Every pixel of an image's region or of a band of its rows, row by row from the top left. Layers are NULL
 // where they were not requested.
 //
@@ -42,6 +53,7 @@ typedef struct {
     uint32_t first_row; // of a band in its region
     bool is_double;     // computed in double
     size_t real_size;   // sizeof(double); sizeof(float) in a band that was not
+    RepeatCounts repeats;
     union {
         void *layers[LAYER_COUNT];
         struct {
@@ -59,6 +71,7 @@ typedef struct {
 typedef struct {
     uint32_t width, first_row, row_count, light_count, real_size, is_double;
     uint64_t layers; // the set of those that are there
+    RepeatCounts repeats;
 } FilmHeader;
 
 static inline size_t film_pixel_count(const Film *film)
@@ -89,7 +102,8 @@ Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsign
 Film film_copy(const Film *band); // with layers of its own
 void film_free(Film *film);       // and zeroes
 
-// Copies the rows of a band into the film, all layers that both have; reals become doubles.
+// Copies the rows of a band into the film, all layers that both have, and adds its counts; reals become
+// doubles.
 void film_copy_band(Film *film, const Film *band);
 
 float *film_narrow_color(const Film *film); // caller frees

@@ -329,7 +329,7 @@ static RenderSettings repeat_settings(const RenderSettings *settings)
 {
     RenderSettings repeat = *settings;
     repeat.precision = PRECISION_DOUBLE;
-    repeat.counting = repeat.hashes_scene = false;
+    repeat.counting = false;
     return repeat;
 }
 
@@ -344,6 +344,9 @@ static Renderer *renderer_open_for(Compute *compute, const Scene *scene, const R
         const RenderSettings repeat = repeat_settings(settings);
         renderer->repeat = renderer_open_for(compute, scene, &repeat, repeats + 1, messages);
         is_ready = renderer->repeat != NULL;
+        if (is_ready) // a scene may differ in what floats do not show
+            renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash,
+                                                     &renderer->repeat->report.scene_hash, sizeof(uint64_t));
     }
     return renderer_finish(renderer, is_ready);
 }
@@ -481,20 +484,9 @@ const RenderReport *renderer_report(const Renderer *renderer)
     return &renderer->report;
 }
 
-RepeatCounts renderers_repeats(Renderer *const *renderers, size_t count)
-{
-    RepeatCounts sum = {0};
-    for (size_t i = 0; i < count; i++) {
-        sum.repeated += renderers[i]->report.repeats.repeated;
-        sum.undecided += renderers[i]->report.repeats.undecided;
-    }
-    return sum;
-}
-
 void renderer_report_restart(Renderer *renderer)
 {
     RenderReport *report = &renderer->report;
     report->launches.count = report->reads.count = 0;
     memset(report->rays, 0, sizeof report->rays);
-    report->repeats = (RepeatCounts){0};
 }

@@ -132,11 +132,6 @@ typedef struct {
     LaunchTime time;
 } NamedLaunch;
 
-// Samples, and rays of AOVs.
-typedef struct {
-    uint64_t repeated, undecided;
-} RepeatCounts;
-
 typedef struct {
     const Device *device;
     FeatureSet features;
@@ -149,9 +144,6 @@ typedef struct {
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
     uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting
-    // At `certified`, of the last render's samples and AOVs' rays: those of the pixels that were rendered in
-    // double, and of these the ones that double left in doubt.
-    RepeatCounts repeats;
     struct {
         NamedLaunch *items;
         size_t count, capacity;
@@ -159,8 +151,6 @@ typedef struct {
     WorkerShare share; // of the last render
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
-// Of several renderers of one image.
-RepeatCounts renderers_repeats(Renderer *const *renderers, size_t count);
 
 // The composed text of the kernel that renders, for other compilers. Caller frees.
 char *renderer_kernel_text(const Renderer *renderer);

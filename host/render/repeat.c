@@ -127,8 +127,8 @@ static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
     return samples;
 }
 
-void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
-                 unsigned aovs, BandRows rows)
+void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
+                 BandRows rows)
 {
     cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
     const RepeatedBand band = {kind, layers, aovs, buffers,
@@ -138,7 +138,7 @@ void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, const Ban
     PixelList list = doubts_list(renderer, rows, values);
     renderer_unmap(renderer, doubts, values);
     if (list.count > 0) {
-        RepeatCounts *counts = &renderer->report.repeats;
+        RepeatCounts *counts = &buffers->repeats;
         uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
         counts->repeated +=
             (uint64_t)list.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);

@@ -4,5 +4,6 @@
 #include "host/render/band.h"
 
 // Renders again in double what a kernel has left in doubt, and as at `double` what that leaves undecided.
-void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
-                 unsigned aovs, BandRows rows);
+// Counts both in the buffers.
+void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
+                 BandRows rows);
