@@ -8,15 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct {
-    const char *file, *name;
-} kernel_sources[KERNEL_COUNT] = {
-    [KERNEL_RENDER] = {"render.cl", "render"},
-    [KERNEL_AOV] = {"aov.cl", "aov"},
-    [KERNEL_PATH] = {"path.cl", "path"},
-    [KERNEL_TRACE] = {"trace.cl", "trace"},
-};
-
 static bool settings_fit(const RenderSettings *settings, const Device *device, MessageList *messages)
 {
     uint32_t lanes = settings->lanes;
@@ -135,13 +126,7 @@ static void offsets_upload(Renderer *renderer)
     free(offsets);
 }
 
-static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
-{
-    for (cl_uint i = 0; i < FLAT_COUNT; i++)
-        kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
-}
-
-static bool certifies(const Renderer *renderer, const RenderSettings *settings)
+bool renderer_certifies(const Renderer *renderer, const RenderSettings *settings)
 {
     return settings->precision == PRECISION_CERTIFIED || renderer->repeats == REPEATS_IN_DOUBT;
 }
@@ -217,89 +202,10 @@ static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSet
     const uint32_t lanes =
         settings->lanes ? settings->lanes : device_lanes(renderer->compute->device, is_double);
     CompileSettings compiling = compile_settings(settings, lanes);
-    compiling.certifies = certifies(renderer, settings);
+    compiling.certifies = renderer_certifies(renderer, settings);
     compiling.textures = renderer->compiled.textures;
     return compile(renderer, scene, &compiling, messages) &&
            compiled_upload(renderer, settings, lanes, scene->lights.count);
-}
-
-// At least `count`: few sizes, so that few kernels are built. Most scenes are served by `usual`, which is
-// doubled for the others.
-static uint32_t capacity_for(uint32_t count, uint32_t usual)
-{
-    while (usual < count)
-        usual *= 2;
-    return usual;
-}
-
-// Refracted rays that wait while reflected ones are traced, up to one per depth.
-static uint32_t pending_max(const Renderer *renderer)
-{
-    if (!(renderer->report.features & FEATURE_TRANSMISSION)) return 1;
-    return capacity_for(renderer->settings.bounce_count, 8);
-}
-
-static void variant_close(Renderer *renderer, KernelVariant *variant)
-{
-    for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
-        KernelSlot *slot = &variant->kernels[kind];
-        if (slot->kernel) {
-            // it has been launched: its program's binary holds finished machine code
-            program_store(renderer->compute, &slot->request, &slot->program);
-            clReleaseKernel(slot->kernel);
-        }
-        program_close(&slot->program);
-    }
-    text_free(&variant->prelude);
-    *variant = (KernelVariant){0};
-}
-
-// The definitions and compiler options that distinguish the variants of the kernels.
-static void variant_set(Renderer *renderer)
-{
-    Precision precision = renderer->settings.precision;
-    uint32_t seed = renderer->settings.perturb_seed, scale = renderer->settings.perturb_scale;
-    const Device *device = renderer->compute->device;
-    // injected errors make the device count as not correctly rounded, so that strict repairs them
-    bool correct = device->correctly_rounded && seed == 0;
-    // OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
-    // vectors, unlike llvmpipe and Oclgrind
-    bool has_fma = renderer->report.is_double || device->fma_in_hardware || device->native_float_width > 1;
-    Text prelude = {0}, *text = &prelude;
-    text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
-    text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
-    text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
-    text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
-    text_appendf(text, "#define IS_CERTIFIED %d\n", certifies(renderer, &renderer->settings));
-    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->repeats != REPEATS_NONE);
-    text_appendf(text, "#define REPAIRS_DIVIDE %d\n", precision == PRECISION_STRICT && !correct);
-    text_appendf(text, "#define HAS_FMA %d\n", has_fma);
-    text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
-    // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
-    text_appendf(text, "#define STACK_CAPACITY %u\n",
-                 capacity_for(renderer->compiled.pending_children_max, 40));
-    text_appendf(text, "#define IS_COUNTING %d\n", renderer->settings.counting);
-    text_appendf(text, "#define PERTURB %d\n", seed != 0);
-    text_appendf(text, "#define PERTURB_SEED %uu\n", seed);
-    text_appendf(text, "#define PERTURB_SCALE %u\n", scale > 0 ? scale : 1);
-    features_write_prelude(text, renderer->report.features);
-    if (strcmp(text_c(&prelude), text_c(&renderer->variant.prelude)) != 0) {
-        const KernelVariant variant = renderer->variant;
-        renderer->variant = renderer->other_variant;
-        renderer->other_variant = variant;
-    }
-    if (strcmp(text_c(&prelude), text_c(&renderer->variant.prelude)) == 0) {
-        text_free(&prelude);
-    } else {
-        variant_close(renderer, &renderer->variant);
-        renderer->variant = (KernelVariant){.prelude = prelude, .options = "-cl-std=CL1.2"};
-        if (precision == PRECISION_FAST) renderer->variant.options = "-cl-std=CL1.2 -cl-fast-relaxed-math";
-        if (precision == PRECISION_STRICT && correct)
-            renderer->variant.options = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
-    }
-    for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
-        if (renderer->variant.kernels[kind].kernel)
-            scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
 }
 
 static Renderer *renderer_make(Compute *compute, PixelRepeats repeats)
@@ -320,7 +226,7 @@ static Renderer *renderer_finish(Renderer *renderer, bool is_ready)
         renderer_close(renderer);
         return NULL;
     }
-    variant_set(renderer);
+    renderer_kernels_choose(renderer);
     return renderer;
 }
 
@@ -340,7 +246,7 @@ static Renderer *renderer_open_for(Compute *compute, const Scene *scene, const R
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
     Renderer *renderer = renderer_make(compute, repeats);
     bool is_ready = scene_assign(renderer, scene, settings, messages);
-    if (is_ready && certifies(renderer, settings)) {
+    if (is_ready && renderer_certifies(renderer, settings)) {
         const RenderSettings repeat = repeat_settings(settings);
         renderer->repeat = renderer_open_for(compute, scene, &repeat, repeats + 1, messages);
         is_ready = renderer->repeat != NULL;
@@ -385,7 +291,7 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
         const RenderSettings repeat = repeat_settings(settings);
         if (!renderer_move(renderer->repeat, scene, &repeat, messages)) return false;
     }
-    variant_set(renderer); // another eye may need another feature, or a deeper stack
+    renderer_kernels_choose(renderer); // another eye may need another feature, or a deeper stack
     return true;
 }
 
@@ -393,8 +299,7 @@ void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
     renderer_close(renderer->repeat);
-    variant_close(renderer, &renderer->variant);
-    variant_close(renderer, &renderer->other_variant);
+    renderer_kernels_close(renderer);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
         buffer_release(renderer->arrays[kind]);
     buffer_release(renderer->offsets);
@@ -407,52 +312,6 @@ void renderer_close(Renderer *renderer)
 size_t renderer_scalar_size(const Renderer *renderer)
 {
     return renderer->report.is_double ? sizeof(double) : sizeof(float);
-}
-
-char *renderer_kernel_text(const Renderer *renderer)
-{
-    return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&renderer->variant.prelude));
-}
-
-uint64_t renderer_kernel_hash(const Renderer *renderer)
-{
-    char *text = renderer_kernel_text(renderer);
-    uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
-    free(text);
-    return hash;
-}
-
-cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
-{
-    KernelSlot *slot = &renderer->variant.kernels[kind];
-    // AOV kernels do not change the hash that identifies an image
-    const bool is_of_image = kind != KERNEL_AOV && kind != KERNEL_PATH;
-    if (slot->kernel) {
-        if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
-        return slot->kernel;
-    }
-    slot->request = (ProgramRequest){
-        .root = kernel_sources[kind].file,
-        .prelude = text_c(&renderer->variant.prelude),
-        .options = renderer->variant.options,
-        .no_cache = renderer->settings.no_cache,
-    };
-    program_build(renderer->compute, &slot->request, &slot->program);
-    if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
-    renderer->report.build_seconds += slot->program.build_seconds;
-    renderer->report.build_from_cache &= slot->program.from_cache;
-    slot->kernel = program_kernel(renderer->compute, &slot->program, kernel_sources[kind].name);
-    scene_arguments_set(renderer, slot->kernel);
-    return slot->kernel;
-}
-
-LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
-                           const size_t *group)
-{
-    KernelSlot *slot = &renderer->variant.kernels[kind];
-    LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, items, group);
-    array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
-    return time;
 }
 
 void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)

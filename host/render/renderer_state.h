@@ -42,6 +42,15 @@ struct Renderer {
 
 size_t renderer_scalar_size(const Renderer *renderer);
 
+// Whether this one's kernels bound their errors and leave pixels in doubt: at `certified`, and at `double`
+// for those pixels.
+bool renderer_certifies(const Renderer *renderer, const RenderSettings *settings);
+
+// Chooses the variant of the kernels that the settings, the device and the compiled scene need; of the two
+// last used it takes the one that suits, with its kernels.
+void renderer_kernels_choose(Renderer *renderer);
+void renderer_kernels_close(Renderer *renderer);
+
 // The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first requested. NULL:
 // the device failed.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);

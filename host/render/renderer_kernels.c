@@ -1,0 +1,179 @@
+// The kernels of a renderer: their variants, which differ in the definitions before their text and in
+// compiler options, and their launches.
+#include "host/base/array.h"
+#include "host/base/hash.h"
+#include "host/compile/features.h"
+#include "host/render/renderer_state.h"
+#include <stdlib.h>
+#include <string.h>
+
+static const struct {
+    const char *file, *name;
+} kernel_sources[KERNEL_COUNT] = {
+    [KERNEL_RENDER] = {"render.cl", "render"},
+    [KERNEL_AOV] = {"aov.cl", "aov"},
+    [KERNEL_PATH] = {"path.cl", "path"},
+    [KERNEL_TRACE] = {"trace.cl", "trace"},
+};
+
+static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
+{
+    for (cl_uint i = 0; i < FLAT_COUNT; i++)
+        kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
+}
+
+// At least `count`: few sizes, so that few kernels are built. Most scenes are served by `usual`, which is
+// doubled for the others.
+static uint32_t capacity_for(uint32_t count, uint32_t usual)
+{
+    while (usual < count)
+        usual *= 2;
+    return usual;
+}
+
+// Refracted rays that wait while reflected ones are traced, up to one per depth.
+static uint32_t pending_max(const Renderer *renderer)
+{
+    if (!(renderer->report.features & FEATURE_TRANSMISSION)) return 1;
+    return capacity_for(renderer->settings.bounce_count, 8);
+}
+
+static void variant_close(Renderer *renderer, KernelVariant *variant)
+{
+    for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
+        KernelSlot *slot = &variant->kernels[kind];
+        if (slot->kernel) {
+            // it has been launched: its program's binary holds finished machine code
+            program_store(renderer->compute, &slot->request, &slot->program);
+            clReleaseKernel(slot->kernel);
+        }
+        program_close(&slot->program);
+    }
+    text_free(&variant->prelude);
+    *variant = (KernelVariant){0};
+}
+
+void renderer_kernels_close(Renderer *renderer)
+{
+    variant_close(renderer, &renderer->variant);
+    variant_close(renderer, &renderer->other_variant);
+}
+
+// Injected errors make the device count as not correctly rounded, so that `strict` repairs them.
+static bool rounds_correctly(const Renderer *renderer)
+{
+    return renderer->compute->device->correctly_rounded && renderer->settings.perturb_seed == 0;
+}
+
+// OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
+// vectors, unlike llvmpipe and Oclgrind.
+static bool has_fma(const Renderer *renderer)
+{
+    const Device *device = renderer->compute->device;
+    return renderer->report.is_double || device->fma_in_hardware || device->native_float_width > 1;
+}
+
+static void prelude_write(Text *text, const Renderer *renderer)
+{
+    const RenderSettings *settings = &renderer->settings;
+    const Precision precision = settings->precision;
+    const uint32_t scale = settings->perturb_scale;
+    text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
+    text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
+    text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
+    text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
+    text_appendf(text, "#define IS_CERTIFIED %d\n", renderer_certifies(renderer, settings));
+    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->repeats != REPEATS_NONE);
+    text_appendf(text, "#define REPAIRS_DIVIDE %d\n",
+                 precision == PRECISION_STRICT && !rounds_correctly(renderer));
+    text_appendf(text, "#define HAS_FMA %d\n", has_fma(renderer));
+    text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
+    // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
+    text_appendf(text, "#define STACK_CAPACITY %u\n",
+                 capacity_for(renderer->compiled.pending_children_max, 40));
+    text_appendf(text, "#define IS_COUNTING %d\n", settings->counting);
+    text_appendf(text, "#define PERTURB %d\n", settings->perturb_seed != 0);
+    text_appendf(text, "#define PERTURB_SEED %uu\n", settings->perturb_seed);
+    text_appendf(text, "#define PERTURB_SCALE %u\n", scale > 0 ? scale : 1);
+    features_write_prelude(text, renderer->report.features);
+}
+
+static const char *build_options(const Renderer *renderer)
+{
+    const Precision precision = renderer->settings.precision;
+    if (precision == PRECISION_FAST) return "-cl-std=CL1.2 -cl-fast-relaxed-math";
+    if (precision == PRECISION_STRICT && rounds_correctly(renderer))
+        return "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
+    return "-cl-std=CL1.2";
+}
+
+static bool variant_has(const KernelVariant *variant, const Text *prelude)
+{
+    return strcmp(text_c(prelude), text_c(&variant->prelude)) == 0;
+}
+
+void renderer_kernels_choose(Renderer *renderer)
+{
+    Text prelude = {0};
+    prelude_write(&prelude, renderer);
+    if (!variant_has(&renderer->variant, &prelude)) {
+        const KernelVariant variant = renderer->variant;
+        renderer->variant = renderer->other_variant;
+        renderer->other_variant = variant;
+    }
+    if (variant_has(&renderer->variant, &prelude)) {
+        text_free(&prelude);
+    } else {
+        variant_close(renderer, &renderer->variant);
+        renderer->variant = (KernelVariant){.prelude = prelude, .options = build_options(renderer)};
+    }
+    for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
+        if (renderer->variant.kernels[kind].kernel)
+            scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
+}
+
+char *renderer_kernel_text(const Renderer *renderer)
+{
+    return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&renderer->variant.prelude));
+}
+
+uint64_t renderer_kernel_hash(const Renderer *renderer)
+{
+    char *text = renderer_kernel_text(renderer);
+    uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
+    free(text);
+    return hash;
+}
+
+cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
+{
+    KernelSlot *slot = &renderer->variant.kernels[kind];
+    // AOV kernels do not change the hash that identifies an image
+    const bool is_of_image = kind != KERNEL_AOV && kind != KERNEL_PATH;
+    if (slot->kernel) {
+        if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
+        return slot->kernel;
+    }
+    slot->request = (ProgramRequest){
+        .root = kernel_sources[kind].file,
+        .prelude = text_c(&renderer->variant.prelude),
+        .options = renderer->variant.options,
+        .no_cache = renderer->settings.no_cache,
+    };
+    program_build(renderer->compute, &slot->request, &slot->program);
+    if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
+    renderer->report.build_seconds += slot->program.build_seconds;
+    renderer->report.build_from_cache &= slot->program.from_cache;
+    slot->kernel = program_kernel(renderer->compute, &slot->program, kernel_sources[kind].name);
+    scene_arguments_set(renderer, slot->kernel);
+    return slot->kernel;
+}
+
+LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
+                           const size_t *group)
+{
+    KernelSlot *slot = &renderer->variant.kernels[kind];
+    LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, items, group);
+    array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
+    return time;
+}
