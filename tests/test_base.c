@@ -1,10 +1,12 @@
-// Messages with their place, growing text, words near to one another, hashes, and output beside its target.
+// Messages with their place, growing text, words near to one another, stages, hashes, and output beside its
+// target.
 #include "host/base/array.h"
 #include "host/base/base64.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/output.h"
+#include "host/base/stage.h"
 #include "host/base/text.h"
 
 #include <dirent.h>
@@ -532,6 +534,46 @@ static void test_base64(void **state)
     }
 }
 
+static void stage_check(Stage *stage, const char *expected)
+{
+    Text text = {0};
+    double seconds = -1;
+    assert_int_equal(stage_write(stage, &text, &seconds), expected[0] != '\0');
+    assert_string_equal(text_c(&text), expected);
+    if (expected[0]) assert_true(seconds >= 0);
+    text_free(&text);
+}
+
+static void test_stage(void **state)
+{
+    (void)state;
+    Stage *stage = stage_open();
+    stage_check(stage, "");
+    stage_begin(stage, "reading", "folder/a.obj", 200);
+    stage_check(stage, "reading a.obj 0%");
+    stage_set(stage, 82);
+    stage_check(stage, "reading a.obj 41%");
+    stage_begin(stage, "building", NULL, 4);
+    stage_check(stage, "building 0%");
+    stage_add(stage, 2);
+    stage_add(stage, 1);
+    stage_check(stage, "building 75%");
+    stage_add(stage, 9); // more than there are
+    stage_check(stage, "building 100%");
+    stage_begin(stage, "uploading", NULL, 0);
+    stage_set(stage, 1);
+    stage_check(stage, "uploading");
+    stage_end(stage);
+    stage_check(stage, "");
+    stage_close(stage);
+    // nobody wants it
+    stage_begin(NULL, "reading", "a.obj", 1);
+    stage_set(NULL, 1);
+    stage_add(NULL, 1);
+    stage_end(NULL);
+    stage_close(NULL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -544,6 +586,7 @@ int main(void)
         cmocka_unit_test(test_text_nearest),
         cmocka_unit_test(test_array),
         cmocka_unit_test(test_clock),
+        cmocka_unit_test(test_stage),
         cmocka_unit_test(test_hash),
         cmocka_unit_test(test_read_failures),
         cmocka_unit_test(test_output_commit),

@@ -114,11 +114,21 @@ static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds
     bvh_wide_free(&wide);
 }
 
-// Every primitive in exactly one leaf, leaves of one kind, boxes that hold what is below them, bounded depth.
+// Every primitive in exactly one leaf, all of them counted, leaves of one kind, boxes that hold what is below
+// them, bounded depth.
 static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
 {
     Bvh bvh;
-    bvh_build(&bvh, boxes, kinds, count);
+    Stage *stage = stage_open();
+    stage_begin(stage, "building", NULL, count + 1);
+    stage_set(stage, 1);
+    bvh_build(&bvh, boxes, kinds, count, stage);
+    Text text = {0};
+    double seconds;
+    stage_write(stage, &text, &seconds);
+    assert_string_equal(text_c(&text), "building 100%");
+    text_free(&text);
+    stage_close(stage);
     Walk walk = {&bvh, boxes, kinds, memory_allocate_zeroed(count, 1), 0, 0};
     node_check(&walk, 0, 1);
     for (size_t i = 0; i < count; i++)

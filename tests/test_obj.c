@@ -1,4 +1,5 @@
 // OBJ and MTL files: the layouts that are read, materials and their images, and each message with its place.
+#include "host/import/load.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
@@ -389,6 +390,43 @@ static void faults_have_their_place(void **state)
         scene_read(&scene, SCENE_OF(""), "a.obj:4:2: error: a face of 16385 corners; 16384 is the most\n"));
 }
 
+typedef struct {
+    Stage *stage;
+    Text seen;
+} Progress;
+
+static void progress_note(void *context, const char *path)
+{
+    Progress *progress = context;
+    double seconds;
+    text_appendf(&progress->seen, "%s: ", path);
+    stage_write(progress->stage, &progress->seen, &seconds);
+}
+
+// The material library is read last.
+static void test_progress(void **state)
+{
+    (void)state;
+    file_write("a.obj", "mtllib missing.mtl\nusemtl red\n" CORNERS "f 1 2 3\nf 1 2 3\n");
+    const char text[] = SCENE_OF("") "  - sphere: {center: [0, 0, 0], radius: 1}\n";
+    const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
+    Progress progress = {.stage = stage_open()};
+    const SceneOptions options = {.file_named = progress_note, .context = &progress, .stage = progress.stage};
+    MessageList messages = {0};
+    Scene scene;
+    assert_true(scene_read_yaml(&scene, &source, &options, &messages));
+    text_appendf(&progress.seen, ", ");
+    progress_note(&progress, "then");
+    assert_string_equal(text_c(&progress.seen),
+                        "a.obj: reading the objects of scene.yaml 0%"
+                        "missing.mtl: reading a.obj 89%"
+                        "a.mtl: reading a.obj 89%, then: reading the objects of scene.yaml 50%");
+    text_free(&progress.seen);
+    stage_close(progress.stage);
+    message_list_free(&messages);
+    scene_free(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -401,6 +439,7 @@ int main(void)
         cmocka_unit_test(what_is_not_used_is_reported_once),
         cmocka_unit_test(many_large_polygons_are_refused),
         cmocka_unit_test(faults_have_their_place),
+        cmocka_unit_test(test_progress),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

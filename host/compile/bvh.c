@@ -94,6 +94,7 @@ typedef struct {
     atomic_size_t node_count;
     atomic_uint depth;
     atomic_int idle_threads;
+    Stage *stage;
 } Builder;
 
 typedef struct {
@@ -303,6 +304,7 @@ static void range_build(Builder *builder, Range range, unsigned depth, BvhChild 
     size_t middle = range_split(builder, range, depth);
     if (middle == range.end) {
         *child = (BvhChild){.first = (uint32_t)range.begin, .count = (uint32_t)(range.end - range.begin)};
+        stage_add(builder->stage, child->count);
         return;
     }
     size_t index = atomic_fetch_add(&builder->node_count, 1);
@@ -341,7 +343,7 @@ static double largest_coordinate(const Bounds *boxes, size_t count)
     return fmax(largest.x, fmax(largest.y, largest.z));
 }
 
-void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count)
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, Stage *stage)
 {
     *bvh = (Bvh){.primitive_count = count};
     Builder builder = {
@@ -349,6 +351,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
         .nodes = memory_allocate(count + 1, sizeof *builder.nodes),
         .node_count = 1,
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
+        .stage = stage,
     };
     if (!builder.references) fault("out of memory for a BVH of %zu primitives", count);
     double largest = largest_coordinate(boxes, count);
@@ -365,10 +368,12 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
         // the root is node 0; a single leaf is its only child
         size_t middle = range_split(&builder, (Range){0, count}, 0);
         builder.depth = 1;
-        if (middle == count)
+        if (middle == count) {
             builder.nodes[0] = (BvhBinaryNode){{{.first = 0, .count = (uint32_t)count}, root}};
-        else
+            stage_add(stage, count);
+        } else {
             sides_build(&builder, (Range){0, middle}, (Range){middle, count}, 1, &builder.nodes[0]);
+        }
     } else {
         builder.nodes[0] = (BvhBinaryNode){{root, root}};
     }

@@ -3,6 +3,7 @@
 // sides of a split built by two threads, and every leaf of one kind of shape).
 #pragma once
 
+#include "host/base/stage.h"
 #include "host/scene/bounds.h"
 #include <stddef.h>
 #include <stdint.h>
@@ -36,5 +37,6 @@ enum { BVH_LEAF_MAX = 8 /* primitives per leaf */, BVH_DEPTH_MAX = 80 };
 
 // `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
 // of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep.
-void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count);
+// The stage, which may be NULL, is set to the primitives whose leaves are built.
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, Stage *stage);
 void bvh_free(Bvh *bvh);

@@ -194,9 +194,11 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     Bounded bounded;
     bounded_collect(&bounded, compiled);
     Bvh bvh;
-    bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count);
+    stage_begin(settings->stage, "building the BVH", NULL, bounded.count);
+    bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count, settings->stage);
     free(bounded.boxes);
     bounded.boxes = NULL;
+    stage_begin(settings->stage, "widening the BVH", NULL, 0);
     nodes_write(compiled, &bvh, &bounded, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         array_reorder(compiled, kind, &bvh, &bounded);

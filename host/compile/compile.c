@@ -24,6 +24,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye,
                                settings->certifies};
     compiled->eye = rounding.eye;
+    stage_begin(settings->stage, "flattening the scene", NULL, 0);
     objects_flatten(compiled, scene, &rounding);
     materials_flatten(compiled, scene, &rounding);
     lights_flatten(compiled, scene, &rounding);
@@ -62,6 +63,7 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
                                settings->certifies};
     compiled->eye = (Vector3){NAN, NAN, NAN}; // equal to no eye, so that the next move sets all
     compiled->eye_offset = (Vector3){0};
+    stage_begin(settings->stage, "flattening the scene", NULL, 0);
     objects_move(compiled, scene, &rounding);
     compiled->features |= settings->extra_features;
     materials_flatten(compiled, scene, &rounding);

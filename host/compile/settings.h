@@ -1,6 +1,7 @@
 // What a Scene is compiled for.
 #pragma once
 
+#include "host/base/stage.h"
 #include "host/compile/features.h"
 
 typedef enum {
@@ -33,4 +34,5 @@ typedef struct {
     // From an earlier compilation of the same textures, whose arrays are then left empty; NULL: read the
     // images.
     const struct CompiledTexture *textures;
+    Stage *stage; // NULL: not wanted
 } CompileSettings;

@@ -168,8 +168,10 @@ bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSet
         return true;
     }
     bool done = true;
-    for (size_t i = 0; i < scene->textures.count && done; i++)
+    for (size_t i = 0; i < scene->textures.count && done; i++) {
+        stage_begin(settings->stage, "reading", scene->textures.items[i].path, 0);
         done = texture_add(&list, &compiled->textures[i], scene, &scene->textures.items[i], messages);
+    }
     if (done) levels_flatten(compiled, &list);
     levels_free(&list);
     return done;

@@ -46,6 +46,7 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
         return false;
     }
     Text text = {0};
+    stage_begin(options->stage, "reading", path, 0);
     bool read = text_read_file(&text, path, messages);
     if (read) {
         Source source = {.file = path, .bytes = text_c(&text), .length = text.count};

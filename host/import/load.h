@@ -1,6 +1,7 @@
 // Scene files; the name's ending chooses the reader.
 #pragma once
 
+#include "host/base/stage.h"
 #include "host/import/report.h"
 #include "host/scene/scene.h"
 
@@ -9,6 +10,7 @@ typedef struct {
     // Called with each mesh and image that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);
     void *context;
+    Stage *stage; // shows what is being read; NULL: not wanted
 } SceneOptions;
 
 // Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff). On a mistake in the file returns

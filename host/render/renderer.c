@@ -145,6 +145,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
         .is_preview = settings->is_preview,
+        .stage = settings->stage,
     };
 }
 
@@ -188,6 +189,7 @@ static bool compiled_upload(Renderer *renderer, const RenderSettings *settings, 
     renderer->report.flatten_seconds = compiled->flatten_seconds;
     renderer->report.bvh_seconds = compiled->bvh_seconds;
     double start = clock_seconds();
+    stage_begin(settings->stage, "uploading the scene", NULL, 0);
     upload(renderer);
     offsets_upload(renderer);
     renderer->report.upload_seconds = clock_seconds() - start;

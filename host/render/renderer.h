@@ -37,6 +37,7 @@ typedef struct {
     bool (*stop)(void);  // called between launches; true ends the render; NULL: never
     bool hashes_scene;   // for the report
     uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
+    Stage *stage;        // shows what is done before the first launch; NULL: not wanted
 } RenderSettings;
 
 // 8192 ulp, the largest error (kernels/numerics/perturb.h), times this is below 2^23 ulp: an injected error

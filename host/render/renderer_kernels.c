@@ -160,6 +160,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
         .options = renderer->variant.options,
         .no_cache = renderer->settings.no_cache,
     };
+    stage_begin(renderer->settings.stage, "building the kernel", NULL, 0);
     program_build(renderer->compute, &slot->request, &slot->program);
     if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;

@@ -21,7 +21,7 @@ static bool camera_file_read(CameraFile *file, const Source *source, MessageList
     *file = (CameraFile){.reader.report = report_open(source, messages)};
     YamlReader *reader = &file->reader;
     reader->scene = &file->scene;
-    if (yaml_tree_read(&reader->tree, &reader->report)) {
+    if (yaml_tree_read(&reader->tree, &reader->report, NULL)) {
         const YamlNode *root = reader->tree.nodes.items;
         file->camera = root->kind == YAML_MAPPING ? field_node(reader, root, "camera") : root;
         if (file->camera == root)

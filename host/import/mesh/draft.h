@@ -40,6 +40,7 @@ typedef struct {
     const MeshImport *import;
     Scene *scene;
     Source source; // the file
+    Stage *stage;  // of its bytes; may be NULL
     DraftPlaces places;
     Report report; // of the file
 

@@ -39,9 +39,11 @@ static bool file_read(MeshDraft *draft, Mesh *mesh)
         message_list_free(&problems);
         draft->source.bytes = text_c(&text);
         draft->source.length = text.count;
+        stage_begin(draft->stage, "reading", draft->import->path, text.count);
     }
     done = done && read(draft) && draft_check(draft);
     text_free(&text);
+    stage_begin(draft->stage, "joining the vertices of", draft->import->path, 0);
     if (done) draft_finish(draft, mesh);
     return done;
 }
@@ -60,7 +62,11 @@ static void warn_of_triangles(MeshDraft *draft, const Mesh *mesh)
 bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index)
 {
     MessageList messages = {0};
-    MeshDraft draft = {.import = import, .scene = scene, .source = {.file = import->path, .bytes = ""}};
+    MeshDraft draft = {.import = import,
+                       .scene = scene,
+                       .source = {.file = import->path, .bytes = ""},
+                       .stage = import->options ? import->options->stage : NULL};
+    stage_begin(draft.stage, "reading", import->path, 0);
     draft.report = report_open(&draft.source, &messages);
     Mesh mesh = {0};
     const bool read = file_read(&draft, &mesh);

@@ -178,9 +178,10 @@ bool obj_read(MeshDraft *draft)
     draft->first_index = 1;
     bool read = scan_is_text(&reader.scan, &draft->report);
     if (read) {
-        do
+        do {
+            stage_set(draft->stage, offset_of(&reader));
             read = line_read(&reader);
-        while (read && scan_line(&reader.scan));
+        } while (read && scan_line(&reader.scan));
     }
     if (read && draft->import->own_materials) obj_materials_read(draft, &reader.materials);
     free(reader.materials.used.items);

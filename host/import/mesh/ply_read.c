@@ -391,8 +391,10 @@ static bool element_read(PlyReader *reader, const PlyElement *element)
     if (is_binary(reader)) draft->places = DRAFT_BYTES;
     // without properties there are no rows, whatever their number
     const size_t count = element->property_count > 0 ? element->count : 0;
-    for (reader->row = 0; reader->row < count; reader->row++)
+    for (reader->row = 0; reader->row < count; reader->row++) {
+        stage_set(draft->stage, (size_t)(reader->reading.left.at - draft->source.bytes));
         if (!row_read(reader)) return false;
+    }
     return true;
 }
 

@@ -65,9 +65,10 @@ static bool text_read(MeshDraft *draft)
     StlReader reader = {.draft = draft,
                         .scan = {source->bytes, source->bytes + source->length, source->bytes}};
     if (!scan_is_text(&reader.scan, &draft->report)) return false;
-    do
+    do {
+        stage_set(draft->stage, (size_t)(reader.scan.at - reader.scan.start));
         if (!line_read(&reader)) return false;
-    while (scan_line(&reader.scan));
+    } while (scan_line(&reader.scan));
     return reader.corner_count == 0 || draft_fails(draft, source->length, "the file ends within a facet");
 }
 
@@ -102,6 +103,7 @@ static bool binary_read(MeshDraft *draft)
     bool has_attributes = false;
     for (size_t i = 0; i < count; i++) {
         const size_t offset = HEADER_SIZE + i * FACET_SIZE;
+        stage_set(draft->stage, offset);
         const unsigned char *facet = (const unsigned char *)source->bytes + offset;
         for (size_t corner = 0; corner < 3; corner++) {
             const unsigned char *bytes = facet + FACET_VERTICES + 12 * corner;

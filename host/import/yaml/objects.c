@@ -238,9 +238,15 @@ void yaml_read_objects(YamlReader *reader, const YamlNode *node)
         expected_report(reader, "objects", "a list", node);
         return;
     }
+    Stage *stage = reader->options->stage;
+    size_t done = 0, mesh_count = SIZE_MAX;
     Places places = places_open(reader->report.source);
     for (const YamlNode *item = yaml_first(&reader->tree, node); item && !report_is_full(&reader->report);
          item = yaml_next(&reader->tree, item)) {
+        if (mesh_count != reader->scene->meshes.count) // the last one had stages of its own
+            stage_begin(stage, "reading the objects of", reader->report.source->file, node->child_count);
+        mesh_count = reader->scene->meshes.count;
+        stage_set(stage, done++);
         object_read(reader, item);
         places_note(&places, reader->scene, item->offset);
     }

@@ -221,7 +221,8 @@ static void diagnostic_ignore(struct fy_diag *diag, void *user, const char *text
     (void)diag, (void)user, (void)text, (void)length;
 }
 
-static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy_diag *diagnostics)
+static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy_diag *diagnostics,
+                       Stage *stage)
 {
     bool ended = false;
     while (!ended) {
@@ -233,6 +234,7 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
         ended = event->type == FYET_STREAM_END;
         bool taken = event_take(builder, event);
         fy_parser_event_free(parser, event);
+        stage_set(stage, builder->end);
         if (!taken) return false;
     }
     if (!builder->tree->nodes.count) {
@@ -255,7 +257,7 @@ static bool source_is_text(const Source *source, Report *report)
     return true;
 }
 
-bool yaml_tree_read(YamlTree *tree, Report *report)
+bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
 {
     if (!source_is_text(report->source, report)) return false;
     struct fy_diag_cfg quiet;
@@ -271,7 +273,7 @@ bool yaml_tree_read(YamlTree *tree, Report *report)
 
     TreeBuilder builder = {.tree = tree, .report = report};
     errno = 0;
-    bool built = tree_build(&builder, parser, diagnostics);
+    bool built = tree_build(&builder, parser, diagnostics, stage);
     free(builder.anchors.items);
     fy_parser_destroy(parser);
     fy_diag_destroy(diagnostics);

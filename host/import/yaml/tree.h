@@ -2,7 +2,7 @@
 // share their target, so that no document expands while it is read.
 #pragma once
 
-#include "host/base/text.h"
+#include "host/base/stage.h"
 #include "host/import/report.h"
 #include <stdint.h>
 
@@ -25,8 +25,8 @@ typedef struct {
 } YamlTree;
 
 // Reports errors and returns false if the text is malformed, empty, nested too deeply, or has several
-// documents or tags.
-bool yaml_tree_read(YamlTree *tree, Report *report);
+// documents or tags. The stage, which may be NULL, is set to the bytes that were read.
+bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage);
 void yaml_tree_free(YamlTree *tree);
 
 // NULL at the end. A mapping's children are key, value, key, value …

@@ -77,7 +77,8 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
                          .scene = scene,
                          .options = options,
                          .default_material = UINT32_MAX};
-    if (yaml_tree_read(&reader.tree, &reader.report)) document_read(&reader);
+    stage_begin(options->stage, "reading", source->file, source->length);
+    if (yaml_tree_read(&reader.tree, &reader.report, options->stage)) document_read(&reader);
     if (scene->textures.count > 0) {
         scene->file = memory_copy_text(source->file);
         text_append(&scene->text, source->bytes, source->length);

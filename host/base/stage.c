@@ -1,0 +1,76 @@
+#include "host/base/stage.h"
+
+#include "host/base/clock.h"
+#include "host/base/memory.h"
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct Stage {
+    atomic_size_t done;
+    pthread_mutex_t mutex; // of the rest
+    Text name;             // empty: no operation
+    size_t total;
+    double start_seconds; // of the operation
+};
+
+Stage *stage_open(void)
+{
+    Stage *stage = memory_allocate_zeroed(1, sizeof *stage);
+    pthread_mutex_init(&stage->mutex, NULL);
+    return stage;
+}
+
+void stage_close(Stage *stage)
+{
+    if (!stage) return;
+    pthread_mutex_destroy(&stage->mutex);
+    text_free(&stage->name);
+    free(stage);
+}
+
+void stage_begin(Stage *stage, const char *what, const char *path, size_t total)
+{
+    if (!stage) return;
+    const char *slash = path ? strrchr(path, '/') : NULL, *name = slash ? slash + 1 : path;
+    pthread_mutex_lock(&stage->mutex);
+    if (stage->name.count == 0) stage->start_seconds = clock_seconds();
+    text_free(&stage->name);
+    text_appendf(&stage->name, name ? "%s %s" : "%s", what, name);
+    stage->total = total;
+    atomic_store(&stage->done, 0);
+    pthread_mutex_unlock(&stage->mutex);
+}
+
+void stage_end(Stage *stage)
+{
+    if (!stage) return;
+    pthread_mutex_lock(&stage->mutex);
+    text_free(&stage->name);
+    pthread_mutex_unlock(&stage->mutex);
+}
+
+void stage_set(Stage *stage, size_t done)
+{
+    if (stage) atomic_store_explicit(&stage->done, done, memory_order_relaxed);
+}
+
+void stage_add(Stage *stage, size_t count)
+{
+    if (stage) atomic_fetch_add_explicit(&stage->done, count, memory_order_relaxed);
+}
+
+bool stage_write(Stage *stage, Text *text, double *seconds)
+{
+    pthread_mutex_lock(&stage->mutex);
+    const bool is_under_way = stage->name.count > 0;
+    if (is_under_way) {
+        text_append(text, stage->name.items, stage->name.count);
+        const double share = stage->total > 0 ? (double)atomic_load(&stage->done) / (double)stage->total : 0;
+        if (stage->total > 0) text_appendf(text, " %.0f%%", 100 * (share < 1 ? share : 1));
+        *seconds = clock_seconds() - stage->start_seconds;
+    }
+    pthread_mutex_unlock(&stage->mutex);
+    return is_under_way;
+}
