@@ -41,7 +41,7 @@ version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_C
 # (tools/numerics/textbook), never to ship.
 kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h)),$(or \
            $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
-sources := $(filter-out $(if $(has_window),,host/view/window.c host/view/caption.c), \
+sources := $(filter-out $(if $(has_window),,$(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c), \
            $(filter-out host/mpi/%,$(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))))
 pages   := $(sort $(wildcard host/cli/page/*))
 objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o

@@ -59,7 +59,7 @@ def display_open():
     """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process."""
     read, write_end = os.pipe()
     folder = os.environ["VIEW_FOLDER"]
-    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "320x240x24", "-fbdir", folder]
+    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "320x360x24", "-fbdir", folder]
     process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write_end)
     with os.fdopen(read) as file:
@@ -195,6 +195,11 @@ class Window:
         stride, pixels = screen()
         return tuple(pixels[y * stride + 4 * x + channel] for channel in (2, 1, 0))
 
+    @staticmethod
+    def most_colors_of_a_column(columns, rows):
+        stride, pixels = screen()
+        return max(len({pixels[y * stride + 4 * x : y * stride + 4 * x + 3] for y in rows}) for x in columns)
+
     def title_at_last(self, text):
         end = time.monotonic() + DEADLINE
         while text not in xdotool("getwindowname", self.id):
@@ -213,6 +218,19 @@ class Window:
             if (line[2::4], line[1::4], line[0::4]) != (row[0::3], row[1::3], row[2::3]):
                 return False
         return True
+
+    def says_at_last(self):
+        """Anything, in white."""
+        end = time.monotonic() + DEADLINE
+        while b"\xff\xff\xff" not in screen()[1]:
+            self.test.assertLess(time.monotonic(), end, "nothing is said")
+            time.sleep(0.01)
+
+    def changes_at_last(self, before):
+        end = time.monotonic() + DEADLINE
+        while screen() == before:
+            self.test.assertLess(time.monotonic(), end, "the display does not change")
+            time.sleep(0.01)
 
     def close(self, status=0):
         self.key("Escape")
@@ -387,6 +405,7 @@ class View(TestCase):
                 os.mkfifo("slow.yaml")
                 window = Window(self, "slow.yaml", waits=False)
                 window.title_at_last("preparing")
+                window.says_at_last()  # what is read
                 if closes:
                     window.key("Escape")
                     end = time.monotonic() + DEADLINE
@@ -423,9 +442,23 @@ class View(TestCase):
                         self.assertLess(time.monotonic(), end, (window.pixel(0, 0), window.pixel(80, 60)))
                         time.sleep(0.01)
                 window.key("v")
-        window.key("4")
-        window.title_at_last(", color, double, ")
-        window.shows_at_last(self.image_of(SCENE, "--precision double"))
+        for key, precision in ("1", "fast"), ("3", "strict"), ("4", "double"), ("5", "certified"), ("2", "single"):
+            with self.subTest(precision):
+                window.key(key)
+                window.title_at_last(f", color, {precision}, ")
+                window.shows_at_last(self.image_of(SCENE, f"--precision {precision}"))
+        window.close()
+
+    def test_legend(self):
+        """The scale of the errors: a bar of many colors in the lower right corner."""
+        window = Window(self)
+        xdotool("windowsize", "--sync", window.id, 320, 360)
+        window.key("shift+v")
+        window.title_at_last(", error against double, ")
+        end = time.monotonic() + DEADLINE
+        while window.most_colors_of_a_column(range(160, 320), range(180, 360)) < 64:
+            self.assertLess(time.monotonic(), end, "there is no legend")
+            time.sleep(0.01)
         window.close()
 
     def test_help(self):
@@ -433,9 +466,7 @@ class View(TestCase):
         window.check()
         before = screen()
         window.key("h")
-        end = time.monotonic() + DEADLINE
-        while screen() == before:
-            self.assertLess(time.monotonic(), end, "no help is shown")
+        window.changes_at_last(before)
         window.key("h")
         window.check()
         window.close()
@@ -460,9 +491,7 @@ class View(TestCase):
         window.line(r"^  reflected, 0.5: nothing$")
         window.line(r"^  refracted, 0.25: sphere 3, scene.yaml:6, t ")
         window.line(r"^    reflected, 0.125: sphere 3")
-        end = time.monotonic() + DEADLINE
-        while screen() == before:
-            self.assertLess(time.monotonic(), end, "no facts are shown")
+        window.changes_at_last(before)
         window.key("i")
         window.mouse(80, 119)
         window.key("i")

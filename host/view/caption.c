@@ -5,12 +5,14 @@
 #include <fontconfig/fontconfig.h>
 #include <stdlib.h>
 
-static const float FONT_SIZE = 15;
+static const float FONT_SIZE = 15, FONT_SIZE_MIN = 9;
 enum { PADDING = 8 };
 
 struct Caption {
     SDL_Renderer *target;
     TTF_Font *font;
+    float scale;
+    int size; // of the font, in pixels
 };
 
 // The file of the font that the user has chosen for fixed-width text. Caller frees; NULL: none.
@@ -33,14 +35,21 @@ static char *font_path(void)
     return path;
 }
 
+static void size_set(Caption *caption, int size)
+{
+    if (size != caption->size) TTF_SetFontSize(caption->font, size);
+    caption->size = size;
+}
+
 Caption *caption_open(SDL_Renderer *target, float scale)
 {
     char *path = font_path();
-    TTF_Font *font = path && TTF_Init() == 0 ? TTF_OpenFont(path, (int)(FONT_SIZE * scale)) : NULL;
+    const int size = (int)(FONT_SIZE * scale);
+    TTF_Font *font = path && TTF_Init() == 0 ? TTF_OpenFont(path, size) : NULL;
     free(path);
     if (!font) return NULL;
     Caption *caption = memory_allocate_zeroed(1, sizeof *caption);
-    *caption = (Caption){target, font};
+    *caption = (Caption){target, font, scale, size};
     return caption;
 }
 
@@ -52,25 +61,90 @@ void caption_close(Caption *caption)
     free(caption);
 }
 
-void caption_draw(const Caption *caption, CaptionPlace place, const char *text)
+// Lines of a text, and characters of the longest.
+static SDL_Point extent_of(const char *text)
+{
+    SDL_Point extent = {0, 1};
+    int column = 0;
+    for (; *text; text++) {
+        const bool is_continuation = (*text & 0xC0) == 0x80; // of a character in UTF-8
+        column = *text == '\n' ? 0 : column + !is_continuation;
+        extent.y += *text == '\n';
+        extent.x = SDL_max(extent.x, column);
+    }
+    return extent;
+}
+
+// In the font's current size.
+static SDL_Point character_size(const Caption *caption)
+{
+    SDL_Point size = {0, TTF_FontLineSkip(caption->font)};
+    TTF_SizeUTF8(caption->font, "0", &size.x, NULL);
+    return size;
+}
+
+SDL_Point caption_character(Caption *caption)
+{
+    if (!caption) return (SDL_Point){0, 0};
+    size_set(caption, (int)(FONT_SIZE * caption->scale));
+    return character_size(caption);
+}
+
+// The largest font that the extent fits in, down to the smallest. Returns the text's width, at most `room.x`.
+static int size_fit(Caption *caption, SDL_Point extent, SDL_Point room)
+{
+    int size = (int)(FONT_SIZE * caption->scale);
+    const int least = (int)(FONT_SIZE_MIN * caption->scale);
+    for (;; size--) {
+        size_set(caption, size);
+        const SDL_Point character = character_size(caption);
+        const int width = extent.x * character.x;
+        if (size <= least || (width <= room.x && extent.y * character.y <= room.y))
+            return SDL_min(width, room.x);
+    }
+}
+
+void caption_draw_ground(const Caption *caption, SDL_Rect place)
+{
+    SDL_SetRenderDrawBlendMode(caption->target, SDL_BLENDMODE_BLEND);
+    SDL_SetRenderDrawColor(caption->target, 0, 0, 0, 176);
+    SDL_RenderFillRect(caption->target, &place);
+}
+
+static void surface_draw(const Caption *caption, SDL_Surface *surface, int x, int y, int width)
+{
+    SDL_Texture *texture = SDL_CreateTextureFromSurface(caption->target, surface);
+    if (!texture) return;
+    const SDL_Rect part = {0, 0, width, surface->h}, place = {x, y, width, surface->h};
+    SDL_RenderCopy(caption->target, texture, &part, &place);
+    SDL_DestroyTexture(texture);
+}
+
+static const SDL_Color white = {255, 255, 255, 255};
+
+void caption_draw(Caption *caption, CaptionPlace place, const char *text)
 {
     if (!caption || text[0] == '\0') return;
-    const SDL_Color white = {255, 255, 255, 255};
-    int width = 0, height = 0;
-    SDL_GetRendererOutputSize(caption->target, &width, &height);
-    if (width <= 2 * PADDING) return;
-    SDL_Surface *surface =
-        TTF_RenderUTF8_Blended_Wrapped(caption->font, text, white, (Uint32)(width - 2 * PADDING));
-    SDL_Texture *texture = surface ? SDL_CreateTextureFromSurface(caption->target, surface) : NULL;
-    if (texture) {
-        SDL_Rect ground = {0, 0, surface->w + 2 * PADDING, surface->h + 2 * PADDING};
-        if (place == CAPTION_BOTTOM) ground.y = height - ground.h;
-        SDL_Rect words = {PADDING, ground.y + PADDING, surface->w, surface->h};
-        SDL_SetRenderDrawBlendMode(caption->target, SDL_BLENDMODE_BLEND);
-        SDL_SetRenderDrawColor(caption->target, 0, 0, 0, 176);
-        SDL_RenderFillRect(caption->target, &ground);
-        SDL_RenderCopy(caption->target, texture, NULL, &words);
-        SDL_DestroyTexture(texture);
-    }
+    SDL_Point room = {0, 0};
+    SDL_GetRendererOutputSize(caption->target, &room.x, &room.y);
+    room = (SDL_Point){room.x - 2 * PADDING, room.y - 2 * PADDING};
+    if (room.x <= 0) return;
+    const int width = size_fit(caption, extent_of(text), room);
+    SDL_Surface *surface = TTF_RenderUTF8_Blended_Wrapped(caption->font, text, white, (Uint32)room.x);
+    if (!surface) return;
+    SDL_Rect ground = {0, 0, width + 2 * PADDING, surface->h + 2 * PADDING};
+    if (place == CAPTION_BOTTOM) ground.y = SDL_max(0, room.y + 2 * PADDING - ground.h);
+    caption_draw_ground(caption, ground);
+    surface_draw(caption, surface, PADDING, ground.y + PADDING, SDL_min(width, surface->w));
+    SDL_FreeSurface(surface);
+}
+
+void caption_draw_line(Caption *caption, int x, int y, const char *text)
+{
+    if (!caption) return;
+    size_set(caption, (int)(FONT_SIZE * caption->scale));
+    SDL_Surface *surface = TTF_RenderUTF8_Blended(caption->font, text, white);
+    if (!surface) return;
+    surface_draw(caption, surface, x, y, surface->w);
     SDL_FreeSurface(surface);
 }

@@ -34,7 +34,8 @@ typedef struct {
     float *distances;
     uint32_t samples; // per pixel; 0: a coarse frame
     bool complete;
-    char *summary; // of the times and what they are of, some lines
+    double largest_error; // of a heat map of errors; of other frames negative
+    char *summary;        // of the times and what they are of, some lines
 } Frame;
 
 void frame_free(Frame *frame); // and zeroes
@@ -45,6 +46,10 @@ typedef struct FrameLoop FrameLoop;
 FrameLoop *frame_loop_open(const FrameLoopOptions *options);
 // Ends the work and waits for it.
 void frame_loop_close(FrameLoop *loop);
+
+// Appends what the loop is doing where it is not rendering, such as "reading bunny.obj 41%", and sets for how
+// many seconds it has. False: it renders, or rests.
+bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds);
 
 // LOADED once the scene was read; `size` is then its image's. REFUSED: its file has a mistake, which the
 // message says, and no scene was read before.

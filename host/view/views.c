@@ -12,8 +12,6 @@ const char *const view_names[VIEW_COUNT] = {VIEW_LIST(VIEW_NAME)};
 #define VIEW_AOVS(NAME, name, aovs) aovs,
 const unsigned view_aovs[VIEW_COUNT] = {VIEW_LIST(VIEW_AOVS)};
 
-static const double ERROR_WHITE = 1e-3;
-
 void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer)
 {
     size_t row = 3 * (size_t)film->width;
@@ -80,7 +78,7 @@ double view_error(uint8_t *pixels, const Film *film, const Film *reference)
         float color[3];
         double error = pixel_error(film, reference, i);
         largest = fmax(largest, error);
-        heatmap_error_color(error, ERROR_WHITE, color);
+        heatmap_error_color(error, VIEW_ERROR_WHITE, color);
         for (size_t channel = 0; channel < 3; channel++)
             pixels[3 * i + channel] = byte_of((double)color[channel]);
     }

@@ -26,6 +26,9 @@ void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transf
 // random color for each object; the share of lights that are not occluded. Nothing hit is black.
 void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half);
 
-// A heat map of each pixel's largest difference of a channel, on a logarithmic scale: white from 1e-3 on,
-// black up to 1e-7. Returns the largest of the image.
+// The error that is white in the heat map of errors.
+#define VIEW_ERROR_WHITE 1e-3
+
+// A heat map of each pixel's largest difference of a channel, on a logarithmic scale: black up to
+// HEATMAP_DECADES powers of ten below white. Returns the largest of the image.
 double view_error(uint8_t *pixels, const Film *film, const Film *reference);

@@ -1,0 +1,248 @@
+// What the thread of the window and that of the loop pass to each other, all of it under the mutex.
+#include "host/view/frame_loop_state.h"
+
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+static atomic_bool has_news; // a request that was not yet read
+static atomic_bool first_is_due, ends;
+
+bool render_stops(void)
+{
+    return atomic_load(&ends) || (atomic_load(&has_news) && !atomic_load(&first_is_due));
+}
+
+void renders_end(bool end)
+{
+    atomic_store(&ends, end);
+    if (!end) atomic_store(&has_news, false);
+}
+
+void first_frame_set_due(bool is_due)
+{
+    atomic_store(&first_is_due, is_due);
+}
+
+bool first_frame_is_due(void)
+{
+    return atomic_load(&first_is_due);
+}
+
+void message_publish(FrameLoop *loop, char *message)
+{
+    pthread_mutex_lock(&loop->mutex);
+    char *waiting = loop->message;
+    loop->message = message;
+    if (waiting && *waiting && *message) {
+        if (asprintf(&loop->message, "%s%s", waiting, message) < 0) fault("out of memory");
+        free(message);
+    }
+    free(waiting);
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
+void messages_publish(FrameLoop *loop, MessageList *messages)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *stream = open_memstream(&text, &size);
+    if (stream) {
+        message_list_print(messages, stream);
+        fclose(stream);
+    }
+    message_list_free(messages);
+    if (text && size > 0)
+        message_publish(loop, text);
+    else
+        free(text);
+}
+
+void frame_publish(FrameLoop *loop, uint32_t samples, bool complete)
+{
+    loop->frame.number = loop->current_number;
+    loop->frame.samples = samples;
+    loop->frame.complete = complete;
+    pthread_mutex_lock(&loop->mutex);
+    Frame taken = loop->ready;
+    loop->ready = loop->frame;
+    loop->has_ready = true;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->frame = taken;
+    stage_end(loop->stage);
+    loop->options.notify(loop->options.notify_context);
+}
+
+static bool cameras_equal(const Camera *a, const Camera *b)
+{
+    return vectors_equal(a->position, b->position) && vectors_equal(a->look_at, b->look_at) &&
+           vectors_equal(a->up, b->up) && a->field_axis == b->field_axis &&
+           a->half_tangent == b->half_tangent;
+}
+
+void scene_publish(FrameLoop *loop)
+{
+    const Camera *camera = &loop->scene.camera;
+    ImageSize size = {0};
+    loop->options.choose_size(&loop->scene, &size.width, &size.height);
+    pthread_mutex_lock(&loop->mutex);
+    loop->has_camera |= loop->scene_state == SCENE_LOADING || !cameras_equal(&loop->file_camera, camera);
+    loop->file_camera = *camera;
+    loop->scene_state = SCENE_LOADED;
+    loop->scene_size = size;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
+void refusal_publish(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    if (loop->scene_state == SCENE_LOADING) loop->scene_state = SCENE_REFUSED;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
+void files_changed(void *context)
+{
+    FrameLoop *loop = context;
+    pthread_mutex_lock(&loop->mutex);
+    loop->reloads = true;
+    atomic_store(&has_news, true);
+    pthread_cond_signal(&loop->changed);
+    pthread_mutex_unlock(&loop->mutex);
+}
+
+bool probe_take(FrameLoop *loop, uint32_t pixel[2])
+{
+    pthread_mutex_lock(&loop->mutex);
+    const bool has_probe = loop->has_probe;
+    memcpy(pixel, loop->probe, sizeof loop->probe);
+    loop->has_probe = false;
+    pthread_mutex_unlock(&loop->mutex);
+    return has_probe;
+}
+
+void facts_publish(FrameLoop *loop, char *facts)
+{
+    pthread_mutex_lock(&loop->mutex);
+    free(loop->facts);
+    loop->facts = facts;
+    pthread_mutex_unlock(&loop->mutex);
+    loop->options.notify(loop->options.notify_context);
+}
+
+Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
+{
+    pthread_mutex_lock(&loop->mutex);
+    while (!loop->quits && !loop->reloads && loop->request_number == loop->current_number &&
+           !(can_save && loop->save_path) && !(loop->renderer && loop->has_probe))
+        pthread_cond_wait(&loop->changed, &loop->mutex);
+    Work work = WORK_SAVE;
+    if (loop->quits) {
+        work = WORK_END;
+    } else if (loop->reloads) {
+        work = WORK_RELOAD;
+        loop->reloads = false;
+    } else if (loop->request_number != loop->current_number) {
+        work = WORK_RENDER;
+        loop->current = loop->request;
+        loop->current_number = loop->request_number;
+    } else if (loop->renderer && loop->has_probe) {
+        work = WORK_PROBE;
+    } else {
+        *save_path = loop->save_path;
+        loop->save_path = NULL;
+    }
+    atomic_store(&has_news, loop->request_number != loop->current_number);
+    pthread_mutex_unlock(&loop->mutex);
+    return work;
+}
+
+SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size)
+{
+    pthread_mutex_lock(&loop->mutex);
+    SceneState state = loop->scene_state;
+    *size = loop->scene_size;
+    pthread_mutex_unlock(&loop->mutex);
+    return state;
+}
+
+unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)
+{
+    pthread_mutex_lock(&loop->mutex);
+    loop->request = *request;
+    unsigned number = ++loop->request_number;
+    atomic_store(&has_news, true);
+    pthread_cond_signal(&loop->changed);
+    pthread_mutex_unlock(&loop->mutex);
+    return number;
+}
+
+void frame_loop_save(FrameLoop *loop, const char *path)
+{
+    pthread_mutex_lock(&loop->mutex);
+    free(loop->save_path);
+    loop->save_path = memory_copy_text(path);
+    pthread_cond_signal(&loop->changed);
+    pthread_mutex_unlock(&loop->mutex);
+}
+
+void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
+{
+    pthread_mutex_lock(&loop->mutex);
+    loop->probe[0] = x;
+    loop->probe[1] = y;
+    loop->has_probe = true;
+    pthread_cond_signal(&loop->changed);
+    pthread_mutex_unlock(&loop->mutex);
+}
+
+char *frame_loop_take_facts(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    char *facts = loop->facts;
+    loop->facts = NULL;
+    pthread_mutex_unlock(&loop->mutex);
+    return facts;
+}
+
+bool frame_loop_take(FrameLoop *loop, Frame *frame)
+{
+    pthread_mutex_lock(&loop->mutex);
+    bool is_new = loop->has_ready;
+    if (is_new) {
+        Frame shown = *frame;
+        *frame = loop->ready;
+        loop->ready = shown;
+        loop->has_ready = false;
+    }
+    pthread_mutex_unlock(&loop->mutex);
+    return is_new;
+}
+
+bool frame_loop_take_camera(FrameLoop *loop, Camera *camera)
+{
+    pthread_mutex_lock(&loop->mutex);
+    bool is_new = loop->has_camera;
+    loop->has_camera = false;
+    if (is_new) *camera = loop->file_camera;
+    pthread_mutex_unlock(&loop->mutex);
+    return is_new;
+}
+
+char *frame_loop_take_message(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    char *message = loop->message;
+    loop->message = NULL;
+    pthread_mutex_unlock(&loop->mutex);
+    return message;
+}
+
+bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds)
+{
+    return stage_write(loop->stage, text, seconds);
+}

@@ -1,0 +1,193 @@
+// Renders requests: while the camera moves a coarse frame, then the image in passes.
+#include "host/view/frame_loop_state.h"
+
+#include "host/base/clock.h"
+#include "host/view/pixel_facts.h"
+#include <math.h>
+#include <time.h>
+
+enum { REST_NANOSECONDS = 150 * 1000 * 1000 };
+
+static bool is_last(const Film *film, const Film *band)
+{
+    return band->first_row + band->height == film->height;
+}
+
+void probe_answer(FrameLoop *loop)
+{
+    uint32_t pixel[2];
+    if (!probe_take(loop, pixel)) return;
+    const PixelView view = {loop->renderer, &loop->scene, loop->options.scene_path, loop->current.size,
+                            loop->settings.bounce_count};
+    facts_publish(loop, pixel_facts(&view, pixel[0], pixel[1]));
+}
+
+static bool preview_take(void *context, const Film *band, double fraction_done)
+{
+    (void)fraction_done;
+    film_copy_band(context, band);
+    return true;
+}
+
+static bool pass_take(void *context, const Film *band, uint32_t samples)
+{
+    FrameLoop *loop = context;
+    film_copy_band(&loop->film, band);
+    if (!first_frame_is_due()) probe_answer(loop);
+    if (!is_last(&loop->film, band)) return true;
+    const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
+    if (is_first && loop->current.is_moving && !loop->has_preview)
+        preview_note(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
+                     (double)film_pixel_count(&loop->film));
+    if (is_first && view_aovs[loop->current.view]) return true; // what it is made of is yet to come
+    frame_fill(loop, samples);
+    if (!is_first) distances_fill(loop);
+    bool complete = !is_first && samples == loop->settings.sample_count && loop->current.view != VIEW_ERROR;
+    frame_publish(loop, samples, complete);
+    first_frame_set_due(false);
+    return true;
+}
+
+static void film_fit(FrameLoop *loop, unsigned aovs)
+{
+    Film *film = &loop->film;
+    const uint32_t light_count = (uint32_t)loop->scene.lights.count;
+    bool fits = film->width == loop->settings.width && film->height == loop->settings.height &&
+                film->light_count == light_count;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        fits = fits && (film->layers[layer] || !(aovs >> layer & 1));
+    if (fits) return;
+    film_free(film);
+    *film = film_allocate(loop->settings.width, loop->settings.height, light_count, aovs);
+}
+
+void renderers_close(FrameLoop *loop)
+{
+    renderer_close(loop->renderer);
+    renderer_close(loop->reference);
+    loop->renderer = loop->reference = NULL;
+}
+
+void failure_publish(FrameLoop *loop)
+{
+    message_publish(loop, compute_failure_text(&loop->compute));
+    renderers_close(loop);
+    compute_close(&loop->compute);
+}
+
+// Several threads do what one did.
+double move_guess(const Renderer *renderer)
+{
+    return renderer_report(renderer)->flatten_seconds / 2;
+}
+
+// Opens or moves the renderer for an image of the divisor. False, with a message published, if it cannot.
+static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples, bool is_preview)
+{
+    double start = clock_seconds();
+    RenderSettings *settings = &loop->settings;
+    const ImageSize size = loop->current.size;
+    settings->width = settings->region_width = (size.width + divisor - 1) / divisor;
+    settings->height = settings->region_height = (size.height + divisor - 1) / divisor;
+    settings->sample_count = samples;
+    settings->is_preview = is_preview;
+    loop->scene.camera = loop->current.camera;
+    MessageList messages = {0};
+    bool prepared = true;
+    if (loop->renderer && settings->precision != loop->current.precision) renderers_close(loop);
+    settings->precision = loop->current.precision;
+    if (loop->renderer) {
+        prepared = renderer_move(loop->renderer, &loop->scene, settings, &messages);
+        renderer_report_restart(loop->renderer);
+    } else {
+        if (!loop->compute.context) compute_open(&loop->compute, loop->options.device);
+        loop->renderer = renderer_open(&loop->compute, &loop->scene, settings, &messages);
+        prepared = loop->renderer != NULL;
+        if (prepared) loop->expected_move = move_guess(loop->renderer);
+        start = clock_seconds();
+    }
+    messages_publish(loop, &messages);
+    if (!compute_ok(&loop->compute)) failure_publish(loop);
+    loop->render_start = clock_seconds();
+    loop->move_seconds = loop->render_start - start;
+    if (!is_preview) loop->expected_move = fmax(0.7 * loop->expected_move, loop->move_seconds);
+    return prepared;
+}
+
+// Large scenes take long to move to another eye: that waits until no other request has come for a while.
+// False: one came.
+static bool camera_rests(FrameLoop *loop)
+{
+    if (loop->expected_move > PREVIEW_SECONDS) {
+        struct timespec until;
+        clock_gettime(CLOCK_MONOTONIC, &until);
+        until.tv_nsec += REST_NANOSECONDS;
+        until.tv_sec += until.tv_nsec / 1000000000;
+        until.tv_nsec %= 1000000000;
+        pthread_mutex_lock(&loop->mutex);
+        while (!render_stops() && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
+            continue;
+        pthread_mutex_unlock(&loop->mutex);
+    }
+    return !render_stops();
+}
+
+static bool preview_render(FrameLoop *loop)
+{
+    const unsigned aovs = view_aovs[loop->current.view];
+    if (!renderer_prepare(loop, loop->divisor, 1, true)) return false;
+    film_fit(loop, aovs);
+    first_frame_set_due(true);
+    if (!renderer_render(loop->renderer, aovs, preview_take, &loop->film)) return false;
+    preview_note(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
+                 (double)film_pixel_count(&loop->film));
+    frame_fill(loop, 1);
+    frame_publish(loop, 0, false);
+    first_frame_set_due(false);
+    return camera_rests(loop);
+}
+
+// Replaces the image by the heat map of its errors. False: stopped, or failed.
+static bool errors_render(FrameLoop *loop)
+{
+    RenderSettings settings = loop->settings;
+    settings.precision = PRECISION_DOUBLE;
+    settings.lanes = 0;
+    MessageList messages = {0};
+    bool prepared = true;
+    if (loop->reference)
+        prepared = renderer_move(loop->reference, &loop->scene, &settings, &messages);
+    else
+        prepared =
+            (loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages)) != NULL;
+    messages_publish(loop, &messages);
+    Film film;
+    if (!prepared || !renderer_render_film(loop->reference, 0, &film)) return false;
+    frame_fill(loop, 1);
+    loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &film);
+    film_free(&film);
+    distances_fill(loop);
+    frame_publish(loop, 1, true);
+    return true;
+}
+
+bool request_render(FrameLoop *loop)
+{
+    const ImageSize size = loop->current.size;
+    const View view = loop->current.view;
+    const unsigned aovs = AOV_T | view_aovs[view];
+    const bool is_moving = loop->current.is_moving;
+    loop->divisor = is_moving ? preview_divisor(&loop->preview, size.width, size.height) : 1;
+    loop->has_preview = is_moving && (loop->divisor > 1 || loop->expected_move > PREVIEW_SECONDS);
+    const uint32_t samples = view == VIEW_COLOR ? loop->options.settings.sample_count : 1;
+    bool complete = (!loop->has_preview || preview_render(loop)) && renderer_prepare(loop, 1, samples, false);
+    if (complete) {
+        film_fit(loop, aovs);
+        first_frame_set_due(is_moving && !loop->has_preview);
+        complete = renderer_accumulate(loop->renderer, aovs, pass_take, loop) &&
+                   (view != VIEW_ERROR || errors_render(loop));
+        first_frame_set_due(false);
+    }
+    if (loop->renderer && !compute_ok(&loop->compute)) failure_publish(loop);
+    return complete;
+}

@@ -1,0 +1,45 @@
+#include "host/view/legend.h"
+
+#include "host/image/heatmap.h"
+#include "host/view/views.h"
+#include <math.h>
+#include <stdio.h>
+
+// In characters.
+enum { LABEL_WIDTH = 6, BAR_WIDTH = 2, LEGEND_WIDTH = 17 };
+
+static void bar_draw(SDL_Renderer *target, SDL_Rect place)
+{
+    SDL_SetRenderDrawBlendMode(target, SDL_BLENDMODE_NONE);
+    for (int y = 0; y < place.h; y++) {
+        float color[3];
+        Uint8 bytes[3];
+        heatmap_color(1 - (y + 0.5) / place.h, color);
+        for (int channel = 0; channel < 3; channel++)
+            bytes[channel] = (Uint8)lroundf(255 * color[channel]);
+        SDL_SetRenderDrawColor(target, bytes[0], bytes[1], bytes[2], 255);
+        SDL_RenderDrawLine(target, place.x, place.y + y, place.x + place.w - 1, place.y + y);
+    }
+}
+
+void legend_draw(Caption *caption, SDL_Renderer *target, double largest_error)
+{
+    const SDL_Point character = caption_character(caption);
+    const int line = character.y, decade = 3 * line / 2, height = HEATMAP_DECADES * decade;
+    SDL_Rect ground = {0, 0, LEGEND_WIDTH * character.x, height + 3 * line};
+    int width, window_height;
+    SDL_GetRendererOutputSize(target, &width, &window_height);
+    if (character.x == 0 || ground.w > width / 2 || ground.h > window_height / 2) return;
+    ground.x = width - ground.w;
+    ground.y = window_height - ground.h;
+    caption_draw_ground(caption, ground);
+    const int left = ground.x + character.x, top = ground.y + line;
+    char text[32];
+    for (int i = 0; i <= HEATMAP_DECADES; i++) {
+        snprintf(text, sizeof text, "1e%.0f", log10(VIEW_ERROR_WHITE) - i);
+        caption_draw_line(caption, left, top + i * decade - line / 2, text);
+    }
+    bar_draw(target, (SDL_Rect){left + LABEL_WIDTH * character.x, top, BAR_WIDTH * character.x, height});
+    snprintf(text, sizeof text, "largest %.2g", largest_error);
+    caption_draw_line(caption, left, top + height + 3 * line / 4, text);
+}

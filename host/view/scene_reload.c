@@ -1,0 +1,106 @@
+// Reads the scene, for the first time and when its files change, and writes the camera into it.
+#include "host/view/frame_loop_state.h"
+
+#include "host/base/memory.h"
+#include "host/base/output.h"
+#include "host/view/camera_file.h"
+#include <stdlib.h>
+#include <string.h>
+
+// The scene's file is watched before it is read, and so are those that it names: no change is missed. They
+// stay watched where the scene has a mistake, which may lie in one of them.
+static void file_watch(void *context, const char *path)
+{
+    const FrameLoop *loop = context;
+    watch_add(loop->watch, path);
+}
+
+// Replaces the renderer by one of the scene. False: the scene cannot be rendered, and the last one stays.
+static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *messages)
+{
+    if (loop->current_number == 0) return true; // no image was asked for
+    if (!loop->compute.context)
+        compute_open(&loop->compute, loop->options.device); // the device had failed
+    else if (!loop->renderer)
+        return true; // the last one cannot be rendered either
+    Scene seen = *scene;
+    seen.camera = loop->current.camera;
+    Renderer *renderer = renderer_open(&loop->compute, &seen, &loop->settings, messages);
+    if (!renderer && compute_ok(&loop->compute)) return false;
+    renderers_close(loop);
+    loop->renderer = renderer;
+    if (renderer) loop->expected_move = move_guess(renderer);
+    if (!renderer) compute_close(&loop->compute); // the image, which is due, opens it again or says why not
+    return true;
+}
+
+bool is_own_write(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    Text written = loop->written;
+    loop->written = (Text){0};
+    pthread_mutex_unlock(&loop->mutex);
+    Text text = {0};
+    MessageList messages = {0};
+    bool same = written.count > 0 && text_read_file(&text, loop->options.scene_path, &messages) &&
+                text.count == written.count && memcmp(text.items, written.items, text.count) == 0;
+    message_list_free(&messages);
+    text_free(&text);
+    text_free(&written);
+    return same;
+}
+
+bool scene_reload(FrameLoop *loop)
+{
+    const bool was_mistaken = loop->is_mistaken;
+    MessageList messages = {0};
+    SceneOptions options = loop->options.scene_options;
+    options.file_named = file_watch;
+    options.context = loop;
+    options.stage = loop->stage;
+    Scene scene;
+    watch_only(loop->watch, loop->options.scene_path);
+    bool loaded = scene_load(&scene, loop->options.scene_path, &options, &messages);
+    if (loaded && !renderer_renew(loop, &scene, &messages)) {
+        scene_free(&scene);
+        loaded = false;
+    }
+    loop->is_mistaken = !loaded;
+    if (was_mistaken && messages.count == 0) message_publish(loop, memory_copy_text(""));
+    messages_publish(loop, &messages);
+    if (!loaded) {
+        refusal_publish(loop);
+        return false;
+    }
+    scene_free(&loop->scene);
+    loop->scene = scene;
+    scene_publish(loop);
+    return true;
+}
+
+bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages)
+{
+    const char *path = loop->options.scene_path;
+    Text old = {0}, text = {0};
+    if (!text_read_file(&old, path, messages)) return false;
+    const Source source = {.file = path, .bytes = text_c(&old), .length = old.count};
+    OutputFile output;
+    bool done = camera_replace(&text, &source, camera, messages);
+    text_free(&old);
+    if (!done || !output_open(&output, path, messages)) {
+        text_free(&text);
+        return false;
+    }
+    done = output_write(&output, text.items, text.count, messages) && output_finish(&output, messages);
+    pthread_mutex_lock(&loop->mutex);
+    if (done) {
+        text_free(&loop->written);
+        loop->written = text;
+        loop->file_camera = *camera;
+    }
+    pthread_mutex_unlock(&loop->mutex);
+    if (done) return output_commit(&output, messages);
+    text_free(&text);
+    output_abandon(&output);
+    return false;
+}

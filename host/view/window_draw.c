@@ -1,0 +1,109 @@
+// Draws the window: the frame, and text over it.
+#include "host/view/window_state.h"
+
+#include "host/view/keys.h"
+#include "host/view/legend.h"
+
+static const double STAGE_SECONDS = 0.3; // what takes less is not shown
+
+#define HELP_ROW(input, effect) {input, effect},
+static const struct {
+    const char *input, *effect;
+} help_rows[] = {VIEW_KEY_LIST(HELP_ROW)};
+
+static void title_set(const Window *window)
+{
+    const uint32_t count = window->view == VIEW_COLOR ? window->options->frames.settings.sample_count : 1;
+    Text title = {0};
+    // ASCII: in the C locale SDL sets no other title
+    text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->view],
+                 precision_names[window->precision], window->size.width, window->size.height);
+    if (!window->frame.pixels || window->frame.number < window->image_request)
+        text_appendf(&title, ", preparing");
+    else if (window->frame.samples < count)
+        text_appendf(&title, ", %u of %u samples", window->frame.samples, count);
+    else
+        text_appendf(&title, ", %u %s", count, count == 1 ? "sample" : "samples");
+    text_appendf(&title, " - glint (H: help)");
+    SDL_SetWindowTitle(window->window, text_c(&title));
+    text_free(&title);
+}
+
+void frame_show(Window *window)
+{
+    const Frame *frame = &window->frame;
+    int width = (int)frame->width, height = (int)frame->height;
+    if (!window->texture || window->texture_width != width || window->texture_height != height) {
+        if (window->texture) SDL_DestroyTexture(window->texture);
+        window->texture = SDL_CreateTexture(window->target, SDL_PIXELFORMAT_RGB24,
+                                            SDL_TEXTUREACCESS_STREAMING, width, height);
+        window->texture_width = width;
+        window->texture_height = height;
+    }
+    if (window->texture) SDL_UpdateTexture(window->texture, NULL, frame->pixels, 3 * width);
+    window->redraws = true;
+}
+
+void stage_show(Window *window)
+{
+    Text text = {0};
+    double seconds;
+    if (frame_loop_stage(window->frames, &text, &seconds) && seconds >= STAGE_SECONDS)
+        text_appendf(&text, ", %.0f s", seconds);
+    else
+        text_free(&text);
+    window->redraws |= text.count > 0 || window->stage.count > 0;
+    text_free(&window->stage);
+    window->stage = text;
+}
+
+static void help_draw(const Window *window)
+{
+    Text help = {0};
+    for (size_t i = 0; i < sizeof help_rows / sizeof *help_rows; i++)
+        text_appendf(&help, "%s%-12s  %s", i > 0 ? "\n" : "", help_rows[i].input, help_rows[i].effect);
+    caption_draw(window->caption, CAPTION_TOP, text_c(&help));
+    text_free(&help);
+}
+
+// The times, and what the pixel under the cursor sees.
+static void facts_draw(const Window *window)
+{
+    Text text = {0};
+    if (window->shows_times && window->frame.summary) text_appendf(&text, "%s", window->frame.summary);
+    if (text.count > 0 && window->frame.largest_error >= 0)
+        text_appendf(&text, "\nlargest error against double: %.3g", window->frame.largest_error);
+    if (window->shows_facts && window->facts)
+        text_appendf(&text, "%s%s", text.count > 0 ? "\n" : "", window->facts);
+    caption_draw(window->caption, CAPTION_TOP, text_c(&text));
+    text_free(&text);
+}
+
+// The message, and what keeps the next frame waiting.
+static void message_draw(const Window *window)
+{
+    Text text = {0};
+    if (window->message) text_appendf(&text, "%s", window->message);
+    if (text.count > 0 && text.items[text.count - 1] != '\n') text_appendf(&text, "\n");
+    text_appendf(&text, "%s", text_c(&window->stage));
+    if (text.count > 0 && text.items[text.count - 1] == '\n') text.items[text.count - 1] = '\0';
+    caption_draw(window->caption, CAPTION_BOTTOM, text_c(&text));
+    text_free(&text);
+}
+
+void window_draw(Window *window)
+{
+    SDL_SetRenderDrawColor(window->target, 0, 0, 0, 255);
+    SDL_RenderClear(window->target);
+    if (window->texture) SDL_RenderCopy(window->target, window->texture, NULL, NULL);
+    if (window->frame.pixels && window->frame.largest_error >= 0)
+        legend_draw(window->caption, window->target, window->frame.largest_error);
+    if (window->shows_help)
+        help_draw(window);
+    else
+        facts_draw(window);
+    message_draw(window);
+    SDL_RenderPresent(window->target);
+    title_set(window);
+    window->redraws = false;
+}

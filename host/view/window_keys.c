@@ -1,0 +1,142 @@
+// What the keys do.
+#include "host/view/window_state.h"
+
+#include "host/base/memory.h"
+#include "host/base/text.h"
+#include "host/view/camera_yaml.h"
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const double ARROW_ANGLE = 5 * M_PI / 180;
+
+static void arrow_turn(Window *window, double yaw, double pitch)
+{
+    camera_orbit(&window->camera, window->camera.look_at, yaw * ARROW_ANGLE, pitch * ARROW_ANGLE);
+    window->camera_changed = true;
+}
+
+static void camera_write(Window *window)
+{
+    MessageList messages = {0};
+    char *text = NULL;
+    size_t size;
+    FILE *stream = open_memstream(&text, &size);
+    if (!stream) return;
+    if (frame_loop_write_camera(window->frames, &window->camera, &messages)) {
+        window->file_camera = window->camera;
+        fprintf(stream, "camera written to %s\n", window->options->frames.scene_path);
+    }
+    message_list_print(&messages, stream);
+    message_list_free(&messages);
+    fclose(stream);
+    fputs(text, stderr);
+    message_show(window, text);
+}
+
+static void camera_print(Window *window)
+{
+    Text yaml = {0};
+    camera_write_yaml(&yaml, &window->camera, (double)window->size.width / window->size.height);
+    fputs(text_c(&yaml), stdout);
+    fflush(stdout);
+    message_show(window, yaml.items);
+    if (window->options->writes_camera) camera_write(window);
+}
+
+// Saves as SCENE-1.png, or with the first number that is free.
+static void image_save(Window *window, const char *ending)
+{
+    const char *name = scene_name(window), *dot = strrchr(name, '.');
+    Text path = {0};
+    int number = 0;
+    do {
+        text_free(&path);
+        text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
+    } while (access(text_c(&path), F_OK) == 0);
+    request_send(window); // what is saved is what was asked for before
+    frame_loop_save(window->frames, text_c(&path));
+    text_free(&path);
+}
+
+static void facts_toggle(Window *window)
+{
+    int x, y;
+    SDL_GetMouseState(&x, &y);
+    position_set(window, window->hover, x, y);
+    window->shows_facts = window->facts_are_due = window->prints_facts = !window->shows_facts;
+    free(window->facts);
+    window->facts = NULL;
+    window->redraws = true;
+}
+
+static void full_screen_toggle(const Window *window)
+{
+    bool is_full = SDL_GetWindowFlags(window->window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
+    SDL_SetWindowFullscreen(window->window, is_full ? 0 : SDL_WINDOW_FULLSCREEN_DESKTOP);
+}
+
+void key_press(Window *window, const SDL_KeyboardEvent *event)
+{
+    if (window->drag == DRAG_LOOK && event->keysym.sym != SDLK_ESCAPE) return; // they fly
+    message_show(window, NULL);
+    switch (event->keysym.sym) {
+    case SDLK_LEFT:
+        arrow_turn(window, -1, 0);
+        break;
+    case SDLK_RIGHT:
+        arrow_turn(window, 1, 0);
+        break;
+    case SDLK_UP:
+        arrow_turn(window, 0, -1);
+        break;
+    case SDLK_DOWN:
+        arrow_turn(window, 0, 1);
+        break;
+    case SDLK_r:
+        window->camera = window->file_camera;
+        window->camera_changed = true;
+        break;
+    case SDLK_c:
+        camera_print(window);
+        break;
+    case SDLK_s:
+        if (window->view == VIEW_COLOR)
+            image_save(window, event->keysym.mod & KMOD_SHIFT ? "exr" : "png");
+        else
+            message_show(window, memory_copy_text("only the color view is saved: V changes the view"));
+        break;
+    case SDLK_f:
+        full_screen_toggle(window);
+        break;
+    case SDLK_v: {
+        unsigned step = event->keysym.mod & KMOD_SHIFT ? VIEW_COUNT - 1 : 1;
+        window->view = (View)((window->view + step) % VIEW_COUNT);
+        window->image_changed = true;
+        break;
+    }
+    case SDLK_1:
+    case SDLK_2:
+    case SDLK_3:
+    case SDLK_4:
+    case SDLK_5:
+        window->precision = (Precision)(event->keysym.sym - SDLK_1);
+        window->image_changed = true;
+        break;
+    case SDLK_t:
+        window->shows_times = !window->shows_times;
+        break;
+    case SDLK_i:
+        facts_toggle(window);
+        break;
+    case SDLK_h:
+        window->shows_help = !window->shows_help;
+        break;
+    case SDLK_ESCAPE:
+        window->closes = true;
+        break;
+    default:
+        break;
+    }
+}

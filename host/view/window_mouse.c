@@ -1,0 +1,107 @@
+// What the mouse does with the camera, and the keys that fly while it looks around.
+#include "host/view/window_state.h"
+
+#include "host/base/clock.h"
+#include <string.h>
+
+static const double WHEEL_FACTOR = 0.9; // of the distance, per notch
+static const double FLY_SPEED = 1;      // distances to the point looked at, per second
+
+void position_set(const Window *window, double position[2], int x, int y)
+{
+    int width, height;
+    SDL_GetWindowSize(window->window, &width, &height);
+    position[0] = x * (double)window->size.width / width;
+    position[1] = y * (double)window->size.height / height;
+}
+
+static double target_distance(const Window *window)
+{
+    return vector_length(vector_subtract(window->camera.look_at, window->camera.position));
+}
+
+// The distance to what is seen in a pixel, where the shown image is of this camera and knows it; else 0.
+static double distance_known(const Window *window, const double at[2])
+{
+    const Frame *frame = &window->frame;
+    bool is_inside = at[0] >= 0 && at[0] < frame->width && at[1] >= 0 && at[1] < frame->height;
+    bool is_current = frame->number == window->request && !window->camera_changed && !window->image_changed;
+    if (!frame->distances || !is_inside || !is_current) return 0;
+    float distance = frame->distances[(size_t)at[1] * frame->width + (size_t)at[0]];
+    return distance < INFINITY ? (double)distance : 0;
+}
+
+// The point seen in a pixel: where that is not known, the point that was last picked there, or one as far
+// away as the point looked at.
+static void pivot_pick(Window *window, const double at[2])
+{
+    double distance = distance_known(window, at);
+    if (distance <= 0 && memcmp(at, window->pivot_at, sizeof window->pivot_at) == 0) return;
+    if (distance <= 0) distance = target_distance(window);
+    Vector3 ray = camera_ray(&window->camera, window->size, at[0], at[1]);
+    window->pivot = vector_add(window->camera.position, vector_scale(ray, distance));
+    memcpy(window->pivot_at, at, sizeof window->pivot_at);
+}
+
+void drag_begin(Window *window, const SDL_MouseButtonEvent *event)
+{
+    position_set(window, window->mouse, event->x, event->y);
+    pivot_pick(window, window->mouse);
+    if (event->button == SDL_BUTTON_LEFT && event->clicks == 2) {
+        camera_look_at(&window->camera, window->pivot);
+        window->camera_changed = true;
+        return;
+    }
+    bool pans = event->button == SDL_BUTTON_MIDDLE || SDL_GetModState() & KMOD_SHIFT;
+    window->drag = event->button == SDL_BUTTON_RIGHT ? DRAG_LOOK : pans ? DRAG_PAN : DRAG_ORBIT;
+    window->pan_distance = vector_length(vector_subtract(window->pivot, window->camera.position));
+    window->flown_seconds = clock_seconds();
+}
+
+void drag_move(Window *window, const SDL_MouseMotionEvent *event)
+{
+    if (window->drag == DRAG_NONE) return;
+    double to[2];
+    position_set(window, to, event->x, event->y);
+    double right = to[0] - window->mouse[0], down = to[1] - window->mouse[1];
+    Camera *camera = &window->camera;
+    if (window->drag == DRAG_ORBIT) {
+        double angle = M_PI / window->size.height;
+        camera_orbit(camera, window->pivot, -right * angle, -down * angle);
+    } else if (window->drag == DRAG_PAN) {
+        camera_pan(camera, window->size, window->pan_distance, window->mouse, to);
+    } else {
+        // what is ahead follows the mouse's way
+        double tangent = camera->half_tangent * 2 /
+                         (camera->field_axis == FIELD_VERTICAL ? window->size.height : window->size.width);
+        double angle = fmin(tangent, M_PI / window->size.height);
+        camera_orbit(camera, camera->position, -right * angle, -down * angle);
+    }
+    memcpy(window->mouse, to, sizeof to);
+    window->camera_changed = true;
+}
+
+void wheel_turn(Window *window, const SDL_MouseWheelEvent *event)
+{
+    int x, y;
+    double at[2];
+    SDL_GetMouseState(&x, &y);
+    position_set(window, at, x, y);
+    pivot_pick(window, at);
+    camera_dolly(&window->camera, window->pivot, pow(WHEEL_FACTOR, (double)event->preciseY));
+    window->camera_changed = true;
+}
+
+void fly(Window *window)
+{
+    double now = clock_seconds(), seconds = now - window->flown_seconds;
+    window->flown_seconds = now;
+    const Uint8 *keys = SDL_GetKeyboardState(NULL);
+    int forward = keys[SDL_SCANCODE_W] - keys[SDL_SCANCODE_S];
+    int right = keys[SDL_SCANCODE_D] - keys[SDL_SCANCODE_A];
+    int up = keys[SDL_SCANCODE_E] - keys[SDL_SCANCODE_Q];
+    if (forward == 0 && right == 0 && up == 0) return;
+    double step = FLY_SPEED * target_distance(window) * seconds;
+    camera_fly(&window->camera, forward * step, right * step, up * step);
+    window->camera_changed = true;
+}

@@ -1,0 +1,68 @@
+// The state of the window, and what the files that work on it have from one another.
+#pragma once
+
+#include "host/view/caption.h"
+#include "host/view/window.h"
+#include <SDL.h>
+
+typedef enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN, DRAG_LOOK } Drag;
+
+typedef struct {
+    const WindowOptions *options;
+    SDL_Window *window;
+    SDL_Renderer *target;
+    SDL_Texture *texture; // the frame's pixels
+    int texture_width, texture_height;
+    Caption *caption;
+    FrameLoop *frames;
+    Uint32 frame_event;
+
+    ImageSize size;             // in pixels, which a point of the window may have several of
+    Camera camera, file_camera; // the view's, and the scene's own
+    View view;
+    Precision precision;
+    bool camera_changed, image_changed;
+    bool is_loaded;         // the scene
+    unsigned request;       // the last one
+    unsigned image_request; // the last one for another view, precision or size
+    Frame frame;
+
+    Drag drag;
+    double mouse[2], pan_distance; // in pixels
+    Vector3 pivot;                 // the point that was last picked, and where
+    double pivot_at[2];
+    double flown_seconds; // the moment up to which the camera has flown
+
+    char *message;   // at the bottom, until the next key
+    Text stage;      // what keeps the next frame waiting; empty: not shown
+    double hover[2]; // the cursor, in pixels
+    char *facts;     // of the pixel there; NULL: not shown, or not known yet
+    bool shows_facts, facts_are_due, prints_facts;
+    unsigned facts_request; // whose image they are of
+    bool shows_help, shows_times, redraws, closes;
+} Window;
+
+// window.c
+const char *scene_name(const Window *window);
+// Takes the message; NULL shows none.
+void message_show(Window *window, char *message);
+// Asks for an image if the last one asked for is not what should be shown.
+void request_send(Window *window);
+
+// window_mouse.c
+// Pixels of a position in the window's points.
+void position_set(const Window *window, double position[2], int x, int y);
+void drag_begin(Window *window, const SDL_MouseButtonEvent *event);
+void drag_move(Window *window, const SDL_MouseMotionEvent *event);
+void wheel_turn(Window *window, const SDL_MouseWheelEvent *event);
+// Moves the camera as the keys have been held since the last call.
+void fly(Window *window);
+
+// window_keys.c
+void key_press(Window *window, const SDL_KeyboardEvent *event);
+
+// window_draw.c
+void frame_show(Window *window); // from the next drawing on
+// Takes what the loop is doing, if it takes long.
+void stage_show(Window *window);
+void window_draw(Window *window);
