@@ -22,6 +22,12 @@ void probe_answer(FrameLoop *loop)
     facts_publish(loop, pixel_facts(&view, pixel[0], pixel[1]));
 }
 
+static void rendering_show(FrameLoop *loop, const Film *band)
+{
+    stage_begin(loop->stage, "rendering", NULL, loop->film.height);
+    stage_set(loop->stage, band->first_row + band->height);
+}
+
 static bool preview_take(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
@@ -34,6 +40,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     FrameLoop *loop = context;
     film_copy_band(&loop->film, band);
     if (!first_frame_is_due()) probe_answer(loop);
+    if (samples == 1) rendering_show(loop, band);
     if (!is_last(&loop->film, band)) return true;
     const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
     if (is_first && loop->current.is_moving && !loop->has_preview)
@@ -147,6 +154,20 @@ static bool preview_render(FrameLoop *loop)
     return camera_rests(loop);
 }
 
+typedef struct {
+    FrameLoop *loop;
+    Film film;
+} Reference;
+
+static bool reference_take(void *context, const Film *band, double fraction_done)
+{
+    (void)fraction_done;
+    Reference *reference = context;
+    film_copy_band(&reference->film, band);
+    rendering_show(reference->loop, band);
+    return true;
+}
+
 // Replaces the image by the heat map of its errors. False: stopped, or failed.
 static bool errors_render(FrameLoop *loop)
 {
@@ -161,14 +182,17 @@ static bool errors_render(FrameLoop *loop)
         prepared =
             (loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages)) != NULL;
     messages_publish(loop, &messages);
-    Film film;
-    if (!prepared || !renderer_render_film(loop->reference, 0, &film)) return false;
-    frame_fill(loop, 1);
-    loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &film);
-    film_free(&film);
-    distances_fill(loop);
-    frame_publish(loop, 1, true);
-    return true;
+    if (!prepared) return false;
+    Reference reference = {loop, film_allocate(settings.width, settings.height, loop->film.light_count, 0)};
+    const bool done = renderer_render(loop->reference, 0, reference_take, &reference);
+    if (done) {
+        frame_fill(loop, 1);
+        loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &reference.film);
+        distances_fill(loop);
+        frame_publish(loop, 1, true);
+    }
+    film_free(&reference.film);
+    return done;
 }
 
 bool request_render(FrameLoop *loop)
