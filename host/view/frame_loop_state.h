@@ -16,23 +16,22 @@ struct FrameLoop {
     // under the mutex
     FrameRequest request;
     unsigned request_number;
-    bool quits;
-    bool reloads; // the scene's files have changed, or have not been read
     SceneState scene_state;
     ImageSize scene_size;
     char *save_path, *message;
     Frame ready;
-    bool has_ready;
     Camera file_camera;
-    bool has_camera;
     uint32_t probe[2]; // a pixel
-    bool has_probe;
-    char *facts;  // of the last one
-    Text written; // into the scene's file, and not yet noticed
+    char *facts;       // of the last one
+    Text written;      // into the scene's file, and not yet noticed
+    bool has_ready, has_camera, has_probe, quits;
+    bool reloads; // the scene's files have changed, or have not been read
 
     // the thread's own
+    bool is_mistaken; // the scene's file, as it is now
+    bool has_preview; // the request's first frame is coarse, or of arrays that another eye saw
+    uint32_t divisor; // of that
     Scene scene;      // with the request's camera
-    bool is_mistaken; // its file, as it is now
     Watch *watch;
     RenderSettings settings;
     Compute compute;
@@ -40,8 +39,6 @@ struct FrameLoop {
     Renderer *reference; // in double, of the view of errors; NULL: not open
     FrameRequest current;
     unsigned current_number;
-    bool has_preview; // its first frame, coarse or of arrays that another eye saw
-    uint32_t divisor; // of that
     double move_seconds, render_start;
     double expected_move; // to another eye, in seconds: of the scene as it is, little by little forgotten
     Film film;            // of the image or the coarse frame: sums of samples, at the end their mean
