@@ -4,7 +4,7 @@
 //
 // Everything is exact (about 2^-113) from the numbers it is given. The only rounding to float is explicit:
 // `reference_round_object` and `reference_ray_rounded` make of an object and a ray what a float kernel
-// receives. A new shape is two functions and a row of `shapes` in reference.c.
+// receives. A shape is one file of shapes/.
 #pragma once
 
 #include "host/scene/quad.h"

@@ -1,0 +1,132 @@
+#include "host/verify/reference_shape.h"
+
+#include <math.h>
+
+static Quad polynomial_value(const Quad *coefficients, int degree, Quad x)
+{
+    Quad value = coefficients[degree];
+    for (int i = degree - 1; i >= 0; i--)
+        value = value * x + coefficients[i];
+    return value;
+}
+
+// The zero between two places around which the polynomial only rises or only falls: Newton's method, and
+// halving where that leaves the bracket.
+static Quad polynomial_zero(const Quad *coefficients, const Quad *derivative, int degree, Quad before,
+                            Quad after)
+{
+    bool rising = polynomial_value(coefficients, degree, before) < 0;
+    Quad x = (before + after) / 2;
+    for (int i = 0; i < 2 * QUAD_BITS; i++) {
+        Quad value = polynomial_value(coefficients, degree, x);
+        *((value < 0) == rising ? &before : &after) = x;
+        Quad slope = polynomial_value(derivative, degree - 1, x), next = x;
+        if (slope != 0) next = x - value / slope;
+        if (next == x) break;
+        if (!(next > before && next < after)) next = (before + after) / 2;
+        if (next == before || next == after) break;
+        x = next;
+    }
+    return x;
+}
+
+// Where a polynomial of degree 1..4 changes its sign between two places, ascending; returns how often. From
+// one such place of its derivative to the next it only rises or only falls.
+static int polynomial_zeros(const Quad *coefficients, int degree, Quad low, Quad high, Quad zeros[])
+{
+    Quad derivative[4], places[5] = {low};
+    for (int i = 0; i < degree; i++)
+        derivative[i] = (Quad)(i + 1) * coefficients[i + 1];
+    int turn_count = degree > 1 ? polynomial_zeros(derivative, degree - 1, low, high, places + 1) : 0;
+    places[turn_count + 1] = high;
+    int count = 0;
+    for (int i = 0; i <= turn_count; i++) {
+        bool rising = polynomial_value(coefficients, degree, places[i]) < 0;
+        if (rising == (polynomial_value(coefficients, degree, places[i + 1]) >= 0))
+            zeros[count++] = polynomial_zero(coefficients, derivative, degree, places[i], places[i + 1]);
+    }
+    return count;
+}
+
+// Whether the ray's line certainly stays away from a torus' tube by an eighth of its radius: nothing of the
+// tube is nearer to a place than its own distance from it. In double, for rays from not too far.
+static bool torus_is_clear(const Object *object, const ReferenceRay *ray)
+{
+    const double major = object->as.torus.major, minor = object->as.torus.minor;
+    Vector3 axis = vector_normalize(object->as.torus.axis);
+    Vector3 from = vector_subtract(quad3_rounded(ray->origin), object->as.torus.center);
+    Vector3 direction = vector_normalize(quad3_rounded(ray->direction));
+    double middle = -vector_dot(from, direction), span = 2 * (major + minor);
+    if (minor < 1e-10 * (vector_length(from) + vector_length(object->as.torus.center))) return false;
+    for (double s = middle - span; s < middle + span;) {
+        Vector3 p = vector_add(from, vector_scale(direction, s));
+        double height = vector_dot(p, axis);
+        double off = vector_length(vector_subtract(p, vector_scale(axis, height)));
+        double clear = hypot(off - major, height) - minor;
+        if (clear < minor / 4) return false;
+        s += clear - minor / 8;
+    }
+    return true;
+}
+
+// In the frame of the axis, from the ray's closest approach to the center on: the zeros of
+// (|p|^2 + R^2 - r^2)^2 - 4 R^2 (x^2 + y^2), and where it turns. Where r > R some have |p|^2 + R^2 - r^2
+// below 0, at r from the circle's far side: they lie within the solid. On the axis itself they coincide with
+// others, and the polynomial touches 0 only, which leaves the hit open.
+static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
+{
+    Quad major = object->as.torus.major, minor = object->as.torus.minor;
+    if (torus_is_clear(object, ray)) {
+        hit_reduce_margin(hit, minor / 4);
+        return;
+    }
+    Quad3 axis = quad3_unit(quad3(object->as.torus.axis)), across = quad3_perpendicular(axis);
+    Quad3 beside = quad3_cross(axis, across);
+    Quad length = quad3_length(ray->direction);
+    Quad3 direction = quad3_scale(ray->direction, 1 / length);
+    Quad3 from = quad3_subtract(ray->origin, quad3(object->as.torus.center));
+    Quad closest = -quad3_dot(from, direction);
+    from = quad3_add(from, quad3_scale(direction, closest));
+    Quad3 p = {quad3_dot(from, across), quad3_dot(from, beside), quad3_dot(from, axis)};
+    Quad3 q = {quad3_dot(direction, across), quad3_dot(direction, beside), quad3_dot(direction, axis)};
+
+    const Quad pp = quad3_dot(p, p), pq = quad3_dot(p, q), four = 4 * major * major;
+    const Quad sum[3] = {pp + major * major - minor * minor, 2 * pq, 1}; // |p + s q|^2 + R^2 - r^2
+    const Quad quartic[5] = {sum[0] * sum[0] - four * (p.x * p.x + p.y * p.y),
+                             2 * sum[0] * sum[1] - 2 * four * (p.x * q.x + p.y * q.y),
+                             sum[1] * sum[1] + 2 * sum[0] - four * (q.x * q.x + q.y * q.y), 2 * sum[1], 1};
+    const Quad cubic[4] = {quartic[1], 2 * quartic[2], 3 * quartic[3], 4};
+    Quad half_span = 4 * (major + minor), turns[3], zeros[4];
+    int count = polynomial_zeros(quartic, 4, -half_span, half_span, zeros);
+    for (int i = 0; i < count; i++) {
+        if (polynomial_value(sum, 2, zeros[i]) < 0) continue;
+        Quad3 at = quad3_add(p, quad3_scale(q, zeros[i]));
+        Quad rho = quad_root(at.x * at.x + at.y * at.y), out = 1 - major / rho;
+        Quad3 normal = quad3_add(quad3_add(quad3_scale(across, at.x * out), quad3_scale(beside, at.y * out)),
+                                 quad3_scale(axis, at.z));
+        hit_offer(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
+    }
+    // the hit is there because of the turns up to the next behind it
+    int turn_count = polynomial_zeros(cubic, 3, -half_span, half_span, turns);
+    bool behind = false;
+    for (int i = 0; i < turn_count && !behind; i++) {
+        Quad3 at = quad3_add(p, quad3_scale(q, turns[i]));
+        Quad off = quad_root(at.x * at.x + at.y * at.y) - major;
+        hit_reduce_margin(hit, 2 * (quad_hypotenuse(off, at.z) - minor));
+        behind = hit->found && closest + turns[i] > hit->t * length;
+    }
+}
+
+static void surface_torus(const Object *object, Quad3 point, ReferenceSurface *surface)
+{
+    double major = object->as.torus.major, minor = object->as.torus.minor;
+    Quad3 from_center = quad3_subtract(point, quad3(object->as.torus.center));
+    Quad3 axis = quad3_unit(quad3(object->as.torus.axis));
+    Quad3 across = quad3_subtract(from_center, quad3_scale(axis, quad3_dot(from_center, axis)));
+    Quad3 from_circle = quad3_subtract(from_center, quad3_scale(quad3_unit(across), major));
+    Quad distance = quad3_length(from_circle);
+    surface_measure(surface, object->as.torus.center, major + minor, minor);
+    surface_add(surface, distance - minor, quad3_scale(from_circle, 1 / distance), minor);
+}
+
+const ReferenceShape reference_torus = {hit_torus, surface_torus, 1, 8};
