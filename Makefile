@@ -63,9 +63,10 @@ mpi_flags := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags ompi-c 2>/dev
 
 mpi: $(BUILD)/glint-mpi
 
-$(BUILD)/host/mpi/main.o: OURS += $(mpi_flags)
+mpi_objects := $(patsubst %.c,$(BUILD)/%.o,$(wildcard host/mpi/*.c))
+$(mpi_objects): OURS += $(mpi_flags)
 
-$(BUILD)/glint-mpi: $(BUILD)/host/mpi/main.o $(library)
+$(BUILD)/glint-mpi: $(mpi_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell pkg-config --libs ompi-c) -o $@
 
 $(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
@@ -185,7 +186,7 @@ CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
-          $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),host/mpi/main.c)
+          $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
              tests/oracle/*.h) $(embree_sources) $(embree_headers)
@@ -253,4 +254,4 @@ clean:
 .PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(BUILD)/host/mpi/main.d $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)

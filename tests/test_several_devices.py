@@ -52,6 +52,7 @@ class SeveralDevices(TestCase):
             for end in "npy", *(f"{aov}.npy" for aov in AOVS):
                 self.assertSameBytes(f"one.{end}", f"all.{end}")
             self.assertEqual(len(report["by_device"]), 2)
+            self.assertEqual(len({device["flatten_ms"] for device in report["by_device"]}), 1, "the scene was compiled more than once")
             self.assertAlmostEqual(sum(device["share"] for device in report["by_device"]), 1)
             for device in report["by_device"]:
                 self.assertEqual(device["bands"], sum(launch["name"] == "aov" for launch in device["launches"]))

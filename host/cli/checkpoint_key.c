@@ -34,7 +34,9 @@ static void devices_append(Text *key, Renderer *const *renderers, size_t count, 
         text_free(&driver);
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
-        model_append(&models, ranks->items[i].device, ranks->items[i].driver, ranks->items[i].lanes);
+        if (ranks->items[i].lanes[PASS_ALL] > 0) // else it cannot render
+            model_append(&models, ranks->items[i].device, ranks->items[i].driver,
+                         ranks->items[i].lanes[PASS_ALL]);
     text_appendf(key, "devices: %s\n", text_c(&models));
     text_free(&models);
 }
@@ -56,5 +58,5 @@ void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Re
     text_appendf(key, "\nperturb: %u:%u\n", settings->perturb_seed, settings->perturb_scale);
     text_appendf(key, "BVH: %s\n", bvh_choice_names[settings->bvh]);
     if (settings->precision != PRECISION_STRICT) devices_append(key, renderers, count, ranks);
-    text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_report(renderers[0])->scene_hash);
+    text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_scene_hash(renderers[0]));
 }

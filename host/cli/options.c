@@ -332,12 +332,21 @@ int device_close(OpenDevice *open, int status)
     return status;
 }
 
+// Closes it, too, unless that was done.
+static void compute_free(Compute *compute)
+{
+    compute_close(compute);
+    free(compute);
+}
+
 static void computes_open(OpenDevices *open, const Device *const *devices, size_t count)
 {
     open->count = count;
     open->items = memory_allocate_zeroed(count, sizeof *open->items);
-    for (size_t i = 0; i < count; i++)
-        compute_open(&open->items[i].compute, devices[i]);
+    for (size_t i = 0; i < count; i++) {
+        open->items[i].compute = memory_allocate_zeroed(1, sizeof *open->items[i].compute);
+        compute_open(open->items[i].compute, devices[i]);
+    }
 }
 
 bool devices_open(OpenDevices *open, const char *selector)
@@ -375,14 +384,14 @@ bool devices_open_one(OpenDevices *open, const char *selector, size_t number, Me
 void devices_abandon(OpenDevices *open)
 {
     for (size_t i = 0; i < open->count; i++)
-        compute_close(&open->items[i].compute);
+        compute_free(open->items[i].compute);
     free(open->items);
     device_list_close(&open->devices);
 }
 
 void devices_drop(OpenDevices *open, size_t index)
 {
-    char *failure = compute_failure_text(&open->items[index].compute);
+    char *failure = compute_failure_text(open->items[index].compute);
     fprintf(stderr, "glint: warning: the other devices go on without one: %s\n", failure);
     free(failure);
     open->items[index].is_dropped = true;
@@ -390,7 +399,7 @@ void devices_drop(OpenDevices *open, size_t index)
 
 void devices_remove(OpenDevices *open, size_t index)
 {
-    compute_close(&open->items[index].compute);
+    compute_free(open->items[index].compute);
     open->count--;
     memmove(&open->items[index], &open->items[index + 1], (open->count - index) * sizeof *open->items);
 }
@@ -398,10 +407,8 @@ void devices_remove(OpenDevices *open, size_t index)
 int devices_close(OpenDevices *open, int status)
 {
     for (size_t i = 0; i < open->count; i++) {
-        if (open->items[i].is_dropped)
-            compute_close(&open->items[i].compute);
-        else
-            status = compute_end(&open->items[i].compute, status);
+        if (!open->items[i].is_dropped) status = compute_end(open->items[i].compute, status);
+        compute_free(open->items[i].compute);
     }
     free(open->items);
     device_list_close(&open->devices);

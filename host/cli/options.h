@@ -146,7 +146,7 @@ int device_close(OpenDevice *open, int status);
 typedef struct {
     DeviceList devices;
     struct {
-        Compute compute;
+        Compute *compute;
         bool is_dropped; // it failed, and the others did its work
     } * items;
     size_t count;
@@ -162,7 +162,7 @@ bool devices_open_one(OpenDevices *open, const char *selector, size_t number, Me
 void devices_abandon(OpenDevices *open);
 // Warns that the device failed and that the others do its work.
 void devices_drop(OpenDevices *open, size_t index);
-// Closes a device; those after it move up.
+// Closes a device that no renderer uses; those after it move up.
 void devices_remove(OpenDevices *open, size_t index);
 // As device_close, for all that were not dropped.
 int devices_close(OpenDevices *open, int status);

@@ -5,21 +5,23 @@
 
 // One process, and the device that it renders on.
 typedef struct {
-    uint32_t lanes;
+    uint32_t lanes[PASS_COUNT]; // of each pass; 0: there is none
     char device[128], driver[128], host[64];
-    char failure[256]; // why it cannot render; empty: it can
+    char failure[256]; // why it has no device; empty: it has one
 } Rank;
 
+// They are called in this order.
 typedef struct Ranks {
     size_t count; // without the first, which is this process
     Rank *items;
     WorkerShare *shares;
     FilmHeader film; // of the image, once it is rendered
     // Asks all of them for their devices. False with a message: one of them has none, and all go no further.
-    bool (*begin)(struct Ranks *ranks, const Scene *scene, const RenderSettings *settings, unsigned aovs,
+    bool (*begin)(struct Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);
-    // Sends them the scene, after which they are to be served; or, unless they `can_start`, ends their job.
-    void (*go_on)(const Scene *scene, const RenderSettings *settings, bool can_start, MessageList *messages);
+    SceneReceivers receivers; // send them the compiled scene
+    // After that they are to be served; or, unless they `can_start`, this ends their job.
+    void (*start)(bool can_start);
     void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker); // see RemoteWorkers
 } Ranks;
 

@@ -274,29 +274,33 @@ static void unfit_print(MessageList *unfit)
 // Opens a renderer on each device. If others are left, those that fail are removed, and of all devices those
 // that the scene or settings do not fit. False: with messages, these do not fit a device, else the device
 // failed.
-static bool renderers_open(Renderer **renderers, OpenDevices *devices, const Scene *scene,
-                           const RenderSettings *settings, MessageList *messages)
+static bool devices_start(Renderer **renderers, OpenDevices *devices, const Scene *scene,
+                          const RenderSettings *settings, const Ranks *ranks, MessageList *messages)
 {
-    MessageList unfit = {0};
-    for (size_t i = 0; i < devices->count;) {
-        MessageList of_device = {0};
-        Renderer *renderer = renderer_open(&devices->items[i].compute, scene, settings, &of_device);
-        const bool fits = message_count(&of_device, MESSAGE_ERROR) == 0;
-        const bool is_dispensable = devices->count > 1 && (fits || devices->are_all);
-        message_list_move(renderer || !is_dispensable ? messages : &unfit, &of_device);
-        renderers[i] = renderer;
-        if (renderer) {
-            i++;
-        } else if (is_dispensable) {
-            if (fits) devices_drop(devices, i);
-            devices_remove(devices, i);
+    const size_t count = devices->count;
+    Compute **computes = memory_allocate(count, sizeof *computes);
+    MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each), unfit = {0};
+    for (size_t i = 0; i < count; i++)
+        computes[i] = devices->items[i].compute;
+    bool is_done = renderers_open(renderers, computes, count, scene, settings,
+                                  ranks ? &ranks->receivers : NULL, messages, of_each);
+    for (size_t i = 0, kept = 0; i < count; i++) {
+        Renderer *renderer = renderers[i];
+        const bool fits = message_count(&of_each[i], MESSAGE_ERROR) == 0;
+        const bool is_dispensable = is_done && devices->count > 1 && (fits || devices->are_all);
+        message_list_move(renderer || !is_dispensable ? messages : &unfit, &of_each[i]);
+        if (renderer || !is_dispensable) {
+            renderers[kept++] = renderer;
+            is_done = is_done && renderer;
         } else {
-            message_list_free(&unfit);
-            return false;
+            if (fits) devices_drop(devices, kept);
+            devices_remove(devices, kept);
         }
     }
     unfit_print(&unfit);
-    return true;
+    free(of_each);
+    free(computes);
+    return is_done;
 }
 
 // False with messages. No checkpoint is requested: true.
@@ -328,13 +332,8 @@ static void rest_print(const RenderOptions *options)
 // Renders, writes the files and reports the times.
 static int image_render(RenderOptions *options, const Scene *scene, OpenDevices *devices,
                         Renderer *const *renderers, Ranks *ranks, const RenderSettings *settings,
-                        HostTimes *times, MessageList *messages)
+                        Checkpoint *checkpoint, HostTimes *times, MessageList *messages)
 {
-    Checkpoint *checkpoint;
-    const bool can_start =
-        checkpoint_start(&checkpoint, options, settings, renderers, devices->count, ranks, messages);
-    if (ranks) ranks->go_on(scene, settings, can_start, messages);
-    if (!can_start) return EXIT_USER;
     Progress progress;
     progress_open(&progress, options->quiet);
     ImageOutput *output = image_output_open(&options->output, options->scene, scene, settings, renderers,
@@ -413,7 +412,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
     Pilot pilot;
     if (!settings_make(&settings, options, scene)) return EXIT_USER;
     if (options->budget.limit > 0) {
-        const int status = precision_choose(&pilot, options, &settings, scene, &devices->items[0].compute);
+        const int status = precision_choose(&pilot, options, &settings, scene, devices->items[0].compute);
         if (status != EXIT_DONE) return status;
         times->pilot = options->output.pilot = &pilot;
     }
@@ -422,15 +421,22 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
     options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Renderer **renderers = memory_allocate_zeroed(devices->count, sizeof *renderers);
+    Checkpoint *checkpoint = NULL;
     int status = EXIT_USER;
-    if (renderers_open(renderers, devices, scene, &settings, &messages) &&
-        (!ranks ||
-         ranks->begin(ranks, scene, &settings, options->output.aovs, options->common.device, &messages)))
-        status = image_render(options, scene, devices, renderers, ranks, &settings, times, &messages);
+    if (!ranks || ranks->begin(ranks, &settings, options->output.aovs, options->common.device, &messages)) {
+        const bool can_start =
+            devices_start(renderers, devices, scene, &settings, ranks, &messages) &&
+            checkpoint_start(&checkpoint, options, &settings, renderers, devices->count, ranks, &messages);
+        if (ranks) ranks->start(can_start);
+        if (can_start)
+            status = image_render(options, scene, devices, renderers, ranks, &settings, checkpoint, times,
+                                  &messages);
+    }
     messages_print(&messages, NULL);
     for (size_t i = 0; i < devices->count; i++)
         renderer_close(renderers[i]);
     free(renderers);
+    times->pilot = options->output.pilot = NULL;
     return status;
 }
 

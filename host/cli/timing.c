@@ -135,8 +135,8 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
     }
     for (size_t i = 0; ranks && i < ranks->count; i++) {
         const Rank *rank = &ranks->items[i];
-        fprintf(stderr, "rank %zu on %s: %s, %u %s\n", i + 1, rank->host, rank->device, rank->lanes,
-                rank->lanes == 1 ? "lane" : "lanes");
+        fprintf(stderr, "rank %zu on %s: %s, %u %s\n", i + 1, rank->host, rank->device, rank->lanes[PASS_ALL],
+                rank->lanes[PASS_ALL] == 1 ? "lane" : "lanes");
         share_print(&ranks->shares[i], settings);
     }
     line_print("render", host->render_seconds, "");
@@ -177,7 +177,7 @@ static void ranks_json(Json *json, const Ranks *ranks, const RenderSettings *set
         json_text(json, "host", ranks->items[i].host);
         json_text(json, "name", ranks->items[i].device);
         json_text(json, "driver", ranks->items[i].driver);
-        json_integer(json, "lanes", ranks->items[i].lanes);
+        json_integer(json, "lanes", ranks->items[i].lanes[PASS_ALL]);
         share_json(json, &ranks->shares[i], settings);
         json_end(json);
     }

@@ -51,7 +51,7 @@ void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, 
     }
     buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
-    const bool is_list = renderer->repeats != REPEATS_NONE;
+    const bool is_list = renderer->pass != PASS_ALL;
     const size_t pixels_size = renderer->repeat || is_list ? film_pixel_count(&film) * sizeof(uint32_t) : 0;
     const size_t doubts_size = renderer->repeat ? pixels_size : 0;
     buffers->doubts = film_buffer(renderer, doubts_size);

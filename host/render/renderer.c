@@ -1,3 +1,5 @@
+// Opening renderers, and giving them scenes: one is compiled once for all renderers that read the same
+// arrays.
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/hash.h"
@@ -48,9 +50,10 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
 
 // False with a message where the arrays exceed the memory that the device reports; if it does not, buffers
 // fail when they are created.
-static bool device_has_room(const CompiledScene *compiled, const Device *device, bool is_double,
-                            MessageList *messages)
+static bool device_has_room(const CompiledScene *compiled, const Renderer *renderer, MessageList *messages)
 {
+    const Device *device = renderer->compute->device;
+    const bool is_double = renderer->report.is_double;
     size_t sum = 0, largest = 0;
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         size_t size = flat_array_size(&compiled->arrays[kind], is_double);
@@ -75,10 +78,9 @@ static bool is_without_eye(size_t kind)
            kind == FLAT_TEXELS;
 }
 
-static void array_upload(Renderer *renderer, size_t kind)
+static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array)
 {
     Compute *compute = renderer->compute;
-    const FlatArray *array = &renderer->compiled.arrays[kind];
     const bool is_double = renderer->report.is_double;
     const size_t size = flat_array_size(array, is_double);
     if (renderer->arrays[kind] && renderer->array_sizes[kind] == size) {
@@ -97,18 +99,19 @@ static void array_upload(Renderer *renderer, size_t kind)
     renderer->array_sizes[kind] = size;
 }
 
-// The arrays that have changed. Frees each host array after its upload, so that the scene is never in memory
-// twice, unless the renderer moves.
-static void upload(Renderer *renderer)
+// The arrays that have changed, to each of the renderers. Frees each host array after its upload, so that the
+// scene is never in memory twice, unless the renderer moves.
+static void arrays_upload(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
-    CompiledScene *compiled = &renderer->compiled;
-    if (renderer->settings.hashes_scene) // lengths are restored with it
-        renderer->report.scene_hash =
-            hash_bytes(renderer->report.scene_hash, &compiled->unit, sizeof compiled->unit);
+    if (count > 0) stage_begin(renderers[0]->settings.stage, "uploading the scene", NULL, 0);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        if (compiled->changed[kind]) array_upload(renderer, kind);
+        for (size_t i = 0; i < count && compiled->changed[kind]; i++) {
+            const double start = clock_seconds();
+            array_upload(renderers[i], kind, &compiled->arrays[kind]);
+            renderers[i]->report.upload_seconds += clock_seconds() - start;
+        }
         compiled->changed[kind] = false;
-        if (renderer->settings.moves && !is_without_eye(kind)) continue;
+        if (count > 0 && renderers[0]->settings.moves && !is_without_eye(kind)) continue;
         free(compiled->arrays[kind].items);
         compiled->arrays[kind].items = NULL;
     }
@@ -126,12 +129,7 @@ static void offsets_upload(Renderer *renderer)
     free(offsets);
 }
 
-bool renderer_certifies(const Renderer *renderer, const RenderSettings *settings)
-{
-    return settings->precision == PRECISION_CERTIFIED || renderer->repeats == REPEATS_IN_DOUBT;
-}
-
-static CompileSettings compile_settings(const RenderSettings *settings, uint32_t lanes)
+static CompileSettings compile_settings(const RenderSettings *settings, SceneVariant variant)
 {
     return (CompileSettings){
         .width = settings->width,
@@ -139,8 +137,8 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
         .precision = settings->precision,
-        .certifies = settings->precision == PRECISION_CERTIFIED,
-        .lanes = lanes,
+        .certifies = settings->precision == PRECISION_CERTIFIED || variant.pass == PASS_IN_DOUBT,
+        .lanes = variant.lanes,
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
@@ -149,152 +147,204 @@ static CompileSettings compile_settings(const RenderSettings *settings, uint32_t
     };
 }
 
-bool renderer_compile(CompiledScene *compiled, const Scene *scene, const RenderSettings *settings,
-                      MessageList *messages)
+// Those of a pass of an image.
+static RenderSettings pass_settings(const RenderSettings *settings, PixelPass pass)
 {
-    const CompileSettings compile = compile_settings(settings, settings->lanes);
-    return scene_compile(compiled, scene, &compile, messages);
+    RenderSettings of_pass = *settings;
+    if (pass == PASS_ALL) return of_pass;
+    of_pass.precision = PRECISION_DOUBLE;
+    of_pass.counting = false;
+    return of_pass;
 }
 
-// Takes a compiled scene if the device has room for it; else frees it. False with a message.
-static bool compiled_take(Renderer *renderer, CompiledScene *fresh, bool is_double, MessageList *messages)
+bool renderer_certifies(const Renderer *renderer)
 {
-    CompiledScene *compiled = &renderer->compiled;
-    const bool has_room = device_has_room(fresh, renderer->compute->device, is_double, messages);
-    compiled_scene_free(has_room ? compiled : fresh);
-    if (has_room) *compiled = *fresh;
-    return has_room;
+    return renderer->settings.precision == PRECISION_CERTIFIED || renderer->pass == PASS_IN_DOUBT;
 }
 
-// For the first time, or for another camera. False with a message.
-static bool compile(Renderer *renderer, const Scene *scene, const CompileSettings *settings,
-                    MessageList *messages)
-{
-    if (renderer->settings.moves) return scene_move(&renderer->compiled, scene, settings, messages);
-    CompiledScene fresh;
-    return scene_compile(&fresh, scene, settings, messages) &&
-           compiled_take(renderer, &fresh, settings->precision == PRECISION_DOUBLE, messages);
-}
-
-// Uploads the compiled scene. False: the device failed.
-static bool compiled_upload(Renderer *renderer, const RenderSettings *settings, uint32_t lanes,
-                            size_t light_count)
-{
-    const CompiledScene *compiled = &renderer->compiled;
-    renderer->settings = *settings;
-    renderer->light_count = light_count;
-    renderer->report.features = compiled->features;
-    renderer->report.lanes = lanes;
-    renderer->report.is_double = settings->precision == PRECISION_DOUBLE;
-    renderer->report.flatten_seconds = compiled->flatten_seconds;
-    renderer->report.bvh_seconds = compiled->bvh_seconds;
-    double start = clock_seconds();
-    stage_begin(settings->stage, "uploading the scene", NULL, 0);
-    upload(renderer);
-    offsets_upload(renderer);
-    renderer->report.upload_seconds = clock_seconds() - start;
-    return compute_ok(renderer->compute);
-}
-
-// Compiles and uploads the scene. False as renderer_open, with nothing changed that kernels read.
-static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
-                         MessageList *messages)
-{
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const uint32_t lanes =
-        settings->lanes ? settings->lanes : device_lanes(renderer->compute->device, is_double);
-    CompileSettings compiling = compile_settings(settings, lanes);
-    compiling.certifies = renderer_certifies(renderer, settings);
-    compiling.textures = renderer->compiled.textures;
-    return compile(renderer, scene, &compiling, messages) &&
-           compiled_upload(renderer, settings, lanes, scene->lights.count);
-}
-
-static Renderer *renderer_make(Compute *compute, PixelRepeats repeats)
+static Renderer *prepare(Compute *compute, const RenderSettings *settings, PixelPass pass)
 {
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
-    renderer->repeats = repeats;
-    renderer->report.device = compute->device;
-    renderer->report.build_from_cache = true;
-    renderer->report.scene_hash = HASH_START;
+    renderer->pass = pass;
+    renderer->settings = pass_settings(settings, pass);
+    RenderReport *report = &renderer->report;
+    report->device = compute->device;
+    report->build_from_cache = true;
+    report->scene_hash = HASH_START;
+    report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
+    report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->is_double);
+    if (renderer_certifies(renderer)) renderer->repeat = prepare(compute, settings, pass + 1);
     return renderer;
 }
 
-// The renderer where its scene is on the device, else NULL.
-static Renderer *renderer_finish(Renderer *renderer, bool is_ready)
-{
-    if (!is_ready) {
-        renderer_close(renderer);
-        return NULL;
-    }
-    renderer_kernels_choose(renderer);
-    return renderer;
-}
-
-// Those of the renderer that repeats pixels for one of `settings`.
-static RenderSettings repeat_settings(const RenderSettings *settings)
-{
-    RenderSettings repeat = *settings;
-    repeat.precision = PRECISION_DOUBLE;
-    repeat.counting = false;
-    return repeat;
-}
-
-// As renderer_open; with the renderer that repeats what this one leaves in doubt.
-static Renderer *renderer_open_for(Compute *compute, const Scene *scene, const RenderSettings *settings,
-                                   PixelRepeats repeats, MessageList *messages)
+Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, MessageList *messages)
 {
     if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
-    Renderer *renderer = renderer_make(compute, repeats);
-    bool is_ready = scene_assign(renderer, scene, settings, messages);
-    if (is_ready && renderer_certifies(renderer, settings)) {
-        const RenderSettings repeat = repeat_settings(settings);
-        renderer->repeat = renderer_open_for(compute, scene, &repeat, repeats + 1, messages);
-        is_ready = renderer->repeat != NULL;
-        if (is_ready) // a scene may differ in what floats do not show
-            renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash,
-                                                     &renderer->repeat->report.scene_hash, sizeof(uint64_t));
+    return prepare(compute, settings, PASS_ALL);
+}
+
+// NULL: there is no such pass.
+static Renderer *of_pass(Renderer *renderer, PixelPass pass)
+{
+    while (renderer && renderer->pass != pass)
+        renderer = renderer->repeat;
+    return renderer;
+}
+
+uint32_t renderer_lanes(const Renderer *renderer, PixelPass pass)
+{
+    while (renderer && renderer->pass != pass)
+        renderer = renderer->repeat;
+    return renderer ? renderer->report.lanes : 0;
+}
+
+// What follows from another compiled scene.
+static void scene_changed(Renderer *renderer)
+{
+    const CompiledScene *compiled = &renderer->compiled;
+    renderer->light_count = compiled->arrays[FLAT_LIGHTS].count;
+    renderer->report.features = compiled->features;
+    renderer->report.flatten_seconds = compiled->flatten_seconds;
+    renderer->report.bvh_seconds = compiled->bvh_seconds;
+    if (renderer->settings.hashes_scene) // lengths are restored with it
+        renderer->report.scene_hash =
+            hash_bytes(renderer->report.scene_hash, &compiled->unit, sizeof compiled->unit);
+    offsets_upload(renderer);
+    renderer_kernels_choose(renderer);
+}
+
+// Uploads the scene to renderers of the same variant, whose devices have room for it. Takes it; the first
+// renderer keeps what moves.
+static void scene_give(Renderer *const *renderers, size_t count, CompiledScene *compiled)
+{
+    arrays_upload(renderers, count, compiled);
+    if (count == 0) compiled_scene_free(compiled);
+    for (size_t i = 0; i < count; i++) {
+        renderers[i]->compiled = *compiled;
+        compiled->textures = NULL;
+        scene_changed(renderers[i]);
     }
-    return renderer_finish(renderer, is_ready);
+}
+
+bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, MessageList *messages)
+{
+    Renderer *taker = of_pass(renderer, pass);
+    const bool has_room = device_has_room(compiled, taker, messages);
+    scene_give(&taker, has_room, compiled);
+    return has_room && compute_ok(renderer->compute);
+}
+
+// The renderers of a variant. Closes those of them whose devices have no room for the scene.
+static size_t takers_find(Renderer **takers, Renderer **renderers, size_t count, SceneVariant variant,
+                          const CompiledScene *compiled, MessageList *of_each)
+{
+    size_t taker_count = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (renderer_lanes(renderers[i], variant.pass) != variant.lanes) continue;
+        takers[taker_count] = of_pass(renderers[i], variant.pass);
+        if (device_has_room(compiled, takers[taker_count], &of_each[i])) {
+            taker_count++;
+        } else {
+            renderer_close(renderers[i]);
+            renderers[i] = NULL;
+        }
+    }
+    return taker_count;
+}
+
+static bool variant_is_needed(SceneVariant variant, Renderer *const *renderers, size_t count,
+                              const SceneReceivers *others)
+{
+    bool is_needed = others && others->needs(others->context, variant);
+    for (size_t i = 0; i < count; i++)
+        is_needed = is_needed || renderer_lanes(renderers[i], variant.pass) == variant.lanes;
+    return is_needed;
+}
+
+// Compiles the scene for each variant that is needed. False with a message.
+static bool variants_compile(Renderer **renderers, size_t count, const Scene *scene,
+                             const RenderSettings *settings, const SceneReceivers *others,
+                             MessageList *messages, MessageList *of_each)
+{
+    Renderer **takers = memory_allocate(count, sizeof *takers);
+    bool compiles = true;
+    for (PixelPass pass = PASS_ALL; pass < PASS_COUNT && compiles; pass++)
+        for (uint32_t lanes = 1; lanes <= LANES_MAX && compiles; lanes *= 2) {
+            const SceneVariant variant = {pass, lanes};
+            if (!variant_is_needed(variant, renderers, count, others)) continue;
+            const RenderSettings of_pass = pass_settings(settings, pass);
+            const CompileSettings compiling = compile_settings(&of_pass, variant);
+            CompiledScene compiled;
+            compiles = scene_compile(&compiled, scene, &compiling, messages);
+            if (!compiles) break;
+            if (others) others->send(others->context, variant, &compiled);
+            scene_give(takers, takers_find(takers, renderers, count, variant, &compiled, of_each), &compiled);
+        }
+    free(takers);
+    return compiles;
+}
+
+bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count, const Scene *scene,
+                    const RenderSettings *settings, const SceneReceivers *others, MessageList *messages,
+                    MessageList *of_each)
+{
+    for (size_t i = 0; i < count; i++)
+        renderers[i] = renderer_open_empty(computes[i], settings, &of_each[i]);
+    const bool compiles = variants_compile(renderers, count, scene, settings, others, messages, of_each);
+    for (size_t i = 0; i < count; i++) {
+        if (compiles && compute_ok(computes[i])) continue;
+        renderer_close(renderers[i]);
+        renderers[i] = NULL;
+    }
+    return compiles;
 }
 
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    return renderer_open_for(compute, scene, settings, REPEATS_NONE, messages);
+    Renderer *renderer;
+    return renderers_open(&renderer, &compute, 1, scene, settings, NULL, messages, messages) ? renderer
+                                                                                             : NULL;
 }
 
-Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
-                                 const RenderSettings *settings, MessageList *messages)
+// Compiles the scene anew, or moves it. False with a message, with nothing changed that kernels read.
+static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
+                         MessageList *messages)
 {
-    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) {
-        compiled_scene_free(compiled);
-        return NULL;
-    }
-    if (settings->precision == PRECISION_CERTIFIED) {
-        message_add(messages, MESSAGE_ERROR, "glint-mpi does not support precision certified");
-        compiled_scene_free(compiled);
-        return NULL;
-    }
-    Renderer *renderer = renderer_make(compute, REPEATS_NONE);
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    return renderer_finish(renderer, compiled_take(renderer, compiled, is_double, messages) &&
-                                         compiled_upload(renderer, settings, settings->lanes, light_count));
+    CompiledScene *compiled = &renderer->compiled, fresh;
+    CompileSettings compiling =
+        compile_settings(settings, (SceneVariant){renderer->pass, renderer->report.lanes});
+    compiling.textures = compiled->textures;
+    if (renderer->settings.moves) return scene_move(compiled, scene, &compiling, messages);
+    if (!scene_compile(&fresh, scene, &compiling, messages)) return false;
+    const bool has_room = device_has_room(&fresh, renderer, messages);
+    compiled_scene_free(has_room ? compiled : &fresh);
+    if (has_room) *compiled = fresh;
+    return has_room;
 }
 
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages)
 {
-    if (!compute_ok(renderer->compute) || !settings_fit(settings, renderer->compute->device, messages) ||
-        !scene_assign(renderer, scene, settings, messages))
+    const RenderSettings of_pass = pass_settings(settings, renderer->pass);
+    if (!compute_ok(renderer->compute) || !settings_fit(&of_pass, renderer->compute->device, messages) ||
+        !scene_assign(renderer, scene, &of_pass, messages))
         return false;
-    if (renderer->repeat) {
-        const RenderSettings repeat = repeat_settings(settings);
-        if (!renderer_move(renderer->repeat, scene, &repeat, messages)) return false;
-    }
-    renderer_kernels_choose(renderer); // another eye may need another feature, or a deeper stack
-    return true;
+    renderer->settings = of_pass;
+    renderer->report.upload_seconds = 0;
+    arrays_upload(&renderer, 1, &renderer->compiled);
+    scene_changed(renderer); // another eye may need another feature, or a deeper stack
+    return compute_ok(renderer->compute) &&
+           (!renderer->repeat || renderer_move(renderer->repeat, scene, settings, messages));
+}
+
+uint64_t renderer_scene_hash(const Renderer *renderer)
+{
+    uint64_t hash = HASH_START;
+    for (; renderer; renderer = renderer->repeat)
+        hash = hash_bytes(hash, &renderer->report.scene_hash, sizeof renderer->report.scene_hash);
+    return hash;
 }
 
 void renderer_close(Renderer *renderer)

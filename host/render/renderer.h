@@ -46,18 +46,44 @@ enum { PERTURB_SCALE_MAX = 1000 };
 
 typedef struct Renderer Renderer;
 
-// Compiles and uploads the scene; kernels are built when first used. NULL with a message: the settings do not
-// fit the device (double or certified without fp64, lanes not 1, 4, 8 or 16) or a number of the scene does
-// not fit the precision. NULL without one: the device failed, see Compute. The compute outlives it.
+enum { LANES_MAX = 16 };
+
+// The pixels that a renderer renders: all; at `certified` then those in doubt, in double with bounds of its
+// own; then those that these leave undecided, which so look as they do at `double`.
+typedef enum { PASS_ALL, PASS_IN_DOUBT, PASS_UNDECIDED, PASS_COUNT } PixelPass;
+
+// What a scene is compiled for beside the settings. Devices with the same lanes read the same arrays.
+typedef struct {
+    PixelPass pass;
+    uint32_t lanes;
+} SceneVariant;
+
+// Others that render the same image, such as other processes.
+typedef struct {
+    bool (*needs)(void *context, SceneVariant variant);
+    void (*send)(void *context, SceneVariant variant, const CompiledScene *compiled);
+    void *context;
+} SceneReceivers;
+
+// Opens a renderer on each device. The scene is compiled once for each variant that they or the receivers
+// (NULL: none) need, and uploaded; kernels are built when first used. False with a message, and all renderers
+// NULL: a number of the scene does not fit the precision. A single renderer is NULL with a message in its own
+// list if the settings do not fit its device (double or certified without fp64, lanes not 1, 4, 8 or 16), or
+// the scene its memory; without one if the device failed, see Compute. Computes outlive their renderers.
+// Where the settings have `moves` there is one device.
+bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count, const Scene *scene,
+                    const RenderSettings *settings, const SceneReceivers *others, MessageList *messages,
+                    MessageList *of_each);
+// On one device: NULL as there.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
-// The same of a scene that renderer_compile compiled for settings->lanes, perhaps on another machine. Takes
-// it, even on failure.
-Renderer *renderer_open_compiled(Compute *compute, CompiledScene *compiled, size_t light_count,
-                                 const RenderSettings *settings, MessageList *messages);
-// Compiles for settings->lanes, which must not be 0. False with a message.
-bool renderer_compile(CompiledScene *compiled, const Scene *scene, const RenderSettings *settings,
-                      MessageList *messages);
+// On one device, without a scene: renderer_take is called with that of each pass. NULL as above.
+Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, MessageList *messages);
+// The lanes of a pass; 0: there is no such pass.
+uint32_t renderer_lanes(const Renderer *renderer, PixelPass pass);
+// Takes the compiled scene of the pass and its lanes, even on failure. False with a message: it exceeds the
+// device's memory; without: the device failed.
+bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, MessageList *messages);
 void renderer_close(Renderer *renderer);
 // Takes another camera, size, region, samples or bounces, and without settings->moves other objects,
 // materials, lights and BvhChoice; all else in `scene` and `settings` is what the renderer was opened with.
@@ -139,9 +165,7 @@ typedef struct {
     uint32_t lanes;
     bool is_double; // structs in double
     uint64_t kernel_hash;
-    // Where requested: of the arrays, their unit and the samples' offsets, but not of the BVH, which does not
-    // change the image.
-    uint64_t scene_hash;
+    uint64_t scene_hash; // of this pass, see renderer_scene_hash
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache; // every program was
     uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting
@@ -152,6 +176,10 @@ typedef struct {
     WorkerShare share; // of the last render
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
+
+// Where settings.hashes_scene: of the arrays of all passes, their unit and the samples' offsets, but not of
+// the BVH, which does not change the image.
+uint64_t renderer_scene_hash(const Renderer *renderer);
 
 // The composed text of the kernel that renders, for other compilers. Caller frees.
 char *renderer_kernel_text(const Renderer *renderer);

@@ -82,8 +82,8 @@ static void prelude_write(Text *text, const Renderer *renderer)
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
-    text_appendf(text, "#define IS_CERTIFIED %d\n", renderer_certifies(renderer, settings));
-    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->repeats != REPEATS_NONE);
+    text_appendf(text, "#define IS_CERTIFIED %d\n", renderer_certifies(renderer));
+    text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->pass != PASS_ALL);
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n",
                  precision == PRECISION_STRICT && !rounds_correctly(renderer));
     text_appendf(text, "#define HAS_FMA %d\n", has_fma(renderer));

@@ -19,14 +19,10 @@ typedef struct {
     KernelSlot kernels[KERNEL_COUNT];
 } KernelVariant;
 
-// Of which pixels a renderer at `double` renders lists, for a renderer at `certified`: none; those in doubt,
-// with bounds of its own; those that these leave undecided, which so look as they do at `double`.
-typedef enum { REPEATS_NONE, REPEATS_IN_DOUBT, REPEATS_UNDECIDED } PixelRepeats;
-
 struct Renderer {
     Compute *compute;
     RenderSettings settings;
-    PixelRepeats repeats;
+    PixelPass pass;
     RenderReport report;
     CompiledScene compiled; // without the arrays that are only on the device
     cl_mem arrays[FLAT_COUNT];
@@ -35,8 +31,7 @@ struct Renderer {
     size_t light_count;
     // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
     KernelVariant variant, other_variant;
-    // Of the same scene at `double`: at `certified` for the pixels in doubt, and for those for the undecided;
-    // else NULL.
+    // For the next pass; NULL: this is the last.
     Renderer *repeat;
 };
 
@@ -44,7 +39,7 @@ size_t renderer_scalar_size(const Renderer *renderer);
 
 // Whether this one's kernels bound their errors and leave pixels in doubt: at `certified`, and at `double`
 // for those pixels.
-bool renderer_certifies(const Renderer *renderer, const RenderSettings *settings);
+bool renderer_certifies(const Renderer *renderer);
 
 // Chooses the variant of the kernels that the settings, the device and the compiled scene need; of the two
 // last used it takes the one that suits, with its kernels.

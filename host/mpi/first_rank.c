@@ -1,0 +1,247 @@
+#include "host/mpi/first_rank.h"
+
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/cli/options.h"
+#include "host/cli/progress.h"
+#include "host/mpi/messages.h"
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static Rank rank_of_message(const Rank *received)
+{
+    Rank rank = *received;
+    rank.device[sizeof rank.device - 1] = rank.driver[sizeof rank.driver - 1] = '\0';
+    rank.host[sizeof rank.host - 1] = rank.failure[sizeof rank.failure - 1] = '\0';
+    return rank;
+}
+
+static void ranks_start(bool can_start)
+{
+    Order order = {.kind = can_start ? ORDER_START : ORDER_CANCEL};
+    broadcast(&order, sizeof order, MPI_COMM_WORLD);
+}
+
+static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned aovs,
+                        const char *device_selector, MessageList *messages)
+{
+    Job job = {.is_there = true,
+               .settings = *settings,
+               .aovs = aovs,
+               .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
+    job.settings.stop = NULL;
+    job.settings.stage = NULL;
+    broadcast(&job, sizeof job, MPI_COMM_WORLD);
+    broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
+    Rank *all = memory_allocate_zeroed(ranks->count + 1, sizeof *all);
+    MPI_Gather(MPI_IN_PLACE, 0, MPI_BYTE, all, sizeof *all, MPI_BYTE, 0, MPI_COMM_WORLD);
+    for (size_t i = 0; i < ranks->count; i++)
+        ranks->items[i] = rank_of_message(&all[i + 1]);
+    free(all);
+    bool all_fit = true;
+    for (size_t i = 0; i < ranks->count; i++) {
+        const Rank *rank = &ranks->items[i];
+        if (rank->failure[0] == '\0') continue;
+        message_add(messages, MESSAGE_ERROR, "rank %zu on %s: %s", i + 1, rank->host, rank->failure);
+        all_fit = false;
+    }
+    if (!all_fit) ranks_start(false);
+    return all_fit;
+}
+
+static bool ranks_need(void *context, SceneVariant variant)
+{
+    const Ranks *ranks = context;
+    for (size_t i = 0; i < ranks->count; i++)
+        if (ranks->items[i].lanes[variant.pass] == variant.lanes) return true;
+    return false;
+}
+
+static void scene_send(void *context, SceneVariant variant, const CompiledScene *compiled)
+{
+    (void)context;
+    Order order = {ORDER_SCENE, variant};
+    CompiledScene sent = *compiled;
+    broadcast(&order, sizeof order, MPI_COMM_WORLD);
+    scene_broadcast(&sent, 0, true);
+}
+
+typedef struct {
+    Request request;
+    BandRows rows; // handed out, and not received yet
+    Film band;     // of them, while its layers arrive; of no height: its header has not arrived
+    Layer next_layer;
+    bool wants_rows, end_sent, is_rejected, is_done;
+} RankState;
+
+// Receives the message of a status, which must have that size; else discards it and returns false.
+static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
+{
+    int count;
+    MPI_Get_count(status, MPI_BYTE, &count);
+    const bool fits = (size_t)count == size;
+    void *discarded = fits ? NULL : memory_allocate((size_t)count + 1, 1);
+    MPI_Recv(fits ? bytes : discarded, count, MPI_BYTE, status->MPI_SOURCE, status->MPI_TAG, MPI_COMM_WORLD,
+             MPI_STATUS_IGNORE);
+    free(discarded);
+    return fits;
+}
+
+// False also for a rank that still owes rows, or an answer to whose last request it did not wait for.
+static bool request_receive(RankState *state, const MPI_Status *status)
+{
+    const bool is_due = !state->wants_rows && state->rows.row_count == 0;
+    state->wants_rows = true;
+    return receive_checked(&state->request, sizeof state->request, status) && is_due &&
+           state->request.rows_max > 0 && state->request.step > 0;
+}
+
+// Gives the scheduler the band once it has all layers.
+static void layers_await(RankState *state, Scheduler *scheduler, size_t worker)
+{
+    while (state->next_layer < LAYER_COUNT && !state->band.layers[state->next_layer])
+        state->next_layer++;
+    if (state->next_layer < LAYER_COUNT) return;
+    state->rows = (BandRows){0};
+    scheduler_give(scheduler, worker, &state->band);
+    film_free(&state->band);
+}
+
+// False: it is not the band of the rows that the rank was given.
+static bool header_receive(const Ranks *ranks, RankState *state, const MPI_Status *status)
+{
+    FilmHeader header;
+    if (!receive_checked(&header, sizeof header, status) || state->band.height > 0 ||
+        !film_header_fits(&header, &ranks->film) || header.first_row != state->rows.first_row ||
+        header.row_count != state->rows.row_count)
+        return false;
+    state->band = film_of_header(&header);
+    state->next_layer = 0;
+    return true;
+}
+
+// Its layers are messages like any other: a rank that sends none keeps nobody waiting.
+static bool layer_receive(RankState *state, const MPI_Status *status)
+{
+    void *layer = state->band.height > 0 ? state->band.layers[state->next_layer] : NULL;
+    const size_t size = layer ? film_layer_size(&state->band, state->next_layer) : SIZE_MAX;
+    const bool is_right = receive_checked(layer, size, status);
+    state->next_layer += is_right;
+    return is_right;
+}
+
+// The others render the rows of a rank that cannot.
+static void rank_drop(const Ranks *ranks, Scheduler *scheduler, size_t worker, int rank, const char *why)
+{
+    fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host, why);
+    scheduler_drop(scheduler, worker);
+}
+
+static void message_receive(const Ranks *ranks, RankState *states, Scheduler *scheduler, size_t first_worker,
+                            const MPI_Status *status)
+{
+    const int rank = status->MPI_SOURCE;
+    const size_t index = (size_t)rank - 1, worker = first_worker + index;
+    RankState *state = &states[index];
+    char failure[sizeof ranks->items->failure];
+    bool is_right = false;
+    if (status->MPI_TAG == TAG_TAKE) {
+        is_right = request_receive(state, status);
+    } else if (status->MPI_TAG == TAG_BAND && !state->is_rejected) {
+        is_right = header_receive(ranks, state, status);
+        if (is_right) layers_await(state, scheduler, worker);
+    } else if (status->MPI_TAG == TAG_LAYERS && !state->is_rejected) {
+        is_right = layer_receive(state, status);
+        if (is_right) layers_await(state, scheduler, worker);
+    } else if (status->MPI_TAG == TAG_DONE) {
+        const bool owes_rows = state->rows.row_count > 0 && !scheduler_has_ended(scheduler);
+        is_right = receive_checked(failure, sizeof failure, status);
+        failure[sizeof failure - 1] = '\0';
+        state->is_done = true;
+        if (is_right && failure[0] != '\0' && !state->is_rejected)
+            rank_drop(ranks, scheduler, worker, rank, failure);
+        else
+            is_right &= !owes_rows;
+    } else {
+        receive_checked(NULL, SIZE_MAX, status);
+    }
+    if (is_right || state->is_rejected) return;
+    state->is_rejected = true;
+    rank_drop(ranks, scheduler, worker, rank,
+              "it sent what is not a band of its rows; the others go on without it");
+}
+
+// Answers a rank that wants rows, and reports the end to each once. False: there is nothing to do.
+static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, int rank)
+{
+    if (state->wants_rows && !state->is_done) {
+        bool waits = false;
+        BandRows rows = {0};
+        if (!state->is_rejected)
+            rows = scheduler_try(scheduler, worker, state->request.rows_max, state->request.step, &waits);
+        if (rows.row_count == 0 && waits) return false;
+        send_bytes(&rows, sizeof rows, rank, TAG_ROWS);
+        state->rows = rows;
+        state->wants_rows = false;
+        return true;
+    }
+    if (state->end_sent || !(state->is_done || scheduler_has_ended(scheduler))) return false;
+    send_bytes(NULL, 0, rank, TAG_END);
+    state->end_sent = true;
+    return true;
+}
+
+static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker)
+{
+    const Ranks *ranks = context;
+    RankState *states = memory_allocate_zeroed(ranks->count, sizeof *states);
+    for (size_t done_count = 0; done_count < ranks->count;) {
+        MPI_Status status;
+        bool is_busy = has_message(MPI_ANY_SOURCE, MPI_ANY_TAG, &status);
+        if (is_busy) message_receive(ranks, states, scheduler, first_worker, &status);
+        if (progress_interrupted()) scheduler_end(scheduler);
+        done_count = 0;
+        for (size_t i = 0; i < ranks->count; i++) {
+            is_busy |= rank_answer(&states[i], scheduler, first_worker + i, (int)i + 1);
+            done_count += states[i].is_done && states[i].end_sent;
+        }
+        if (!is_busy) rest();
+    }
+    for (size_t i = 0; i < ranks->count; i++)
+        film_free(&states[i].band);
+    free(states);
+}
+
+int first_rank_run(size_t other_count, int argument_count, char **arguments)
+{
+    Ranks ranks = {.count = other_count,
+                   .items = memory_allocate_zeroed(other_count, sizeof *ranks.items),
+                   .shares = memory_allocate_zeroed(other_count, sizeof *ranks.shares),
+                   .begin = ranks_begin,
+                   .receivers = {ranks_need, scene_send, &ranks},
+                   .start = ranks_start,
+                   .serve = ranks_serve};
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN);
+    progress_catch_signals();
+    fault_catch_crashes();
+    int status = EXIT_USER;
+    if (argument_count < 2 || strcmp(arguments[1], "render") != 0) {
+        fprintf(stderr, "usage: mpirun -n RANKS glint-mpi render SCENE... [OPTIONS]\n"
+                        "The options are those of glint render; each rank renders on a device of its own.\n");
+    } else {
+        char name[] = "glint-mpi render"; // which getopt's messages begin with
+        arguments[1] = name;
+        status = command_render_on(&ranks, argument_count - 1, arguments + 1);
+    }
+    Job none = {.is_there = false};
+    broadcast(&none, sizeof none, MPI_COMM_WORLD);
+    free(ranks.items);
+    free(ranks.shares);
+    if (fflush(stdout) == 0 && !ferror(stdout)) return status;
+    fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
+    return EXIT_MACHINE;
+}

@@ -1,0 +1,56 @@
+#include "host/mpi/messages.h"
+
+#include "host/base/fault.h"
+#include <stdlib.h>
+#include <time.h>
+
+void rest(void)
+{
+    nanosleep(&(struct timespec){.tv_nsec = 200000}, NULL);
+}
+
+void broadcast(void *bytes, size_t size, MPI_Comm ranks)
+{
+    const size_t most = 1 << 30; // a count is an int
+    for (size_t done = 0; done < size; done += most)
+        MPI_Bcast((char *)bytes + done, (int)(size - done < most ? size - done : most), MPI_BYTE, 0, ranks);
+}
+
+void send_bytes(const void *bytes, size_t size, int rank, int tag)
+{
+    MPI_Send(bytes, (int)size, MPI_BYTE, rank, tag, MPI_COMM_WORLD);
+}
+
+void receive_bytes(void *bytes, size_t size, int rank, int tag)
+{
+    MPI_Recv(bytes, (int)size, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+}
+
+bool has_message(int rank, int tag, MPI_Status *status)
+{
+    int is_there;
+    MPI_Iprobe(rank, tag, MPI_COMM_WORLD, &is_there, status);
+    return is_there;
+}
+
+static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm ranks)
+{
+    broadcast(compiled, sizeof *compiled, ranks);
+    if (!is_sender) compiled->textures = NULL; // only a renderer that moves reads them
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        FlatArray *array = &compiled->arrays[kind];
+        const size_t size = array->count * array->layout.size;
+        if (!is_sender) array->items = aligned_alloc(64, (size + 127) / 64 * 64);
+        if (!array->items) fault("out of memory for %zu bytes of the scene", size);
+        broadcast(array->items, size, ranks);
+    }
+}
+
+void scene_broadcast(CompiledScene *compiled, int rank, bool takes)
+{
+    MPI_Comm ranks;
+    MPI_Comm_split(MPI_COMM_WORLD, rank == 0 || takes ? 0 : MPI_UNDEFINED, rank, &ranks);
+    if (ranks == MPI_COMM_NULL) return;
+    compiled_broadcast(compiled, rank == 0, ranks);
+    MPI_Comm_free(&ranks);
+}

@@ -1,0 +1,145 @@
+#include "host/mpi/other_rank.h"
+
+#include "host/base/memory.h"
+#include "host/cli/options.h"
+#include "host/mpi/messages.h"
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+static bool has_ended(void *ended)
+{
+    bool *end_received = ended;
+    MPI_Status status;
+    if (!*end_received && has_message(0, TAG_END, &status)) {
+        receive_bytes(NULL, 0, 0, TAG_END);
+        *end_received = true;
+    }
+    return *end_received;
+}
+
+static BandRows rows_take(void *ended, uint32_t rows_max, uint32_t step)
+{
+    const Request request = {rows_max, step};
+    send_bytes(&request, sizeof request, 0, TAG_TAKE);
+    MPI_Status status;
+    while (!has_message(0, TAG_ROWS, &status)) {
+        has_ended(ended);
+        rest();
+    }
+    BandRows rows;
+    receive_bytes(&rows, sizeof rows, 0, TAG_ROWS);
+    return rows;
+}
+
+static bool band_give(void *ended, const Film *band)
+{
+    const FilmHeader header = film_header(band);
+    send_bytes(&header, sizeof header, 0, TAG_BAND);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (band->layers[layer]) send_bytes(band->layers[layer], film_layer_size(band, layer), 0, TAG_LAYERS);
+    return !has_ended(ended);
+}
+
+// What this rank renders an image with.
+typedef struct {
+    int rank;
+    OpenDevices devices;
+    bool is_open;
+    Renderer *renderer; // NULL: it cannot render, see `messages` or the device's failure
+    MessageList messages;
+    Rank own;
+} Worker;
+
+static void worker_open(Worker *worker, const Job *job, const char *selector, size_t local_rank)
+{
+    Rank *own = &worker->own;
+    gethostname(own->host, sizeof own->host - 1);
+    worker->is_open = devices_open_one(&worker->devices, selector, local_rank, &worker->messages);
+    if (!worker->is_open) {
+        snprintf(own->failure, sizeof own->failure, "%s", worker->messages.items[0].text);
+        return;
+    }
+    Compute *compute = worker->devices.items[0].compute;
+    worker->renderer = renderer_open_empty(compute, &job->settings, &worker->messages);
+    snprintf(own->device, sizeof own->device, "%s", compute->device->name);
+    snprintf(own->driver, sizeof own->driver, "%s, %s", compute->device->platform_name,
+             compute->device->driver);
+    for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
+        own->lanes[pass] = renderer_lanes(worker->renderer, pass);
+}
+
+static void worker_close(Worker *worker)
+{
+    renderer_close(worker->renderer);
+    message_list_free(&worker->messages);
+    if (worker->is_open) devices_abandon(&worker->devices);
+}
+
+// All ranks of a variant receive its scene, also those that can render no longer.
+static void scene_receive(Worker *worker, SceneVariant variant)
+{
+    CompiledScene compiled;
+    const bool takes = worker->own.lanes[variant.pass] == variant.lanes;
+    scene_broadcast(&compiled, worker->rank, takes);
+    if (!takes) return;
+    if (!worker->renderer) {
+        compiled_scene_free(&compiled);
+    } else if (!renderer_take(worker->renderer, variant.pass, &compiled, &worker->messages)) {
+        renderer_close(worker->renderer);
+        worker->renderer = NULL;
+    }
+}
+
+// Renders until the first rank has no more rows, and says why the device could not. Before the next job it
+// waits for this one's end, which would end that.
+static void worker_render(Worker *worker, unsigned aovs)
+{
+    char failure[sizeof worker->own.failure] = "";
+    bool end_received = false;
+    const BandQueue queue = {
+        .take = rows_take, .give = band_give, .has_ended = has_ended, .context = &end_received};
+    const Compute *compute = worker->devices.items[0].compute;
+    if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
+    if (worker->messages.count > 0) {
+        snprintf(failure, sizeof failure, "%s", worker->messages.items[0].text);
+    } else if (!compute_ok(compute)) {
+        char *text = compute_failure_text(compute);
+        snprintf(failure, sizeof failure, "%s", text);
+        free(text);
+    }
+    send_bytes(failure, sizeof failure, 0, TAG_DONE);
+    if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
+}
+
+static void job_run(const Job *job, int rank, size_t local_rank)
+{
+    Worker worker = {.rank = rank};
+    Order order;
+    char *selector = memory_allocate_zeroed(job->selector_size + 1, 1);
+    broadcast(selector, job->selector_size, MPI_COMM_WORLD);
+    worker_open(&worker, job, job->selector_size > 0 ? selector : NULL, local_rank);
+    free(selector);
+    MPI_Gather(&worker.own, sizeof worker.own, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
+    while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.kind == ORDER_SCENE)
+        scene_receive(&worker, order.variant);
+    if (order.kind == ORDER_START) worker_render(&worker, job->aovs);
+    worker_close(&worker);
+}
+
+// An interrupt reaches all ranks: the first one ends the render, and the job.
+static void signals_ignore(void)
+{
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++)
+        signal(signals[i], SIG_IGN);
+}
+
+void other_rank_run(int rank, size_t local_rank)
+{
+    signals_ignore();
+    Job job;
+    while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.is_there)
+        job_run(&job, rank, local_rank);
+}

@@ -1,0 +1,8 @@
+// Another rank: renders rows of the first one's images on a device of its own.
+#pragma once
+
+#include <stddef.h>
+
+// Runs until the first rank has no more images. `local_rank`: among those of this machine, by which they
+// share its devices.
+void other_rank_run(int rank, size_t local_rank);
