@@ -4,223 +4,12 @@
 #include "host/base/memory.h"
 #include "host/cli/checkpoint_key.h"
 #include "host/cli/commands.h"
-#include "host/cli/image_output.h"
-#include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/cli/ranks.h"
-#include "host/cli/timing.h"
-#include <errno.h>
-#include <getopt.h>
+#include "host/cli/render_options.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-
-enum {
-    OPTION_SIZE = OPTION_OWN,
-    OPTION_SAMPLES,
-    OPTION_REGION,
-    OPTION_AOV,
-    OPTION_MAX_ERROR,
-    OPTION_TIMING,
-    OPTION_TRANSFER,
-    OPTION_BITS,
-    OPTION_BOUNCES,
-    OPTION_CHECKPOINT,
-    OPTION_QUIET
-};
-
-static const struct option long_options[] = {
-    {"output", required_argument, NULL, 'o'},
-    {"size", required_argument, NULL, OPTION_SIZE},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"region", required_argument, NULL, OPTION_REGION},
-    {"aov", required_argument, NULL, OPTION_AOV},
-    {"max-error", required_argument, NULL, OPTION_MAX_ERROR},
-    {"timing", optional_argument, NULL, OPTION_TIMING},
-    {"transfer", required_argument, NULL, OPTION_TRANSFER},
-    {"bits", required_argument, NULL, OPTION_BITS},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
-    {"quiet", no_argument, NULL, OPTION_QUIET},
-    COMMON_LONG_OPTIONS,
-    PERTURB_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-#define HELP_LAYER(NAME, name, type, components, note) "                          " #name ": " note "\n"
-
-static const char help_text[] =
-    "usage: glint render SCENE... [OPTIONS]\n\n"
-    "  -o, --output FILE     .png, .ppm, .exr or .npy; of several scenes their folder (default: each "
-    "scene's\n"
-    "                        name with .png)\n"
-    "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
-    "      --samples N       per pixel (default: 1, at the center)\n"
-    "      --region X,Y,W,H  render these pixels of the image only\n"
-    "      --aov LIST        more files beside the image, IMAGE.NAME.npy for each NAME of the list:\n" //
-    LAYER_LIST(
-        HELP_LAYER) "      --max-error E[:METRIC]\n"
-                    "                        choose the fastest precision that keeps this error in linear "
-                    "light; the metric is\n"
-                    "                        rmse, max or flip (default: rmse)\n"
-                    "      --timing[=json]   report the time of every stage and launch\n"
-                    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
-                    "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
-                    "      --checkpoint FILE\n"
-                    "                        keep finished bands in FILE until the image is complete; the\n"
-                    "                        same command goes on where an earlier one ended\n"
-                    "      --quiet           no progress\n" //
-    HELP_BOUNCES HELP_DEVICES HELP_COMMON HELP_PERTURB HELP_HELP;
-
-typedef struct {
-    CommonOptions common;
-    char **scenes;
-    size_t scene_count;
-    const char *scene; // the one that is rendered
-    const char *checkpoint;
-    ImageOutputOptions output; // path: of several scenes, their folder
-    uint32_t width, height;    // 0: not given
-    uint32_t sample_count, bounce_count;
-    uint32_t region[4]; // x, y, width, height
-    bool has_region, has_transfer, quiet;
-    ErrorBudget budget; // limit 0: none
-    TimingStyle timing;
-} RenderOptions;
-
-static bool region_read(const char *value, uint32_t region[4])
-{
-    const char *at = value;
-    for (int i = 0; i < 4; i++) {
-        char *end;
-        errno = 0;
-        unsigned long number = strtoul(at, &end, 10);
-        bool digit_first = *at >= '0' && *at <= '9';
-        if (!digit_first || errno != 0 || number > IMAGE_SIDE_MAX || *end != (i < 3 ? ',' : '\0')) break;
-        region[i] = (uint32_t)number;
-        at = end + 1;
-        if (i == 3 && region[2] > 0 && region[3] > 0) return true;
-    }
-    fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n",
-            value);
-    return false;
-}
-
-static bool option_take(RenderOptions *options, int option, const char *value)
-{
-    static const char *const transfers[] = {"srgb", "none"};
-    unsigned choice;
-    bool valid = true;
-    if (option_common(&options->common, option, value, &valid)) return valid;
-    switch (option) {
-    case 'o':
-        options->output.path = value;
-        return true;
-    case OPTION_SIZE:
-        return option_size("size", value, &options->width, &options->height);
-    case OPTION_SAMPLES:
-        return option_count("samples", value, 1, SAMPLES_MAX, &options->sample_count);
-    case OPTION_REGION:
-        options->has_region = true;
-        return region_read(value, options->region);
-    case OPTION_AOV:
-        return option_set("aov", value, layer_names, LAYER_COUNT, &options->output.aovs);
-    case OPTION_MAX_ERROR:
-        return option_error_budget("max-error", value, &options->budget);
-    case OPTION_TIMING:
-        return timing_style_read(value, &options->timing);
-    case OPTION_TRANSFER:
-        if (!option_choice("transfer", value, transfers, 2, &choice)) return false;
-        options->output.transfer = choice == 0 ? TRANSFER_SRGB : TRANSFER_NONE;
-        options->has_transfer = true;
-        return true;
-    case OPTION_BITS:
-        if (!option_choice("bits", value, (const char *const[]){"8", "16"}, 2, &choice)) return false;
-        options->output.bits = choice == 0 ? 8 : 16;
-        return true;
-    case OPTION_BOUNCES:
-        return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
-    case OPTION_CHECKPOINT:
-        options->checkpoint = value;
-        return true;
-    case OPTION_QUIET:
-        options->quiet = true;
-        return true;
-    default:
-        return false;
-    }
-}
-
-static bool is_folder(const char *path)
-{
-    struct stat status;
-    return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
-}
-
-// What suits one scene alone. False with a message.
-static bool several_fit(const RenderOptions *options)
-{
-    const char *const folder = options->output.path;
-    if (options->checkpoint)
-        option_usage_fault("render", "--checkpoint is for one scene");
-    else if (options->timing == TIMING_JSON)
-        option_usage_fault("render", "--timing=json is for one scene");
-    else if (folder && !is_folder(folder))
-        option_usage_fault("render", "--output of several scenes must be a folder");
-    else
-        return true;
-    return false;
-}
-
-static int options_read(RenderOptions *options, int argument_count, char **arguments)
-{
-    *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
-                               .sample_count = 1,
-                               .bounce_count = BOUNCES_DEFAULT,
-                               .output.bits = 8};
-    int option;
-    while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
-    }
-    if (optind == argument_count) return option_usage_fault("render", "no scene given");
-    if (options->budget.limit > 0 && options->common.has_precision)
-        return option_usage_fault("render", "--max-error chooses the precision: leave out --precision");
-    if (options->budget.limit > 0 && options->checkpoint)
-        return option_usage_fault("render",
-                                  "--max-error may choose otherwise when a checkpoint is continued: "
-                                  "name its choice with --precision");
-    options->scenes = arguments + optind;
-    options->scene_count = (size_t)(argument_count - optind);
-    return options->scene_count == 1 || several_fit(options) ? OPTIONS_READ : EXIT_USER;
-}
-
-static bool settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
-{
-    image_size_choose(scene, &options->width, &options->height);
-    if (!options->has_region) {
-        options->region[2] = options->width;
-        options->region[3] = options->height;
-    }
-    const uint32_t *region = options->region;
-    if (region[0] + region[2] > options->width || region[1] + region[3] > options->height) {
-        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the image of %ux%u pixels\n",
-                region[0], region[1], region[2], region[3], options->width, options->height);
-        return false;
-    }
-    *settings = settings_whole(&options->common, options->width, options->height);
-    settings->region_x = region[0];
-    settings->region_y = region[1];
-    settings->region_width = region[2];
-    settings->region_height = region[3];
-    settings->sample_count = options->sample_count;
-    settings->bounce_count = options->bounce_count;
-    settings->shift_to_eye = true;
-    settings->stop = progress_interrupted;
-    settings->hashes_scene = options->checkpoint != NULL;
-    return true;
-}
 
 typedef struct {
     ImageOutput *output;
@@ -410,7 +199,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
 {
     RenderSettings settings;
     Pilot pilot;
-    if (!settings_make(&settings, options, scene)) return EXIT_USER;
+    if (!render_settings_make(&settings, options, scene)) return EXIT_USER;
     if (options->budget.limit > 0) {
         const int status = precision_choose(&pilot, options, &settings, scene, devices->items[0].compute);
         if (status != EXIT_DONE) return status;
@@ -504,7 +293,7 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
 int command_render_on(Ranks *ranks, int argument_count, char **arguments)
 {
     RenderOptions options;
-    int status = options_read(&options, argument_count, arguments);
+    int status = render_options_read(&options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     const size_t count = options.scene_count;
     char **paths = memory_allocate(count, sizeof *paths);
