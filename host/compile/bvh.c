@@ -2,273 +2,92 @@
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
-#include "host/compile/flat_types.h"
-#include <float.h>
+#include "host/base/parallel.h"
+#include "host/compile/bvh_split.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <unistd.h>
-#ifdef __SSE__
-#include <xmmintrin.h>
-#endif
 
 enum {
-    BIN_COUNT = 16,
-    SMALL_RANGE = 32, // below it fewer bins, which cost less to fill and to sweep, split as well
-    SMALL_BIN_COUNT = 8,
     // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
     // 2^28 primitives, and at most 7 cuts by kind follow.
     HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
     THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };
 
-// SAH costs of the binary tree: visiting a node, testing a primitive. (bvh_widen has those of wide nodes.)
-static const float traversal_cost = 1, intersection_cost = 1;
-
-typedef float Float4 __attribute__((vector_size(16)));
-typedef int32_t Int4 __attribute__((vector_size(16)));
-
-static inline Float4 float4_of(Vector3 v)
-{
-    return (Float4){(float)v.x, (float)v.y, (float)v.z, 0};
-}
-
-// gcc makes no minps of a comparison and a choice.
-#ifdef __SSE__
-static inline Float4 float4_min(Float4 a, Float4 b)
-{
-    return _mm_min_ps(a, b);
-}
-
-static inline Float4 float4_max(Float4 a, Float4 b)
-{
-    return _mm_max_ps(a, b);
-}
-#else
-static inline Float4 float4_pick(Int4 take_a, Float4 a, Float4 b)
-{
-    return (Float4)((take_a & (Int4)a) | (~take_a & (Int4)b));
-}
-
-static inline Float4 float4_min(Float4 a, Float4 b)
-{
-    return float4_pick(a < b, a, b);
-}
-
-static inline Float4 float4_max(Float4 a, Float4 b)
-{
-    return float4_pick(a > b, a, b);
-}
-#endif
-
 typedef struct {
-    Float4 low, high;
-} BuildBox;
-
-static const BuildBox empty_box = {{FLT_MAX, FLT_MAX, FLT_MAX, 0}, {-FLT_MAX, -FLT_MAX, -FLT_MAX, 0}};
-
-static inline BuildBox box_join(BuildBox a, BuildBox b)
-{
-    return (BuildBox){float4_min(a.low, b.low), float4_max(a.high, b.high)};
-}
-
-static inline float box_half_area(BuildBox box)
-{
-    Float4 size = box.high - box.low;
-    return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
-}
-
-// A primitive while the tree is built: single precision is enough to choose splits. Scaled so that the
-// largest coordinate is about 1, which keeps areas of any scene within range.
-typedef struct {
-    BuildBox box; // low[3] and high[3] unused
-    uint32_t index;
-    uint8_t kind;
-} PrimitiveReference;
-
-typedef struct {
+    const Bounds *boxes;
+    const uint8_t *kinds;
+    double scale; // of the references' coordinates
+    size_t count;
     PrimitiveReference *references;
     BvhBinaryNode *nodes;
     atomic_size_t node_count;
     atomic_uint depth;
     atomic_int idle_threads;
+    pthread_mutex_t lock; // of `bounds`
+    RangeBounds bounds;   // of all
     Stage *stage;
 } Builder;
 
 typedef struct {
     size_t begin, end;
+    RangeBounds bounds;
 } Range;
 
-static void range_build(Builder *builder, Range range, unsigned depth, BvhChild *child);
+static BvhChild range_build(Builder *builder, const Range *range, unsigned depth);
 
-static Float4 reference_center(const PrimitiveReference *reference)
-{
-    return reference->box.low + reference->box.high; // twice the center: only ratios count
-}
-
-typedef struct {
-    bool found;
-    int axis;
-    int bin; // the left side is bins 0..bin
-    float cost;
-} Split;
-
-typedef struct {
-    Float4 low, scale; // of the centers
-    int bin_count;
-} BinMap;
-
-// Along each axis.
-static inline Int4 bins_of(const BinMap *map, const PrimitiveReference *reference)
-{
-    return __builtin_convertvector((reference_center(reference) - map->low) * map->scale, Int4);
-}
-
-// The cheapest split of a range between bins of centers, over all axes; cost in primitive tests.
-static Split split_find(const Builder *builder, Range range, const BinMap *map)
-{
-    BuildBox boxes[3][BIN_COUNT];
-    uint32_t counts[3][BIN_COUNT] = {{0}};
-    for (int axis = 0; axis < 3; axis++)
-        for (int bin = 0; bin < map->bin_count; bin++)
-            boxes[axis][bin] = empty_box;
-    for (size_t i = range.begin; i < range.end; i++) {
-        const PrimitiveReference *reference = &builder->references[i];
-        Int4 bins = bins_of(map, reference);
-        for (int axis = 0; axis < 3; axis++) {
-            BuildBox *box = &boxes[axis][bins[axis]];
-            *box = box_join(*box, reference->box);
-            counts[axis][bins[axis]]++;
-        }
-    }
-    Split best = {.cost = FLT_MAX};
-    for (int axis = 0; axis < 3; axis++) {
-        if (map->scale[axis] <= 0) continue;
-        float right_areas[BIN_COUNT] = {0};
-        uint32_t right_counts[BIN_COUNT] = {0};
-        BuildBox box = empty_box;
-        uint32_t count = 0;
-        for (int bin = map->bin_count - 1; bin > 0; bin--) {
-            box = box_join(box, boxes[axis][bin]);
-            count += counts[axis][bin];
-            right_areas[bin] = count ? box_half_area(box) : 0;
-            right_counts[bin] = count;
-        }
-        box = empty_box;
-        count = 0;
-        for (int bin = 0; bin + 1 < map->bin_count; bin++) {
-            box = box_join(box, boxes[axis][bin]);
-            count += counts[axis][bin];
-            if (count == 0 || right_counts[bin + 1] == 0) continue;
-            float cost =
-                box_half_area(box) * (float)count + right_areas[bin + 1] * (float)right_counts[bin + 1];
-            if (cost < best.cost) best = (Split){true, axis, bin, cost};
-        }
-    }
-    return best;
-}
-
-static size_t range_partition(Builder *builder, Range range, const BinMap *map, const Split *split)
+static void range_sort_by_kind(const Builder *builder, const Range *range)
 {
     PrimitiveReference *references = builder->references;
-    size_t left = range.begin, right = range.end;
-    while (left < right) {
-        if (bins_of(map, &references[left])[split->axis] <= split->bin) {
-            left++;
-        } else {
-            PrimitiveReference swapped = references[left];
-            references[left] = references[--right];
-            references[right] = swapped;
-        }
-    }
-    return left;
-}
-
-static void range_sort_by_kind(Builder *builder, Range range)
-{
-    PrimitiveReference *references = builder->references;
-    for (size_t i = range.begin + 1; i < range.end; i++) {
-        PrimitiveReference moving = references[i];
+    for (size_t i = range->begin + 1; i < range->end; i++) {
+        const PrimitiveReference moving = references[i];
+        const uint8_t kind = reference_kind(&moving);
         size_t place = i;
-        for (; place > range.begin && references[place - 1].kind > moving.kind; place--)
+        for (; place > range->begin && reference_kind(&references[place - 1]) > kind; place--)
             references[place] = references[place - 1];
         references[place] = moving;
     }
 }
 
 // The first primitive of another kind than the first; `end` where there is but one kind.
-static size_t range_kind_boundary(const Builder *builder, Range range)
+static size_t range_kind_boundary(const Builder *builder, const Range *range)
 {
     const PrimitiveReference *references = builder->references;
-    size_t boundary = range.begin + 1;
-    while (boundary < range.end && references[boundary].kind == references[range.begin].kind)
+    const uint8_t kind = reference_kind(&references[range->begin]);
+    size_t boundary = range->begin + 1;
+    while (boundary < range->end && reference_kind(&references[boundary]) == kind)
         boundary++;
     return boundary;
 }
 
-typedef struct {
-    BuildBox boxes, centers; // around the primitives' boxes, and around their centers
-} RangeBounds;
-
-static RangeBounds range_bounds(const Builder *builder, Range range)
+// Sets both sides. False where the range is to be a leaf.
+static bool range_divide(const Builder *builder, const Range *range, unsigned depth, Range sides[2])
 {
-    RangeBounds bounds = {empty_box, empty_box};
-    for (size_t i = range.begin; i < range.end; i++) {
-        const PrimitiveReference *reference = &builder->references[i];
-        bounds.boxes = box_join(bounds.boxes, reference->box);
-        Float4 center = reference_center(reference);
-        bounds.centers = box_join(bounds.centers, (BuildBox){center, center});
+    PrimitiveReference *references = builder->references + range->begin;
+    const size_t count = range->end - range->begin;
+    size_t left = count;
+    RangeBounds bounds[2];
+    if (depth < HALVING_DEPTH && count > 1)
+        left =
+            range_split(references, count, &range->bounds, depth == 0 && count >= THREAD_RANGE_MIN, bounds);
+    if (left == count) {
+        if (count <= BVH_LEAF_MAX) range_sort_by_kind(builder, range);
+        left = count > BVH_LEAF_MAX ? count / 2 : range_kind_boundary(builder, range) - range->begin;
+        if (left == count) return false;
+        bounds[0] = range_bounds_of(references, left);
+        bounds[1] = range_bounds_of(references + left, count - left);
     }
-    return bounds;
-}
-
-static BinMap bins_make(BuildBox centers, size_t count)
-{
-    Float4 extent = centers.high - centers.low;
-    BinMap map = {.low = centers.low, .bin_count = count < SMALL_RANGE ? SMALL_BIN_COUNT : BIN_COUNT};
-    for (int axis = 0; axis < 3; axis++) {
-        // a smaller extent would overflow the scale; a little less than bin_count keeps the highest center in
-        // the last bin
-        bool is_splittable = extent[axis] > 0x1p-120f;
-        map.scale[axis] = is_splittable ? (float)map.bin_count * (1 - 1e-6f) / extent[axis] : 0;
-    }
-    return map;
-}
-
-// Partitions the range by the surface area heuristic where that pays or the range is too large for a leaf.
-// Returns the first index of the right side; `end` where it did not.
-static size_t range_partition_by_area(Builder *builder, Range range)
-{
-    size_t count = range.end - range.begin;
-    RangeBounds bounds = range_bounds(builder, range);
-    BinMap map = bins_make(bounds.centers, count);
-    Split split = split_find(builder, range, &map);
-    float area = box_half_area(bounds.boxes);
-    bool pays = split.found && split.cost * intersection_cost + traversal_cost * area <
-                                   (float)count * intersection_cost * area;
-    if (!pays && !(split.found && count > BVH_LEAF_MAX)) return range.end;
-    size_t middle = range_partition(builder, range, &map, &split);
-    return middle > range.begin ? middle : range.end;
-}
-
-// Partitions the range. Returns the first index of the right side; `end` where the range is to be a leaf.
-static size_t range_split(Builder *builder, Range range, unsigned depth)
-{
-    size_t count = range.end - range.begin;
-    if (depth < HALVING_DEPTH && count > 1) {
-        size_t middle = range_partition_by_area(builder, range);
-        if (middle < range.end) return middle;
-    }
-    if (count > BVH_LEAF_MAX) return range.begin + count / 2;
-    range_sort_by_kind(builder, range);
-    return range_kind_boundary(builder, range);
+    sides[0] = (Range){range->begin, range->begin + left, bounds[0]};
+    sides[1] = (Range){range->begin + left, range->end, bounds[1]};
+    return true;
 }
 
 typedef struct {
     Builder *builder;
-    Range range;
+    const Range *range;
     unsigned depth;
     BvhChild *child;
 } RangeTask;
@@ -276,62 +95,64 @@ typedef struct {
 static void *range_task_run(void *context)
 {
     RangeTask *task = context;
-    range_build(task->builder, task->range, task->depth, task->child);
+    *task->child = range_build(task->builder, task->range, task->depth);
     atomic_fetch_add(&task->builder->idle_threads, 1);
     return NULL;
 }
 
 // Builds both sides of a node, in two threads where one is idle and the range is worth it.
-static void sides_build(Builder *builder, Range left, Range right, unsigned depth, BvhBinaryNode *node)
+static void sides_build(Builder *builder, const Range sides[2], unsigned depth, BvhBinaryNode *node)
 {
-    bool large = right.end - left.begin >= THREAD_RANGE_MIN;
+    const bool large = sides[1].end - sides[0].begin >= THREAD_RANGE_MIN;
     if (large && atomic_fetch_sub(&builder->idle_threads, 1) > 0) {
-        RangeTask task = {builder, left, depth, &node->children[0]};
+        RangeTask task = {builder, &sides[0], depth, &node->children[0]};
         pthread_t thread;
         if (pthread_create(&thread, NULL, range_task_run, &task) == 0) {
-            range_build(builder, right, depth, &node->children[1]);
+            node->children[1] = range_build(builder, &sides[1], depth);
             pthread_join(thread, NULL);
             return;
         }
     }
     if (large) atomic_fetch_add(&builder->idle_threads, 1);
-    range_build(builder, left, depth, &node->children[0]);
-    range_build(builder, right, depth, &node->children[1]);
+    node->children[0] = range_build(builder, &sides[0], depth);
+    node->children[1] = range_build(builder, &sides[1], depth);
 }
 
-static void range_build(Builder *builder, Range range, unsigned depth, BvhChild *child)
+static void depth_note(Builder *builder, unsigned depth)
 {
-    size_t middle = range_split(builder, range, depth);
-    if (middle == range.end) {
-        *child = (BvhChild){.first = (uint32_t)range.begin, .count = (uint32_t)(range.end - range.begin)};
-        stage_add(builder->stage, child->count);
-        return;
-    }
-    size_t index = atomic_fetch_add(&builder->node_count, 1);
-    *child = (BvhChild){.first = (uint32_t)index};
     unsigned deepest = atomic_load(&builder->depth);
-    while (depth + 1 > deepest && !atomic_compare_exchange_weak(&builder->depth, &deepest, depth + 1)) {
+    while (depth > deepest && !atomic_compare_exchange_weak(&builder->depth, &deepest, depth)) {
     }
-    sides_build(builder, (Range){range.begin, middle}, (Range){middle, range.end}, depth + 1,
-                &builder->nodes[index]);
 }
 
-// Boxes from the primitives up, in double: children come after their parent, so one walk backwards meets them
-// first.
-static void boxes_fit(Bvh *bvh, const Bounds *boxes)
+static BvhChild leaf_make(const Builder *builder, const Range *range)
 {
-    for (size_t i = bvh->node_count; i-- > 0;) {
-        for (int side = 0; side < 2; side++) {
-            BvhChild *child = &bvh->nodes[i].children[side];
-            child->box = bounds_empty();
-            if (child->count > 0) {
-                for (uint32_t k = 0; k < child->count; k++)
-                    child->box = bounds_join(child->box, boxes[bvh->order[child->first + k]]);
-            } else if (child->first > i) {
-                child->box = bvh_node_bounds(&bvh->nodes[child->first]);
-            }
-        }
-    }
+    BvhChild leaf = {bounds_empty(), (uint32_t)range->begin, (uint32_t)(range->end - range->begin)};
+    for (size_t i = range->begin; i < range->end; i++)
+        leaf.box = bounds_join(leaf.box, builder->boxes[reference_index(&builder->references[i])]);
+    stage_add(builder->stage, leaf.count);
+    return leaf;
+}
+
+// Of a range whose leaves come soon: they may be anywhere.
+static void boxes_prefetch(const Builder *builder, const Range *range)
+{
+    if (range->end - range->begin > BVH_LEAF_MAX) return;
+    for (size_t i = range->begin; i < range->end; i++)
+        __builtin_prefetch(&builder->boxes[reference_index(&builder->references[i])]);
+}
+
+// Boxes from the primitives up, in double.
+static BvhChild range_build(Builder *builder, const Range *range, unsigned depth)
+{
+    boxes_prefetch(builder, range);
+    Range sides[2];
+    if (!range_divide(builder, range, depth, sides)) return leaf_make(builder, range);
+    const size_t index = atomic_fetch_add(&builder->node_count, 1);
+    depth_note(builder, depth + 1);
+    BvhBinaryNode *node = &builder->nodes[index];
+    sides_build(builder, sides, depth + 1, node);
+    return (BvhChild){bvh_node_bounds(node), (uint32_t)index, 0};
 }
 
 static double largest_coordinate(const Bounds *boxes, size_t count)
@@ -343,51 +164,61 @@ static double largest_coordinate(const Bounds *boxes, size_t count)
     return fmax(largest.x, fmax(largest.y, largest.z));
 }
 
+static void references_make(void *context, size_t begin, size_t end)
+{
+    Builder *builder = context;
+    for (size_t i = begin; i < end; i++)
+        builder->references[i] =
+            reference_make(builder->boxes[i], builder->scale, (uint32_t)i, builder->kinds[i]);
+    const RangeBounds bounds = range_bounds_of(builder->references + begin, end - begin);
+    pthread_mutex_lock(&builder->lock);
+    builder->bounds = range_bounds_join(builder->bounds, bounds);
+    pthread_mutex_unlock(&builder->lock);
+}
+
+// The root is node 0; a single leaf is its only child.
+static void root_build(Builder *builder)
+{
+    const Range all = {0, builder->count, builder->bounds};
+    const BvhChild none = {bounds_empty(), 0, 0};
+    const BvhChild root = builder->count > 0 ? range_build(builder, &all, 0) : none;
+    if (builder->node_count > 0) return;
+    builder->nodes[0] = (BvhBinaryNode){{root, none}};
+    builder->node_count = 1;
+    builder->depth = builder->count > 0;
+}
+
 void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, Stage *stage)
 {
-    *bvh = (Bvh){.primitive_count = count};
+    const double largest = largest_coordinate(boxes, count);
     Builder builder = {
+        .boxes = boxes,
+        .kinds = kinds,
+        .scale = largest > 0 ? 1 / largest : 1,
+        .count = count,
         .references = aligned_alloc(64, (count * sizeof(PrimitiveReference) + 127) / 64 * 64),
         .nodes = memory_allocate(count + 1, sizeof *builder.nodes),
-        .node_count = 1,
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
+        .lock = PTHREAD_MUTEX_INITIALIZER,
+        .bounds = range_bounds_empty(),
         .stage = stage,
     };
     if (!builder.references) fault("out of memory for a BVH of %zu primitives", count);
-    double largest = largest_coordinate(boxes, count);
-    double scale = largest > 0 ? 1 / largest : 1;
+    parallel_run(count, THREAD_RANGE_MIN, references_make, &builder);
+    root_build(&builder);
+    *bvh = (Bvh){
+        .nodes = builder.nodes,
+        .node_count = builder.node_count,
+        .order = memory_allocate(count + 1, sizeof *bvh->order),
+        .kinds = memory_allocate(count + 1, 1),
+        .primitive_count = count,
+        .depth = builder.depth,
+    };
     for (size_t i = 0; i < count; i++) {
-        PrimitiveReference *reference = &builder.references[i];
-        reference->box.low = float4_of(vector_scale(boxes[i].min, scale));
-        reference->box.high = float4_of(vector_scale(boxes[i].max, scale));
-        reference->index = (uint32_t)i;
-        reference->kind = kinds[i];
-    }
-    BvhChild root = {.first = 0};
-    if (count > 0) {
-        // the root is node 0; a single leaf is its only child
-        size_t middle = range_split(&builder, (Range){0, count}, 0);
-        builder.depth = 1;
-        if (middle == count) {
-            builder.nodes[0] = (BvhBinaryNode){{{.first = 0, .count = (uint32_t)count}, root}};
-            stage_add(stage, count);
-        } else {
-            sides_build(&builder, (Range){0, middle}, (Range){middle, count}, 1, &builder.nodes[0]);
-        }
-    } else {
-        builder.nodes[0] = (BvhBinaryNode){{root, root}};
-    }
-    bvh->nodes = builder.nodes;
-    bvh->node_count = builder.node_count;
-    bvh->depth = builder.depth;
-    bvh->order = memory_allocate(count + 1, sizeof *bvh->order);
-    bvh->kinds = memory_allocate(count + 1, 1);
-    for (size_t i = 0; i < count; i++) {
-        bvh->order[i] = builder.references[i].index;
-        bvh->kinds[i] = builder.references[i].kind;
+        bvh->order[i] = reference_index(&builder.references[i]);
+        bvh->kinds[i] = reference_kind(&builder.references[i]);
     }
     free(builder.references);
-    boxes_fit(bvh, boxes);
 }
 
 void bvh_free(Bvh *bvh)

@@ -1,6 +1,6 @@
-// The bounding volume hierarchy over a scene's bounded primitives: a binary tree by binned surface area
-// heuristic (Wald, On fast construction of SAH-based bounding volume hierarchies, RT 2007; here with both
-// sides of a split built by two threads, and every leaf of one kind of shape).
+// The bounding volume hierarchy over a scene's bounded primitives: a binary tree by the surface area
+// heuristic (bvh_split.h), both sides of a split built by two threads, every leaf of one kind of shape. The
+// tree is the same whatever the number of threads; only the order of its nodes is not.
 #pragma once
 
 #include "host/base/stage.h"

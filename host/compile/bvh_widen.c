@@ -22,7 +22,8 @@ static const float tie_cost = 0x1p-40f;
 typedef float Costs[BVH_WIDTH_MAX + 1];
 
 typedef struct {
-    Costs costs;
+    Costs costs; // of up to slots_max slots: its leaves need no more
+    unsigned slots_max;
     float leaves_cost;     // of the binary tree's leaves
     uint32_t first, count; // its primitives; count 0: more, or of more kinds, than a leaf may hold
     bool is_leaf;          // rather than a wide node
@@ -50,21 +51,24 @@ static float leaf_cost(const Widening *widening, double half_area, uint32_t coun
     return (float)(half_area * widening->scale * (visit_cost + intersection_cost * count));
 }
 
-static Subtree child_subtree(const Widening *widening, const BvhChild *child)
+// `leaf`: where that of a leaf has room.
+static const Subtree *child_subtree(const Widening *widening, const BvhChild *child, Subtree *leaf)
 {
-    if (child_is_node(child)) return widening->subtrees[child->first];
-    Subtree leaf = {.first = child->first, .count = child->count};
+    if (child_is_node(child)) return &widening->subtrees[child->first];
+    *leaf = (Subtree){.slots_max = 1, .first = child->first, .count = child->count};
     if (!child_is_empty(child))
-        leaf.leaves_cost = leaf_cost(widening, bounds_half_area(child->box), child->count);
+        leaf->leaves_cost = leaf_cost(widening, bounds_half_area(child->box), child->count);
     return leaf;
 }
 
-// How many of the slots the first of two children best takes.
-static unsigned slots_share(const float *first, const float *second, unsigned slots)
+// How many of the slots, which both together may use, the first of two children best takes.
+static unsigned slots_share(const Subtree *first, const Subtree *second, unsigned slots)
 {
-    unsigned best = 1;
-    for (unsigned k = 2; k < slots; k++)
-        if (first[k] + second[slots - k] < first[best] + second[slots - best]) best = k;
+    const unsigned end = first->slots_max < slots - 1 ? first->slots_max : slots - 1;
+    unsigned best = slots > second->slots_max ? slots - second->slots_max : 1;
+    for (unsigned k = best + 1; k <= end; k++)
+        if (first->costs[k] + second->costs[slots - k] < first->costs[best] + second->costs[slots - best])
+            best = k;
     return best;
 }
 
@@ -85,23 +89,26 @@ static void costs_find(Widening *widening)
     const Bvh *bvh = widening->bvh;
     for (size_t i = bvh->node_count; i-- > 0;) {
         const BvhBinaryNode *node = &bvh->nodes[i];
-        Subtree first = child_subtree(widening, &node->children[0]);
-        Subtree second = child_subtree(widening, &node->children[1]);
-        Subtree subtree = {.leaves_cost = first.leaves_cost + second.leaves_cost};
-        subtree_count(widening, &first, &second, &subtree);
-        for (unsigned slots = 2; slots <= widening->width; slots++) {
-            unsigned share = slots_share(first.costs, second.costs, slots);
-            subtree.costs[slots] = first.costs[share] + second.costs[slots - share];
+        Subtree leaves[2];
+        const Subtree *first = child_subtree(widening, &node->children[0], &leaves[0]);
+        const Subtree *second = child_subtree(widening, &node->children[1], &leaves[1]);
+        Subtree *subtree = &widening->subtrees[i];
+        const unsigned leaf_count = first->slots_max + second->slots_max;
+        subtree->slots_max = leaf_count < widening->width ? leaf_count : widening->width;
+        subtree->leaves_cost = first->leaves_cost + second->leaves_cost;
+        subtree_count(widening, first, second, subtree);
+        for (unsigned slots = 2; slots <= subtree->slots_max; slots++) {
+            const unsigned share = slots_share(first, second, slots);
+            subtree->costs[slots] = first->costs[share] + second->costs[slots - share];
         }
-        double half_area = bounds_half_area(bvh_node_bounds(node));
-        float as_node =
-            subtree.costs[widening->width] + (float)(half_area * widening->scale * (node_cost + visit_cost));
-        float as_leaf = leaf_cost(widening, half_area, subtree.count) - subtree.leaves_cost;
-        subtree.is_leaf = subtree.count > 0 && as_leaf < as_node;
-        subtree.costs[1] = (subtree.is_leaf ? as_leaf : as_node) + tie_cost;
-        for (unsigned slots = 2; slots <= widening->width; slots++)
-            subtree.costs[slots] = fminf(subtree.costs[slots], subtree.costs[1]);
-        widening->subtrees[i] = subtree;
+        const double half_area = bounds_half_area(bvh_node_bounds(node));
+        const float as_node = subtree->costs[subtree->slots_max] +
+                              (float)(half_area * widening->scale * (node_cost + visit_cost));
+        const float as_leaf = leaf_cost(widening, half_area, subtree->count) - subtree->leaves_cost;
+        subtree->is_leaf = subtree->count > 0 && as_leaf < as_node;
+        subtree->costs[1] = (subtree->is_leaf ? as_leaf : as_node) + tie_cost;
+        for (unsigned slots = 2; slots <= subtree->slots_max; slots++)
+            subtree->costs[slots] = fminf(subtree->costs[slots], subtree->costs[1]);
     }
 }
 
@@ -112,8 +119,12 @@ static void children_gather(const Widening *widening, uint32_t index, unsigned s
                             BvhWideNode *node)
 {
     const BvhChild *children = widening->bvh->nodes[index].children;
-    Subtree first = child_subtree(widening, &children[0]), second = child_subtree(widening, &children[1]);
-    unsigned share = slots_share(first.costs, second.costs, slots);
+    Subtree leaves[2];
+    const Subtree *first = child_subtree(widening, &children[0], &leaves[0]);
+    const Subtree *second = child_subtree(widening, &children[1], &leaves[1]);
+    const unsigned both = first->slots_max + second->slots_max;
+    if (slots > both) slots = both;
+    const unsigned share = slots_share(first, second, slots);
     child_gather(widening, &children[0], share, wide, node);
     child_gather(widening, &children[1], slots - share, wide, node);
 }

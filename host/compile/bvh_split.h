@@ -1,0 +1,51 @@
+// Where a range of primitives is best split in two, by the surface area heuristic on bins of their centers
+// (Wald, On fast construction of SAH-based bounding volume hierarchies, RT 2007).
+#pragma once
+
+#include "host/scene/bounds.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef float Float4 __attribute__((vector_size(16)));
+typedef int32_t Int4 __attribute__((vector_size(16)));
+
+// Boxes while the tree is built: single precision is enough to choose splits. Scaled so that the largest
+// coordinate is about 1, which keeps areas of any scene within range.
+typedef struct {
+    Float4 low, high; // the fourth lanes unused
+} BuildBox;
+
+// A primitive while the tree is built. The fourth lanes of the box hold its index and its kind, as the bits
+// of floats from 2 on, with which arithmetic is as fast as with others.
+typedef struct {
+    BuildBox box;
+} PrimitiveReference;
+
+// Around the primitives' boxes, and around their centers.
+typedef struct {
+    BuildBox boxes, centers;
+} RangeBounds;
+
+// `scale`: of the box's coordinates; index: below 2^28.
+PrimitiveReference reference_make(Bounds box, double scale, uint32_t index, uint8_t kind);
+
+static inline uint32_t reference_index(const PrimitiveReference *reference)
+{
+    return (uint32_t)((Int4)reference->box.low)[3] & 0xfffffff;
+}
+
+static inline uint8_t reference_kind(const PrimitiveReference *reference)
+{
+    return (uint8_t)((Int4)reference->box.high)[3];
+}
+
+RangeBounds range_bounds_empty(void);
+RangeBounds range_bounds_join(RangeBounds a, RangeBounds b);
+RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count);
+
+// Partitions the range where that pays or it is too large for a leaf, and sets the bounds of both sides.
+// `is_parallel`: by several threads, which are idle. Returns how many are on the left side; `count` where the
+// range stays whole.
+size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, bool is_parallel,
+                   RangeBounds sides[2]);
