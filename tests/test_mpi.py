@@ -101,6 +101,16 @@ class Mpi(TestCase):
                 self.assertEqual(len(report["by_rank"]), count - 1)
                 self.assertAlmostEqual(sum(part["share"] for part in report["by_device"] + report["by_rank"]), 1)
 
+    def test_certified(self):
+        """The pixels that any rank repeats in double count. The other rank has no file of the scene's."""
+        command = f"{RENDER} --precision certified --timing=json"
+        one = self.json(f"{command} -o one.npy", env=POCL)
+        ranks = json.loads(self.mpirun(f"-n 1 {RANKS} {command} -o ranks.npy : -n 1 --wdir / {RANKS} {command} -o ranks.npy").stdout)
+        self.assertSameBytes("one.npy", "ranks.npy")
+        self.assertGreater(one["repeated_samples"], 0)
+        for key in "repeated_samples", "undecided_samples":
+            self.assertEqual(ranks[key], one[key])
+
     def test_mixed_lanes(self):
         """Each rank gets the BVH of its own lanes."""
         scene = ROOT / "scenes/spheres16.yaml"
