@@ -63,7 +63,7 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
     // nearly parallel: beyond the least distance over the greatest approach
     real least = real_max(fabs(height) - height_error, (real)(0));
     real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
-    mask moves = least * (real)(SMALLEST_RATIO) < greatest;
+    mask moves = quotient_is_bounded(least, greatest);
     real parallel_low =
         lanes_select(moves, real_divide(least, lanes_select(moves, greatest, (real)(1))), (real)(LARGEST)) *
         (real)(1 - 16 * UNIT_ROUNDOFF);

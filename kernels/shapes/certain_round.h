@@ -122,7 +122,7 @@ static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
 
 static inline real divide_or(real a, real b, real otherwise)
 {
-    mask usable = fabs(a) * (real)(SMALLEST_RATIO) < fabs(b);
+    mask usable = quotient_is_bounded(a, b);
     return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
 }
 

@@ -72,7 +72,7 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     real sum = lanes_select(ahead, root - b, -(root + b));
     mask zero = sum == (real)(0);
     // a ray along the axis has a = 0 and one root; the other is infinitely far on the open side
-    mask within = fabs(sum) * (real)(SMALLEST_RATIO) < a;
+    mask within = quotient_is_bounded(sum, a);
     real far_root = lanes_select(within, real_divide(sum, lanes_select(within, a, (real)(1))),
                                  lanes_select(ahead, (real)(LARGEST), (real)(-LARGEST)));
     real near_root = lanes_select(zero, far_root, real_divide(c, lanes_select(zero, (real)(1), sum)));

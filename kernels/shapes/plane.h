@@ -8,8 +8,7 @@
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
     mask ahead = (height > (real)(0)) == (along > (real)(0));
-    mask hit = RAY_ACTIVE(ray) & (ahead | (ray->tmin < (real)(0))) &
-               (fabs(height) * (real)(SMALLEST_RATIO) < fabs(along));
+    mask hit = RAY_ACTIVE(ray) & (ahead | (ray->tmin < (real)(0))) & quotient_is_bounded(height, along);
     if (!lanes_any(hit)) return hit;
     *t = real_divide(height, lanes_select(hit, along, (real)(1)));
     return hit & (*t > ray->tmin);

@@ -196,7 +196,7 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
         real norm = vector_norm(across);
         real excess = (norm - fabs(radius)) * (norm + fabs(radius));
         real steepness = (real)(2) * real_fma(-radius, quadric->h, vector_dot(across, quadric->q));
-        mask steep = (fabs(excess) * (real)(SMALLEST_RATIO) < fabs(steepness)) & (fabs(t) < (real)(LARGEST));
+        mask steep = quotient_is_bounded(excess, steepness) & (fabs(t) < (real)(LARGEST));
         real step = real_divide(excess, lanes_select(steep, steepness, (real)(1)));
         t = lanes_select(steep, t - step, t);
     }
@@ -253,7 +253,7 @@ static inline Interval revolution_roots(const RevolutionQuadric *quadric, bool s
     mask ahead = quadric->b < (real)(0);
     real q = lanes_select(ahead, root - quadric->b, -(root + quadric->b));
     *zero = q == (real)(0);
-    mask within = fabs(q) * (real)(SMALLEST_RATIO) < fabs(quadric->a);
+    mask within = quotient_is_bounded(q, quadric->a);
     mask positive_ratio = (q > (real)(0)) == (quadric->a >= (real)(0));
     real q_over_a = lanes_select(within, real_divide(q, lanes_select(within, quadric->a, (real)(1))),
                                  lanes_select(positive_ratio, (real)(LARGEST), (real)(-LARGEST)));

@@ -50,7 +50,7 @@ static inline real torus_cubic(real p, real q, real s, real *slope)
 // The next iterate within a bracket: Newton's step if it lies inside, else the middle.
 static inline real bracket_next(real low, real high, real s, real value, real slope)
 {
-    mask usable = fabs(value) * (real)(SMALLEST_RATIO) < fabs(slope);
+    mask usable = quotient_is_bounded(value, slope);
     real newton = s - real_divide(value, lanes_select(usable, slope, (real)(1)));
     mask inside = usable & (newton > low) & (newton < high);
     return lanes_select(inside, newton, (real)(0.5f) * (low + high));

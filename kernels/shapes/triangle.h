@@ -124,7 +124,7 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
         along = vector_dot_compensated(normal, ray->direction);
         height = vector_dot_compensated(normal, vector_subtract(a, ray->origin));
     }
-    mask crosses = fabs(height) * (real)(SMALLEST_RATIO) < fabs(along);
+    mask crosses = quotient_is_bounded(height, along);
     return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), in_plane);
 }
 
