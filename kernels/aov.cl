@@ -42,7 +42,7 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
         film_store_integer(layers->shadow, tile, light_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }
-    if (IS_CERTIFIED) film_count_doubts(doubts, tile, doubt, true);
+    if (IS_CERTIFIED) film_note_doubts(doubts, tile, doubt, true);
 }
 
 kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint light_count,

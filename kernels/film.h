@@ -15,6 +15,7 @@ typedef struct {
     mask inside;
     integer index; // of each pixel within the band
     uint width;    // of the band
+    uint number;   // of the tile, in the order of work-items
 } Tile;
 
 // Mixes 32 bits one to one: as alike as two numbers are, their results are unlike.
@@ -54,7 +55,7 @@ static inline Tile list_tile(const Band *band, uint which)
         x.each[lane] = band->pixels[2 * at];
         y.each[lane] = band->pixels[2 * at + 1];
     }
-    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), index.all, 0};
+    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), index.all, 0, 0};
     if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
@@ -72,6 +73,9 @@ static inline Tile band_tile(const Band *band, uint which)
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
     tile.index = y * (integer)((scalar_integer)band->width) + x;
     tile.width = band->width;
+    const uint item_width = MACRO_TILE_COLUMNS * TILE_WIDTH,
+               of_row = (band->width + item_width - 1) / item_width;
+    tile.number = ((uint)get_global_id(1) * of_row + (uint)get_global_id(0)) * TILES + which;
     integer cell = (integer)((scalar_integer)band->cell);
     tile.pixels.x = x * cell + (integer)((scalar_integer)band->first_x);
     tile.pixels.y = y * cell + (integer)((scalar_integer)band->first_y);
@@ -129,10 +133,16 @@ static inline void film_store_color(global scalar *film, const Tile *tile, Vecto
     film_store(film, tile, 3, 2, color.z);
 }
 
-// Adds the lanes in doubt to their pixels' counts, of which a first launch finds none.
-static inline void film_count_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
+// Notes the lanes in doubt: in a word per tile, as bits; of a list in its pixels' counts. A first launch
+// finds none.
+static inline void film_note_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
 {
     if (!is_first && !lanes_any(doubt)) return;
+    if (!IS_PIXEL_LIST) {
+        int before = is_first ? 0 : doubts[tile->number];
+        doubts[tile->number] = before | (int)lanes_bits(doubt & tile->inside);
+        return;
+    }
     IntegerLanes counted = {doubt}, inside = {tile->inside}, index = {tile->index};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;

@@ -11,7 +11,7 @@ static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile
     unsigned_integer signature;
     mask doubt;
     ray_tree_color(scene, ray, false, &hit, &signature, &doubt);
-    if (IS_CERTIFIED) film_count_doubts(doubts, tile, doubt, true);
+    if (IS_CERTIFIED) film_note_doubts(doubts, tile, doubt, true);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 

@@ -37,7 +37,7 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
             unsigned_integer path;
             mask doubt;
             Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path, &doubt);
-            if (IS_CERTIFIED) film_count_doubts(doubts, &tiles[i], doubt, sample == 0);
+            if (IS_CERTIFIED) film_note_doubts(doubts, &tiles[i], doubt, sample == 0);
             Color3 color = vector_subtract(traced, lost[i]);
             Color3 next = vector_add(sums[i], color);
             lost[i] = vector_subtract(vector_subtract(next, sums[i]), color);

@@ -39,6 +39,18 @@ static cl_mem film_buffer(Renderer *renderer, size_t size)
     return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
 }
 
+static size_t divide_up(uint32_t count, uint32_t by)
+{
+    return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
+}
+
+size_t film_tile_count(const Renderer *renderer, const Film *film)
+{
+    const uint32_t lanes = renderer->report.lanes;
+    const TileShape item = item_shape(lanes);
+    return divide_up(film->width, item.width) * divide_up(film->height, item.height) * lanes;
+}
+
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
 {
     // a kernel fills all of its layers, but computes shadows only on request
@@ -52,11 +64,12 @@ void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, 
     buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = renderer->pass != PASS_ALL;
-    const size_t pixels_size = renderer->repeat || is_list ? film_pixel_count(&film) * sizeof(uint32_t) : 0;
-    const size_t doubts_size = renderer->repeat ? pixels_size : 0;
+    const size_t pixel_count = film_pixel_count(&film),
+                 doubt_count = is_list ? pixel_count : film_tile_count(renderer, &film),
+                 doubts_size = renderer->repeat ? doubt_count * sizeof(uint32_t) : 0;
     buffers->doubts = film_buffer(renderer, doubts_size);
     buffers->center_doubts = film_buffer(renderer, doubts_size);
-    buffers->pixels = film_buffer(renderer, is_list ? 2 * pixels_size : 0);
+    buffers->pixels = film_buffer(renderer, is_list ? 2 * pixel_count * sizeof(uint32_t) : 0);
 }
 
 void band_buffers_close(BandBuffers *buffers)
@@ -69,11 +82,6 @@ void band_buffers_close(BandBuffers *buffers)
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         buffer_release(buffers->layers[layer]);
     *buffers = (BandBuffers){0};
-}
-
-static size_t divide_up(uint32_t count, uint32_t by)
-{
-    return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
 }
 
 Place band_place(const Renderer *renderer, BandRows rows)

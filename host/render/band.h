@@ -6,8 +6,10 @@
 typedef struct {
     uint32_t rows;
     cl_mem ray_counts, compensation, layers[LAYER_COUNT];
-    cl_mem doubts;        // at `certified`: of each pixel's color, how many of its samples are in doubt
-    cl_mem center_doubts; // likewise of its AOVs, 0 or 1
+    // at `certified`: of each tile which pixels' colors are in doubt, as bits; of a list's pixels how many
+    // samples
+    cl_mem doubts;
+    cl_mem center_doubts; // likewise of the AOVs
     cl_mem pixels;        // where a list is rendered: x and y of each
     RepeatCounts repeats; // of the band, since its last delivery
 } BandBuffers;
@@ -23,6 +25,8 @@ typedef struct {
 } Place;
 
 Place band_place(const Renderer *renderer, BandRows rows);
+// The tiles of a film's work-items.
+size_t film_tile_count(const Renderer *renderer, const Film *film);
 // The first `count` pixels of a list.
 Place list_place(const Renderer *renderer, uint32_t count);
 

@@ -162,7 +162,7 @@ bool renderer_certifies(const Renderer *renderer)
     return renderer->settings.precision == PRECISION_CERTIFIED || renderer->pass == PASS_IN_DOUBT;
 }
 
-static Renderer *prepare(Compute *compute, const RenderSettings *settings, PixelPass pass, Renderer *earlier)
+static Renderer *prepare(Compute *compute, const RenderSettings *settings, PixelPass pass)
 {
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
@@ -174,20 +174,14 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
     report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->is_double);
-    if (earlier) renderer_kernels_take(renderer, earlier);
-    if (renderer_certifies(renderer))
-        renderer->repeat = prepare(compute, settings, pass + 1, earlier ? earlier->repeat : NULL);
+    if (renderer_certifies(renderer)) renderer->repeat = prepare(compute, settings, pass + 1);
     return renderer;
 }
 
-Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, Renderer *earlier,
-                              MessageList *messages)
+Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, MessageList *messages)
 {
-    Renderer *renderer = NULL;
-    if (compute_ok(compute) && settings_fit(settings, compute->device, messages))
-        renderer = prepare(compute, settings, PASS_ALL, earlier);
-    renderer_close(earlier);
-    return renderer;
+    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
+    return prepare(compute, settings, PASS_ALL);
 }
 
 // NULL: there is no such pass.
@@ -296,7 +290,7 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
                     MessageList *of_each)
 {
     for (size_t i = 0; i < count; i++)
-        renderers[i] = renderer_open_empty(computes[i], settings, renderers[i], &of_each[i]);
+        renderers[i] = renderer_open_empty(computes[i], settings, &of_each[i]);
     const bool compiles = variants_compile(renderers, count, scene, settings, others, messages, of_each);
     for (size_t i = 0; i < count; i++) {
         if (compiles && compute_ok(computes[i])) continue;
@@ -309,7 +303,7 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    Renderer *renderer = NULL;
+    Renderer *renderer;
     return renderers_open(&renderer, &compute, 1, scene, settings, NULL, messages, messages) ? renderer
                                                                                              : NULL;
 }
@@ -353,25 +347,15 @@ uint64_t renderer_scene_hash(const Renderer *renderer)
     return hash;
 }
 
-void renderer_release_scene(Renderer *renderer)
-{
-    for (; renderer; renderer = renderer->repeat) {
-        for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-            buffer_release(renderer->arrays[kind]);
-            renderer->arrays[kind] = NULL;
-        }
-        buffer_release(renderer->offsets);
-        renderer->offsets = NULL;
-        compiled_scene_free(&renderer->compiled);
-    }
-}
-
 void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
-    renderer_release_scene(renderer);
     renderer_close(renderer->repeat);
     renderer_kernels_close(renderer);
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        buffer_release(renderer->arrays[kind]);
+    buffer_release(renderer->offsets);
+    compiled_scene_free(&renderer->compiled);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
     free(renderer);
@@ -382,7 +366,7 @@ size_t renderer_scalar_size(const Renderer *renderer)
     return renderer->report.is_double ? sizeof(double) : sizeof(float);
 }
 
-void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
+void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size, cl_map_flags access)
 {
     Compute *compute = renderer->compute;
     if (!compute_ok(compute)) return NULL;
@@ -391,7 +375,7 @@ void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size)
     cl_int status;
     fault_note_call("clEnqueueMapBuffer");
     void *mapped =
-        clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, CL_MAP_READ, 0, size, 0, NULL, &event, &status);
+        clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, access, 0, size, 0, NULL, &event, &status);
     if (!compute_check_object(compute, mapped, status, "clEnqueueMapBuffer")) {
         if (event) clReleaseEvent(event);
         return NULL;

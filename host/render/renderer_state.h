@@ -44,8 +44,6 @@ bool renderer_certifies(const Renderer *renderer);
 // Chooses the variant of the kernels that the settings, the device and the compiled scene need; of the two
 // last used it takes the one that suits, with its kernels.
 void renderer_kernels_choose(Renderer *renderer);
-// Takes the kernels of an earlier renderer of the device, which is left with none, and has none before.
-void renderer_kernels_take(Renderer *renderer, Renderer *earlier);
 void renderer_kernels_close(Renderer *renderer);
 
 // The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first requested. NULL:
@@ -56,7 +54,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
                            const size_t *group);
 
-// Maps a buffer for the host to read and adds the time to the report; NULL: the device failed. Released with
-// renderer_unmap, which accepts NULL.
-void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size);
+// Maps a buffer for the host, to read or also to write, and adds the time to the report; NULL: the device
+// failed. Released with renderer_unmap, which accepts NULL.
+void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size, cl_map_flags access);
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

@@ -6,33 +6,39 @@
 
 // A list's pixels in a band, and what a renderer at double made of them.
 typedef struct {
-    uint32_t *pixels; // x and y in the image
-    uint32_t *index;  // in the band
-    uint32_t count;
+    uint32_t *items;
+    size_t count, capacity;
+} Numbers;
+
+typedef struct {
+    Numbers pixels; // x and y in the image
+    Numbers index;  // in the band
 } PixelList;
 
-// The pixels of a band that have doubts, block by block, so that neighbors share packets.
-static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint32_t *doubts)
+// The pixels of a band that are in doubt, tile by tile, so that neighbors share packets.
+static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint32_t *doubts,
+                             size_t tile_count)
 {
-    enum { BLOCK = 8 };
     const RenderSettings *settings = &renderer->settings;
-    const uint32_t width = settings->region_width, cell = settings_cell(settings);
+    const uint32_t lanes = renderer->report.lanes, columns = MACRO_TILE_COLUMNS_OF(lanes),
+                   tile_width = TILE_WIDTH_OF(lanes), tile_height = TILE_HEIGHT_OF(lanes),
+                   width = settings->region_width, cell = settings_cell(settings);
+    const uint32_t items_of_row = (width + columns * tile_width - 1) / (columns * tile_width);
     PixelList list = {0};
-    for (size_t i = 0; i < (size_t)width * rows.row_count; i++)
-        list.count += doubts[i] != 0;
-    if (list.count == 0) return list;
-    list.pixels = memory_allocate(list.count, 2 * sizeof *list.pixels);
-    list.index = memory_allocate(list.count, sizeof *list.index);
-    uint32_t n = 0;
-    for (uint32_t block_y = 0; block_y < rows.row_count; block_y += BLOCK)
-        for (uint32_t block_x = 0; block_x < width; block_x += BLOCK)
-            for (uint32_t y = block_y; y < block_y + BLOCK && y < rows.row_count; y++)
-                for (uint32_t x = block_x; x < block_x + BLOCK && x < width; x++) {
-                    if (doubts[(size_t)y * width + x] == 0) continue;
-                    list.pixels[2 * n] = settings->region_x + x * cell;
-                    list.pixels[2 * n + 1] = settings->region_y + (rows.first_row + y) * cell;
-                    list.index[n++] = y * width + x;
-                }
+    for (size_t i = 0; i < tile_count; i++) {
+        const uint32_t item = (uint32_t)(i / lanes), which = (uint32_t)(i % lanes);
+        const uint32_t left = (item % items_of_row * columns + which % columns) * tile_width,
+                       top =
+                           (item / items_of_row * MACRO_TILE_ROWS_OF(lanes) + which / columns) * tile_height;
+        if (left >= width || top >= rows.row_count) continue; // not a tile of the band
+        for (uint32_t bits = doubts[i], lane = 0; bits != 0; bits >>= 1, lane++) {
+            if (!(bits & 1)) continue;
+            const uint32_t x = left + lane % tile_width, y = top + lane / tile_width;
+            array_push(list.pixels, settings->region_x + x * cell);
+            array_push(list.pixels, settings->region_y + (rows.first_row + y) * cell);
+            array_push(list.index, y * width + x);
+        }
+    }
     return list;
 }
 
@@ -41,27 +47,27 @@ static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem 
                         const PixelList *list, const Film *band)
 {
     Renderer *repeat = renderer->repeat;
-    const Film film = {.width = list->count,
+    const Film film = {.width = (uint32_t)list->index.count,
                        .height = 1,
                        .light_count = band->light_count,
                        .real_size = renderer_scalar_size(repeat)};
-    const size_t components = film_components(band, layer), size = film_layer_size(band, layer);
+    const size_t components = film_components(band, layer);
     const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
-    void *repeated = memory_allocate(film_layer_size(&film, layer), 1), *values = memory_allocate(size, 1);
+    void *values = renderer_map(renderer, of_band, film_layer_size(band, layer), CL_MAP_READ | CL_MAP_WRITE);
+    if (!values) return;
+    void *repeated = memory_allocate(film_layer_size(&film, layer), 1);
     buffer_read(renderer->compute, of_list, film_layer_size(&film, layer), repeated);
-    buffer_read(renderer->compute, of_band, size, values);
-    for (size_t i = 0; i < list->count; i++)
+    for (size_t i = 0; i < list->index.count; i++)
         for (size_t k = 0; k < components; k++) {
-            const size_t from = i * components + k, to = list->index[i] * components + k;
+            const size_t from = i * components + k, to = list->index.items[i] * components + k;
             if (layer_types[layer] == LAYER_TYPE_INTEGER)
                 ((uint32_t *)values)[to] = ((const uint32_t *)repeated)[from];
             else
                 ((float *)values)[to] =
                     (float)(((const double *)repeated)[from] / (is_length ? renderer->compiled.unit : 1));
         }
-    buffer_write(renderer->compute, of_band, size, values);
+    renderer_unmap(renderer, of_band, values);
     free(repeated);
-    free(values);
 }
 
 static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
@@ -87,14 +93,15 @@ typedef struct {
 static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
                         uint32_t *undecided)
 {
-    const Film film = {.width = list->count,
+    const Film film = {.width = (uint32_t)list->index.count,
                        .height = 1,
                        .light_count = band->film.light_count,
                        .real_size = renderer_scalar_size(repeat)};
-    const Place place = list_place(repeat, list->count);
+    const Place place = list_place(repeat, (uint32_t)list->index.count);
     BandBuffers repeated = {0};
     band_buffers_open(&repeated, repeat, band->aovs, film);
-    buffer_write(repeat->compute, repeated.pixels, list->count * 2 * sizeof *list->pixels, list->pixels);
+    buffer_write(repeat->compute, repeated.pixels, list->pixels.count * sizeof *list->pixels.items,
+                 list->pixels.items);
     if (band->kind == KERNEL_RENDER)
         band_render(repeat, &repeated, &place, 0, renderer->settings.sample_count);
     else
@@ -106,7 +113,7 @@ static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
                         &band->film);
     if (undecided)
         buffer_read(renderer->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
-                    list->count * sizeof *undecided, undecided);
+                    list->index.count * sizeof *undecided, undecided);
     repeat_launches_take(&renderer->report, &repeat->report);
     band_buffers_close(&repeated);
 }
@@ -115,15 +122,17 @@ static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
 static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
 {
     uint64_t samples = 0;
-    uint32_t kept = 0;
-    for (uint32_t i = 0; i < list->count; i++) {
+    size_t kept = 0;
+    uint32_t *pixels = list->pixels.items, *index = list->index.items;
+    for (size_t i = 0; i < list->index.count; i++) {
         if (undecided[i] == 0) continue;
         samples += undecided[i];
-        list->pixels[2 * kept] = list->pixels[2 * i];
-        list->pixels[2 * kept + 1] = list->pixels[2 * i + 1];
-        list->index[kept++] = list->index[i];
+        pixels[2 * kept] = pixels[2 * i];
+        pixels[2 * kept + 1] = pixels[2 * i + 1];
+        index[kept++] = index[i];
     }
-    list->count = kept;
+    list->pixels.count = 2 * kept;
+    list->index.count = kept;
     return samples;
 }
 
@@ -133,21 +142,22 @@ void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
     cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
     const RepeatedBand band = {kind, layers, aovs, buffers,
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
-    uint32_t *values = renderer_map(renderer, doubts, film_pixel_count(&band.film) * sizeof *values);
+    const size_t tile_count = film_tile_count(renderer, &band.film);
+    uint32_t *values = renderer_map(renderer, doubts, tile_count * sizeof *values, CL_MAP_READ);
     if (!values) return;
-    PixelList list = doubts_list(renderer, rows, values);
+    PixelList list = doubts_list(renderer, rows, values, tile_count);
     renderer_unmap(renderer, doubts, values);
-    if (list.count > 0) {
+    if (list.index.count > 0) {
         RepeatCounts *counts = &buffers->repeats;
-        uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
+        uint32_t *undecided = memory_allocate(list.index.count, sizeof *undecided);
         counts->repeated +=
-            (uint64_t)list.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
+            (uint64_t)list.index.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
         list_repeat(renderer, renderer->repeat, &band, &list, undecided);
         if (compute_ok(renderer->compute)) counts->undecided += list_keep_undecided(&list, undecided);
-        if (compute_ok(renderer->compute) && list.count > 0)
+        if (compute_ok(renderer->compute) && list.index.count > 0)
             list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
         free(undecided);
     }
-    free(list.pixels);
-    free(list.index);
+    free(list.pixels.items);
+    free(list.index.items);
 }

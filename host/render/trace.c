@@ -81,8 +81,8 @@ static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_m
 {
     Compute *compute = renderer->compute;
     size_t result_size = (size_t)count * RESULT_SCALARS * renderer_scalar_size(renderer);
-    const void *result = renderer_map(renderer, results, result_size);
-    const uint32_t *object = renderer_map(renderer, objects, (size_t)count * sizeof *object);
+    const void *result = renderer_map(renderer, results, result_size, CL_MAP_READ);
+    const uint32_t *object = renderer_map(renderer, objects, (size_t)count * sizeof *object, CL_MAP_READ);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
         hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i],
                          renderer->compiled.unit);
