@@ -53,7 +53,9 @@ enum { CULL_SPHERES_MAX = 1 << 20 };
 void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
 {
     const double roundoff = (settings->precision == PRECISION_DOUBLE ? DBL_EPSILON : FLT_EPSILON) / 2;
-    const double slack = roundoff * (settings->certifies ? CERTIFIED_CULL_SPHERE_SLACK : CULL_SPHERE_SLACK);
+    const double slack = roundoff * CULL_SPHERE_SLACK,
+                 light_slack =
+                     roundoff * (settings->certifies ? CERTIFIED_CULL_SPHERE_SLACK : CULL_SPHERE_SLACK);
     const FlatArray *lights = &compiled->arrays[FLAT_LIGHTS];
     size_t count = 1;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
@@ -70,5 +72,6 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
     CullSphere *row = compiled->arrays[FLAT_CULL_SPHERES].items;
     row_fill(compiled, compiled->eye_offset, slack, row);
     for (size_t i = 0; i < lights->count; i++)
-        row_fill(compiled, vector3_of(&((const FlatLight *)lights->items)[i].position), slack, row += count);
+        row_fill(compiled, vector3_of(&((const FlatLight *)lights->items)[i].position), light_slack,
+                 row += count);
 }

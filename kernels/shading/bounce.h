@@ -83,7 +83,7 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
 // The largest error of a bounced ray's direction that is still traced.
 #define BOUNCE_ERROR_MAX ((real)(0x1p-8f))
 
-// The bounds of a surface's reflected and refracted ray. d - 2 (d . N) N is off by the error of d and 4 times
+// The bounds of a surface's reflected and refracted ray. d - 2 (d . N) N is off by the error of d and twice
 // that of N; the refracted ray by Snell's law, whose root divides by the refracted cosine. Lanes in doubt are
 // not traced further.
 static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
@@ -92,7 +92,7 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     const real zero = (real)(0), one = (real)(1), rounding = (real)(32 * UNIT_ROUNDOFF);
     real normal_error = surface->normal_error, turn = ray->direction_error + rounding;
     mask found = surface->found & ray->active, open = mask_none();
-    real reflected_error = real_fma((real)(4), normal_error, turn);
+    real reflected_error = real_fma((real)(2.25f), normal_error, turn);
     reflected->origin_error = refracted->origin_error = surface->place_error;
     reflected->left = refracted->left = surface->object;
     reflected->direction_error = reflected_error;

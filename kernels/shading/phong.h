@@ -73,7 +73,7 @@ typedef struct {
 
 // The largest error of a shadow ray's origin, in u of its length, that cull spheres allow: rays with a larger
 // one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is in doubt.
-enum { SHADOW_ERROR_MAX = 1 << 13 };
+enum { SHADOW_ERROR_MAX = 1 << 9 };
 #define SHADOW_DOUBT_MAX ((real)(0x1p-6f))
 // Where the facing is open by no more than this, what the light adds is too faint to matter.
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
@@ -85,9 +85,9 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     const real zero = (real)(0);
     real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
     mask far_off = mask_none(), is_loose = far_off;
-    shadow_ray->direction_error = (real)(8 * UNIT_ROUNDOFF);
+    shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
-        place_error = place_error + (real)(4 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
+        place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
         real distance = vector_norm(shadow_ray->direction);
         mask apart = distance > (real)(4) * place_error;
         real relative = real_divide(place_error, lanes_select(apart, distance, (real)(1)));
@@ -101,14 +101,15 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     shadow_ray->left = surface->object;
     real geometric = vector_dot(surface->normal, visibility->direction);
     real facing_error = surface->normal_error + angle_error;
-    shadow_ray->leaves_outward = surface->entering & (geometric > facing_error);
+    real geometric_error = surface->geometric_error + angle_error;
+    shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
     mask turned = (visibility->facing < -facing_error) | !surface->found;
     mask open = !turned & (visibility->facing <= facing_error);
     mask faint = facing_error <= FACING_ERROR_MAX;
     visibility->facing_doubt = open & faint;
     // a light in front of the shading normal but behind the surface is occluded by the surface itself
-    mask behind = HAS_TRIANGLES ? !turned & (geometric < -facing_error) : mask_none();
-    mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= facing_error) : mask_none();
+    mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
+    mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
     self_doubt = self_doubt | (open & !faint);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {

@@ -34,8 +34,8 @@ typedef struct {
     mask entering;  // the ray runs into the solid, against its outward normal
     real travelled; // distance from the eye along the path
     // At `certified`: bounds on the distance of the position from the exact one and of the shading normal
-    // from the exact one's; the object; what is in doubt.
-    real place_error, normal_error;
+    // and of the geometric normal from the exact ones; the object; what is in doubt.
+    real place_error, normal_error, geometric_error;
     integer object;
     mask doubt;
 } Surface;
@@ -149,7 +149,7 @@ static inline real hit_place_error(const Ray *ray, const Hit *hit)
 {
     real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
     real rounding =
-        (real)(8 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
+        (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
     return ray_place_error(ray, length * t) +
            real_fma(length, real_max(hit->high - hit->t, hit->t - hit->low), rounding);
 }
@@ -157,7 +157,7 @@ static inline real hit_place_error(const Ray *ray, const Hit *hit)
 // Of the shading normal.
 static inline real point_normal_error(const SurfacePoint *point, real place_error)
 {
-    return real_fma((real)(4) * point->curvature, place_error, point->normal_error) +
+    return real_fma((real)(2) * point->curvature, place_error, point->normal_error) +
            (real)(16 * UNIT_ROUNDOFF);
 }
 
@@ -246,6 +246,7 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     mask is_open = fabs(cosine) <= geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
     is_open = is_open | (fabs(shading_cosine) <= geometric_error + surface->normal_error);
     surface->doubt = surface->doubt | (surface->found & is_open);
+    surface->geometric_error = geometric_error;
 }
 
 // Turns both normals to the side that the ray comes from.

@@ -18,9 +18,9 @@ typedef struct {
     real t, low, high;
 } CertainHit;
 
-// Camera rays, of their length: two products and sums of three terms of at most sqrt 3 of the direction, and
-// the roundings of the camera's vectors and of the unit length.
-enum { CAMERA_DIRECTION_ERROR = 20 };
+// Of camera rays, in u of their length: the three vectors' roundings add up to sqrt 3, as they are
+// perpendicular, two sums to 2, an offset in the pixel to 1, the unit length's to 1.
+enum { CAMERA_DIRECTION_ERROR = 7 };
 
 // How far the exact ray is from the packet's, up to a distance.
 static inline real ray_place_error(const Ray *ray, real distance)
@@ -89,27 +89,29 @@ typedef struct {
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray)
 {
     Vector f = vector_subtract(ray->origin, center);
-    real distance = vector_norm1(f);
-    real place = ray_place_error(ray, distance + radius) +
-                 (real)(UNIT_ROUNDOFF) *
-                     ((real)(32) * distance + (real)(4) * vector_norm1(ray->origin) + (real)(16) * radius);
-    real inverse_length = ray->inverse_length;
     CertainSphere crossed;
     crossed.middle_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
     Vector l = vector_fma(ray->direction, crossed.middle_t, f);
     real squared = real_fma(radius, radius, -vector_dot(l, l));
-    real band = place * (radius + radius + place) * (real)(1 + 8 * UNIT_ROUNDOFF);
+    // not less than |f| where |l| is up to twice the radius: beyond, errors in proportion to |l| do not count
+    real distance = real_fma(fabs(crossed.middle_t), ray->length, radius + radius);
+    real rounding = (real)(UNIT_ROUNDOFF)*real_fma((real)(3), distance,
+                                                   real_fma((real)(6), radius, vector_norm1(ray->origin)));
+    real place = ray_place_error(ray, distance) + rounding;
+    real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
+    real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
     crossed.active = RAY_ACTIVE(ray);
     crossed.certain = crossed.active & (squared > band);
     crossed.perhaps = crossed.active & !(squared < -band);
-    crossed.middle_error = (real)(2) * place * inverse_length;
-    real half_chord = real_sqrt(real_max(squared, (real)(0)));
-    real root = real_sqrt(real_max(squared, band));
-    crossed.t_error =
-        inverse_length * real_fma((real)(2) * band, real_divide((real)(1), root), place + place) +
-        (real)(16 * UNIT_ROUNDOFF) * inverse_length * half_chord;
-    crossed.near_t = real_fma(-half_chord, inverse_length, crossed.middle_t);
-    crossed.far_t = real_fma(half_chord, inverse_length, crossed.middle_t);
+    crossed.near_t = crossed.far_t = crossed.middle_error = crossed.t_error = (real)(0);
+    if (!lanes_any(crossed.perhaps)) return crossed;
+    real half_chord = real_sqrt(real_max(squared, (real)(0)) * ray->inverse_squared);
+    real chord_error = real_divide(band, real_sqrt(real_max(squared, band)));
+    crossed.middle_error = ray->inverse_length * (place + along);
+    crossed.t_error = real_fma(ray->inverse_length * (real)(1.5f), chord_error, crossed.middle_error) +
+                      (real)(16 * UNIT_ROUNDOFF) * half_chord;
+    crossed.near_t = crossed.middle_t - half_chord;
+    crossed.far_t = crossed.middle_t + half_chord;
     return crossed;
 }
 

@@ -32,7 +32,7 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
     mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
     if (lanes_any(left)) {
         // one crossing is the start; the other lies twice as far as the closest point
-        real t = (real)(2) * crossed.middle_t, t_error = (real)(4) * crossed.middle_error;
+        real t = (real)(2) * crossed.middle_t, t_error = (real)(2.5f) * crossed.middle_error;
         mask on = left & crossed.active;
         CertainHit other = certain_crossing(ray, on, on, t - t_error, t + t_error);
         hit = certain_select(left, other, hit);
@@ -50,16 +50,16 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
     real size = real_divide((real)(1 + 16 * UNIT_ROUNDOFF), (real)(normal_and_inverse.w));
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
-    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(8) * vector_norm1_along(unsigned_normal, to_point) +
-                                                 (real)(4) * vector_norm1_along(unsigned_normal, point)) +
+    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
+                                                 (real)(2) * vector_norm1_along(unsigned_normal, point)) +
                         size * ray->origin_error;
-    real along_error = (real)(6 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
+    real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
                        size * (ray->length * ray->direction_error);
     mask crosses = fabs(along) > (real)(8) * along_error;
     real divisor = lanes_select(crosses, along, (real)(1));
     real t = real_divide(height, divisor);
-    real t_error = real_divide((real)(1.25f) * real_fma(fabs(t), along_error, height_error), fabs(divisor)) +
-                   (real)(16 * UNIT_ROUNDOFF) * fabs(t);
+    real t_error = real_divide((real)(1.2f) * real_fma(fabs(t), along_error, height_error), fabs(divisor)) +
+                   (real)(8 * UNIT_ROUNDOFF) * fabs(t);
     // nearly parallel: beyond the least distance over the greatest approach
     real least = real_max(fabs(height) - height_error, (real)(0));
     real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
@@ -99,7 +99,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     real moved = ray->length, path = moved * fabs(hit.t);
     real place = ray_place_error(ray, path) + moved * ((real)(0.5f) * (hit.high - hit.low)) +
                  (real)(UNIT_ROUNDOFF) *
-                     ((real)(16) * (vector_norm1(f) + path + radius) + (real)(4) * vector_norm1(ray->origin));
+                     ((real)(4) * (vector_norm1(f) + path) + (real)(8) * radius + vector_norm1(ray->origin));
     real squared = real_fma(radius, radius, -vector_dot(across, across));
     real band = place * (radius + radius + place);
     mask within = squared > band, beyond = crosses & (squared < -band);
@@ -109,29 +109,25 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     return hit;
 }
 
-// Where the ray is between two planes across an axis, of a box larger by `more`.
-static inline Interval certain_slab(real low, real high, real more, real origin, real direction)
+// Where the ray is between two planes across an axis, of a box larger by `more`. ray_prepare sets `inverse`,
+// which is exact within 2 u.
+static inline Interval certain_slab(real low, real high, real more, real origin, real direction, real inverse)
 {
     mask parallel = fabs(direction) <= (real)(SMALLEST_RATIO);
-    real from = (low - more) - origin, to = (high + more) - origin;
-    real inverse = real_divide((real)(1), lanes_select(parallel, (real)(1), direction));
-    real a = from * inverse, b = to * inverse;
-    mask between = (from <= (real)(0)) & (to >= (real)(0));
+    real from = low - origin, to = high - origin;
+    real a = from * inverse, b = to * inverse, more_t = more * fabs(inverse);
+    mask between = (from <= more) & (to >= -more);
     real always = lanes_select(between, (real)(LARGEST / 4), (real)(-LARGEST / 4));
-    mask empty = from > to; // shrunk to nothing
-    Interval slab = {lanes_select(parallel, -always, real_min(a, b)),
-                     lanes_select(parallel, always, real_max(a, b))};
-    slab.near = lanes_select(empty, (real)(LARGEST / 4), slab.near);
-    slab.far = lanes_select(empty, (real)(-LARGEST / 4), slab.far);
-    return slab;
+    return (Interval){lanes_select(parallel, -always, real_min(a, b) - more_t),
+                      lanes_select(parallel, always, real_max(a, b) + more_t)};
 }
 
 static inline Interval certain_box(const Box *box, const Ray *ray, real more)
 {
-    Vector low = vector_of(box->low), high = vector_of(box->high);
-    Interval x = certain_slab(low.x, high.x, more, ray->origin.x, ray->direction.x);
-    Interval y = certain_slab(low.y, high.y, more, ray->origin.y, ray->direction.y);
-    Interval z = certain_slab(low.z, high.z, more, ray->origin.z, ray->direction.z);
+    Vector low = vector_of(box->low), high = vector_of(box->high), o = ray->origin, d = ray->direction;
+    Interval x = certain_slab(low.x, high.x, more, o.x, d.x, ray->inverse.x);
+    Interval y = certain_slab(low.y, high.y, more, o.y, d.y, ray->inverse.y);
+    Interval z = certain_slab(low.z, high.z, more, o.z, d.z, ray->inverse.z);
     return (Interval){real_max(real_max(x.near, y.near), z.near), real_min(real_min(x.far, y.far), z.far)};
 }
 
@@ -139,11 +135,13 @@ static inline Interval certain_box(const Box *box, const Ray *ray, real more)
 static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
 {
     mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, box->id.x, false);
-    Vector low = vector_of(box->low), high = vector_of(box->high);
-    Vector to_low = vector_subtract(low, ray->origin), to_high = vector_subtract(high, ray->origin);
-    real distance = vector_norm1(to_low) + vector_norm1(to_high);
-    real place =
-        ray_place_error(ray, distance) + (real)(32 * UNIT_ROUNDOFF) * (distance + vector_norm1(ray->origin));
+    Vector to_low = vector_subtract(vector_of(box->low), ray->origin),
+           to_high = vector_subtract(vector_of(box->high), ray->origin);
+    real distance = vector_norm1((Vector){real_max(fabs(to_low.x), fabs(to_high.x)),
+                                          real_max(fabs(to_low.y), fabs(to_high.y)),
+                                          real_max(fabs(to_low.z), fabs(to_high.z))});
+    real place = ray_place_error(ray, distance) +
+                 (real)(UNIT_ROUNDOFF)*real_fma((real)(8), distance, (real)(2) * vector_norm1(ray->origin));
     Interval outer = certain_box(box, ray, place);
     mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
     if (!lanes_any(perhaps)) return certain_miss();
@@ -169,7 +167,7 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     Vector max_abs = corners_max_abs((Corners){edges.a, edges.b, edges.c});
     real distance = vector_norm(max_abs);
     real place = ray_place_error(ray, distance) +
-                 (real)(UNIT_ROUNDOFF) * ((real)(48) * distance + (real)(2) * vector_norm1(ray->origin));
+                 (real)(UNIT_ROUNDOFF)*real_fma((real)(5), distance, (real)(2) * vector_norm1(ray->origin));
     Vector u = ray->across_u, v = ray->across_v;
     real error = place * ray->across_length;
     real ax = vector_dot(edges.a, u), ay = vector_dot(edges.a, v);
@@ -190,17 +188,16 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     if (!lanes_any(perhaps)) return certain_miss();
     mask certain = perhaps & (all_above | all_below);
 
-    real inverse_length = ray->inverse_length;
     real a_t = vector_dot(edges.a, ray->along), b_t = vector_dot(edges.b, ray->along),
          c_t = vector_dot(edges.c, ray->along);
     real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
-    real vertex_error = place * inverse_length;
-    real divisor = lanes_select(certain, edges.determinant, (real)(1));
-    real inverse = real_divide((real)(1), divisor);
+    real vertex_error = ray->inverse_length * real_fma((real)(16 * UNIT_ROUNDOFF), distance, place);
+    // in doubt as well: if it is hit, then where the weights say
+    mask narrows = perhaps & (fabs(edges.determinant) > (real)(8) * edge_error);
+    real inverse = real_divide((real)(1), lanes_select(narrows, edges.determinant, (real)(1)));
     real t = real_fma(a_t, edges.u * inverse, real_fma(b_t, edges.v * inverse, c_t * (edges.w * inverse)));
-    real part = (real)(4) * edge_error * fabs(inverse); // of all weights, if it is small
-    real t_error = (high - low) * part + (real)(32 * UNIT_ROUNDOFF) * (fabs(low) + fabs(high)) + vertex_error;
-    mask narrows = certain & (part < (real)(0.5f));
+    real part = (real)(2.5f) * edge_error * fabs(inverse); // of all weights
+    real t_error = (high - low) * part + (real)(16 * UNIT_ROUNDOFF) * (fabs(low) + fabs(high)) + vertex_error;
     low = low - vertex_error;
     high = high + vertex_error;
     low = lanes_select(narrows, real_max(low, t - t_error), low);
@@ -221,21 +218,22 @@ static inline real triangle_slimness(Corners corners)
                         (real)(1 / SMALLEST_RATIO));
 }
 
-// The errors of the normals: each vertex is off by up to 2 u of its 1-norm, and where normals are blended the
-// weights by that and the place's error.
+// The errors of the normals: each vertex is off by u of its length, and where normals are blended the weights
+// move with the place.
 static inline void triangle_set_normal_errors(Corners corners, Corners normals, TriangleWeights weights,
                                               SurfacePoint *point)
 {
     real slimness = triangle_slimness(corners);
-    real vertex_error = (real)(8 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
+    real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
     real apart = vector_norm1(vector_subtract(normals.a, normals.b)) +
                  vector_norm1(vector_subtract(normals.b, normals.c));
     Vector blend = triangle_blend(weights, normals);
     real length = vector_norm(blend);
     mask bends = (apart > (real)(0)) & (length > (real)(SMALLEST_RATIO));
-    point->curvature = lanes_select(
-        bends, (real)(4) * apart * slimness * real_divide((real)(1), lanes_select(bends, length, (real)(1))),
-        (real)(0));
+    point->curvature = lanes_select(bends,
+                                    (real)(1.25f) * apart * slimness *
+                                        real_divide((real)(1), lanes_select(bends, length, (real)(1))),
+                                    (real)(0));
     point->normal_error = vertex_error * (slimness + point->curvature);
 }
 

@@ -52,7 +52,9 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
     point.rho = vector_norm(point.across);
     point.radius = real_fma(round->slope, z, round->radius);
-    real from_eye = (real)(0), power_band = (real)(0), lift = round->k * z;
+    // what the axis' length, off by 14 u, leaves of z in the distance from it, squared
+    real left_of_z = (real)(20 * UNIT_ROUNDOFF) * z, power_band = left_of_z * left_of_z;
+    real from_eye = (real)(0), lift = round->k * z;
     if (round->has_power) {
         // rho^2 - radius^2 without cancellation next to the eye
         real rise = round->slope * z, twice = round->radius + round->radius;
@@ -60,10 +62,10 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
         Vector beyond = vector_fma(round->foot, (real)(-2), x);
         from_eye = round->power + (vector_dot(round_across(round, x), round_across(round, beyond)) - lift);
         real size = vector_norm1(x);
-        power_band = (real)(UNIT_ROUNDOFF) *
-                     ((real)(16) * real_fma(size, size + round->power_scale + round->power_scale,
-                                            fabs(lift) + fabs(rise) * fabs(twice)) +
-                      (real)(4) * fabs(round->power));
+        power_band += (real)(UNIT_ROUNDOFF) *
+                      ((real)(16) * real_fma(size, size + round->power_scale + round->power_scale,
+                                             fabs(lift) + fabs(rise) * fabs(twice)) +
+                       (real)(4) * fabs(round->power));
     }
     if (round->curves) {
         point.value = round->has_power ? from_eye : real_fma(point.rho, point.rho, -lift);
@@ -326,16 +328,20 @@ static inline real round_range(const Ray *ray, real size)
     return (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray->inverse_length;
 }
 
-static inline real round_place1(const Ray *ray)
+// In u of the coordinates: what the axis' direction and the products add; where the radius depends on the
+// height, the axis' length as well.
+enum { ROUND_ERROR = 8, SLOPED_ROUND_ERROR = 20 };
+
+static inline real round_place1(const Ray *ray, uint units)
 {
     return real_fma(ray->length, ray->direction_error,
-                    (real)(32 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
+                    (real)(units * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
 }
 
-static inline real round_place0(const Ray *ray, Vector start)
+static inline real round_place0(const Ray *ray, Vector start, uint units)
 {
-    return ray->origin_error +
-           (real)(UNIT_ROUNDOFF) * ((real)(32) * vector_norm1(start) + (real)(4) * vector_norm1(ray->origin));
+    return ray->origin_error + (real)(UNIT_ROUNDOFF)*real_fma((real)(units), vector_norm1(start),
+                                                              (real)(2) * vector_norm1(ray->origin));
 }
 
 static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray)
@@ -351,8 +357,8 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     round.slope = round.k = zero;
     round.power = eye_power_of(sphere->id);
     round.power_scale = vector_norm1(round.foot);
-    round.place0 = round_place0(ray, ray->origin);
-    round.place1 = round_place1(ray);
+    round.place0 = round_place0(ray, ray->origin, ROUND_ERROR);
+    round.place1 = round_place1(ray, ROUND_ERROR);
     round.has_power = true;
     round.curves = false;
     real range = round_range(ray, round.power_scale + round.radius + vector_norm1(ray->origin));
@@ -396,8 +402,9 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
     round->power_scale = vector_norm1(base);
     round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, base);
-    round->place0 = round_place0(ray, round->start);
-    round->place1 = round_place1(ray);
+    const uint units = sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR;
+    round->place0 = round_place0(ray, round->start, units);
+    round->place1 = round_place1(ray, units);
     solid.low = (real)(shape->range.w) * inverse;
     solid.high = (real)(shape->range.x) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high - solid.low);
@@ -502,8 +509,8 @@ static inline RoundSolid round_of_paraboloid(const Paraboloid *shape, const Ray 
     round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
     round->power_scale = vector_norm1(round->foot);
     round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, apex);
-    round->place0 = round_place0(ray, round->start);
-    round->place1 = round_place1(ray);
+    round->place0 = round_place0(ray, round->start, SLOPED_ROUND_ERROR);
+    round->place1 = round_place1(ray, SLOPED_ROUND_ERROR);
     real lift = round->has_power ? (real)(shape->foot_lift.w) * inverse : (real)(0);
     solid.high = (real)(shape->axis_end.w) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high + lift);

@@ -27,11 +27,11 @@ static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
     certain.major = (real)(torus->center_major.w);
     certain.minor = (real)(torus->axis_minor.w);
     certain.place0 =
-        ray->origin_error + (real)(UNIT_ROUNDOFF) * ((real)(32) * vector_norm1(certain.start) +
-                                                     (real)(4) * vector_norm1(ray->origin) +
-                                                     (real)(16) * (certain.major + certain.minor));
-    certain.place1 = real_fma(ray->length, ray->direction_error,
-                              (real)(32 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
+        ray->origin_error + (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
+                                                     (real)(2) * vector_norm1(ray->origin) +
+                                                     (real)(24) * (certain.major + certain.minor));
+    certain.place1 =
+        real_fma(ray->length, ray->direction_error, (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
     return certain;
 }
 

@@ -83,6 +83,19 @@ static inline void frame_across(Vector d, Vector *u, Vector *v)
     *v = (Vector){-d.x * d.y, real_fma(-d.y, d.y, side * norm_w), -d.y * w};
 }
 
+// Two vectors exactly perpendicular to d, so that products with points far along it do not cancel badly: a
+// shear along the largest component, as in Woop, Benthin, Wald (shapes/triangle.h).
+static inline void shear_across(Vector d, Vector *u, Vector *v)
+{
+    const real zero = (real)(0);
+    mask by_z = (fabs(d.z) >= fabs(d.x)) & (fabs(d.z) >= fabs(d.y)), by_x = !by_z & (fabs(d.x) > fabs(d.y));
+    mask by_y = !by_z & !by_x;
+    *u = (Vector){lanes_select(by_z, d.z, lanes_select(by_y, d.y, -d.y)),
+                  lanes_select(by_z, zero, lanes_select(by_y, -d.x, d.x)), lanes_select(by_z, -d.x, zero)};
+    *v = (Vector){lanes_select(by_x, -d.z, zero), lanes_select(by_z, d.z, lanes_select(by_y, -d.z, zero)),
+                  lanes_select(by_z, -d.y, lanes_select(by_y, d.y, d.x))};
+}
+
 static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax, mask active)
 {
     Ray ray;
@@ -117,9 +130,14 @@ static inline void ray_prepare(Ray *ray)
     ray->inverse = (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
     if (!HAS_TRIANGLES) return;
     real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
-    frame_across(vector_scale(d, real_inverse_power_of_two(largest)), &ray->across_u, &ray->across_v);
+    real scale = real_inverse_power_of_two(largest);
     ray->along = vector_scale(d, ray->inverse_squared);
-    if (IS_CERTIFIED) ray->across_length = vector_norm(ray->across_u) * (real)(1 + 32 * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) {
+        shear_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
+        ray->across_length = (real)(1.42f) * (largest * scale);
+    } else {
+        frame_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
+    }
 }
 
 // A ray without far end whose direction is unit, or 0. Its square is 1 + e with e of a few u; the reciprocal
