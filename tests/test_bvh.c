@@ -37,7 +37,7 @@ typedef struct {
     uint8_t *seen;
     unsigned depth;
     unsigned wide_depth;
-} Walk;
+} TreeCheck;
 
 static void assert_contains(const Bounds *outer, const Bounds *inner)
 {
@@ -46,57 +46,58 @@ static void assert_contains(const Bounds *outer, const Bounds *inner)
     assert_true(outer->min.z <= inner->min.z && outer->max.z >= inner->max.z);
 }
 
-static void leaf_check(Walk *walk, const BvhChild *leaf)
+static void leaf_check(TreeCheck *check, const BvhChild *leaf)
 {
     assert_true(leaf->count <= BVH_LEAF_MAX);
-    assert_true(leaf->first + leaf->count <= walk->bvh->primitive_count);
-    const uint32_t *order = walk->bvh->order + leaf->first;
+    assert_true(leaf->first + leaf->count <= check->bvh->primitive_count);
+    const uint32_t *order = check->bvh->order + leaf->first;
     for (uint32_t i = 0; i < leaf->count; i++) {
-        assert_int_equal(walk->seen[order[i]]++, 0);
-        assert_int_equal(walk->kinds[order[i]], walk->kinds[order[0]]);
-        assert_contains(&leaf->box, &walk->boxes[order[i]]);
+        assert_int_equal(check->seen[order[i]]++, 0);
+        assert_int_equal(check->kinds[order[i]], check->kinds[order[0]]);
+        assert_contains(&leaf->box, &check->boxes[order[i]]);
     }
 }
 
-static void node_check(Walk *walk, uint32_t index, unsigned depth)
+static void node_check(TreeCheck *check, uint32_t index, unsigned depth)
 {
-    assert_true(index < walk->bvh->node_count);
-    if (depth > walk->depth) walk->depth = depth;
+    assert_true(index < check->bvh->node_count);
+    if (depth > check->depth) check->depth = depth;
     for (int side = 0; side < 2; side++) {
-        const BvhChild *child = &walk->bvh->nodes[index].children[side];
+        const BvhChild *child = &check->bvh->nodes[index].children[side];
         if (bounds_is_empty(&child->box)) {
-            assert_int_equal(walk->bvh->primitive_count > BVH_LEAF_MAX, 0);
+            assert_int_equal(check->bvh->primitive_count > BVH_LEAF_MAX, 0);
         } else if (child->count > 0) {
-            leaf_check(walk, child);
+            leaf_check(check, child);
         } else {
             assert_true(child->first > index);
             for (int k = 0; k < 2; k++)
-                assert_contains(&child->box, &walk->bvh->nodes[child->first].children[k].box);
-            node_check(walk, child->first, depth + 1);
+                assert_contains(&child->box, &check->bvh->nodes[child->first].children[k].box);
+            node_check(check, child->first, depth + 1);
         }
     }
 }
 
 // Wide nodes: every primitive in exactly one leaf, every node met once, none too deep.
-static void wide_node_check(Walk *walk, const BvhWide *wide, unsigned width, uint32_t index, unsigned depth)
+static void wide_node_check(TreeCheck *check, const BvhWide *wide, unsigned width, uint32_t index,
+                            unsigned depth)
 {
     assert_true(index < wide->node_count);
     assert_true(depth <= BVH_DEPTH_MAX);
     const BvhWideNode *node = &wide->nodes[index];
     assert_true(node->child_count <= width);
-    if (depth > walk->wide_depth) walk->wide_depth = depth;
+    if (depth > check->wide_depth) check->wide_depth = depth;
     uint32_t next = node->first_node;
     for (unsigned i = 0; i < node->child_count; i++) {
         const BvhChild *child = node->children[i];
         if (child->count > 0) {
-            leaf_check(walk, child);
+            leaf_check(check, child);
             continue;
         }
         assert_true(next > index);
         for (unsigned k = 0; k < wide->nodes[next].child_count; k++)
             assert_contains(&child->box, &wide->nodes[next].children[k]->box);
-        walk->depth++; // counts nodes here
-        wide_node_check(walk, wide, width, next++, depth + 1);
+        check->depth++; // counts nodes here
+        wide_node_check(check, wide, width, next++, depth + 1);
     }
 }
 
@@ -104,13 +105,13 @@ static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
-    Walk walk = {bvh, boxes, kinds, memory_allocate_zeroed(bvh->primitive_count, 1), 1, 0};
-    wide_node_check(&walk, &wide, width, 0, 1);
+    TreeCheck check = {bvh, boxes, kinds, memory_allocate_zeroed(bvh->primitive_count, 1), 1, 0};
+    wide_node_check(&check, &wide, width, 0, 1);
     for (size_t i = 0; i < bvh->primitive_count; i++)
-        assert_int_equal(walk.seen[i], 1);
-    assert_int_equal(walk.depth, wide.node_count);
-    assert_int_equal(walk.wide_depth, wide.depth);
-    free(walk.seen);
+        assert_int_equal(check.seen[i], 1);
+    assert_int_equal(check.depth, wide.node_count);
+    assert_int_equal(check.wide_depth, wide.depth);
+    free(check.seen);
     bvh_wide_free(&wide);
 }
 
@@ -129,15 +130,15 @@ static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
     assert_string_equal(text_c(&text), "building 100%");
     text_free(&text);
     stage_close(stage);
-    Walk walk = {&bvh, boxes, kinds, memory_allocate_zeroed(count, 1), 0, 0};
-    node_check(&walk, 0, 1);
+    TreeCheck check = {&bvh, boxes, kinds, memory_allocate_zeroed(count, 1), 0, 0};
+    node_check(&check, 0, 1);
     for (size_t i = 0; i < count; i++)
-        assert_int_equal(walk.seen[i], 1);
-    assert_true(walk.depth <= BVH_DEPTH_MAX);
-    assert_int_equal(walk.depth, bvh.depth);
+        assert_int_equal(check.seen[i], 1);
+    assert_true(check.depth <= BVH_DEPTH_MAX);
+    assert_int_equal(check.depth, bvh.depth);
     for (unsigned width = BVH_WIDTH_MIN; width <= BVH_WIDTH_MAX; width *= 2)
         wide_check(&bvh, boxes, kinds, width);
-    free(walk.seen);
+    free(check.seen);
     bvh_free(&bvh);
 }
 
@@ -260,7 +261,7 @@ static Scene random_scene(size_t count)
     const ShapeForm triangle = {.kind = SHAPE_TRIANGLE};
     Scene scene = {0};
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
-    // what a ray passes twice takes light from it twice
+    // what a ray crosses twice attenuates it twice
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .transmission = 0.75, .ior = 1}));
     for (size_t i = 0; scene.objects.count < count; i++) {
         const ShapeForm *form = i % 3 == 0 ? &triangle : &forms[random_bits(&random_state) % form_count];

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 4 }; // at most so many channels
+enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 4 }; // at most
 
 static char path[] = "/tmp/glint-test-XXXXXX";
 

@@ -22,7 +22,7 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# What a rank does wrong: its device fails, or is slow for so many microseconds, or what it sends with the tag FAULT_TAG has a wrong word,
+# What a rank does wrong: its device fails, or is slow for a number of microseconds, or what it sends with the tag FAULT_TAG has a wrong word,
 # is sent FAULT_TIMES, or is replaced by an end without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
@@ -61,7 +61,7 @@ TAKE, BAND, LAYERS = 0, 2, 3  # tags
 
 
 def wrong_word(tag, word, value, cut=0):
-    """And so many bytes cut off the end."""
+    """And this many bytes cut off the end."""
     return {"FAULT_TAG": tag, "FAULT_WORD": word, "FAULT_VALUE": value, "FAULT_CUT": cut}
 
 

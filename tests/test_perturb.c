@@ -67,7 +67,7 @@ static void repair(uint32_t seed, const float *a, const float *b, float *quotien
     clReleaseProgram(program);
 }
 
-// A whole number of so many bits, odd if asked for.
+// An integer of this many bits, odd if asked for.
 static double whole(Random *random, int bits, bool odd)
 {
     double half = ldexp(1, bits - 2);

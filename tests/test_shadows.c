@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-// A veil's light is taken once, also in a tile whose shadow rays run to different sides, which then search
+// A veil's light is taken once, also in a tile whose shadow rays run to different sides, which then traverse
 // the BVH in several packets: the light is above the corner of a tile.
 static void takes_a_veils_light_once(void **state)
 {
@@ -70,8 +70,8 @@ static void darkens_an_eclipse_in_meters(void **state)
 }
 
 // As the reference has it, but for pixels at an edge.
-static void hold_to_reference(const Scene *scene, const RenderSettings *settings, double error,
-                              const char *what)
+static void compare_with_reference(const Scene *scene, const RenderSettings *settings, double error,
+                                   const char *what)
 {
     Film film = film_render(&probe_compute, scene, settings, AOV_T | AOV_SHADOW);
     unsigned open = 0, dark = 0;
@@ -142,9 +142,10 @@ static void keeps_small_shadows_on(const Ground *ground)
     for (Precision precision = ground->from; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         RenderSettings settings = film_settings(128, 96, precision);
-        hold_to_reference(&scene, &settings, ground->error, ground->name);
+        compare_with_reference(&scene, &settings, ground->error, ground->name);
         settings.perturb_seed = 1;
-        if (precision == PRECISION_SINGLE) hold_to_reference(&scene, &settings, ground->error, ground->name);
+        if (precision == PRECISION_SINGLE)
+            compare_with_reference(&scene, &settings, ground->error, ground->name);
     }
     scene_free(&scene);
 }

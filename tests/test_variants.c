@@ -95,7 +95,7 @@ static void lanes_agree_on_aovs(void **state)
 #define SCENE_HEAD                                                                                           \
     "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], fov: 40}\n"                                    \
     "background: [0.1, 0.2, 0.4]\nambient: [0.5, 0.5, 0.5]\n"
-#define BALL "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1}}]\n"
+#define SPHERE "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1}}]\n"
 
 enum { LONG_SCENES = 5 }; // the last ones
 
@@ -105,7 +105,7 @@ static const struct {
     const char *text;
 } feature_scenes[] = {
     {0, SCENE_HEAD},
-    {FEATURE_SPHERES, SCENE_HEAD BALL},
+    {FEATURE_SPHERES, SCENE_HEAD SPHERE},
     {FEATURE_PLANES, SCENE_HEAD "objects: [{plane: {point: [0, 0, 0], normal: [0.1, 1, 0]}}]\n"},
     {FEATURE_DISCS, SCENE_HEAD "objects: [{disc: {center: [0, 1, 0], normal: [0.2, 0.4, -1], radius: 1}}]\n"},
     {FEATURE_BOXES, SCENE_HEAD "objects: [{box: {min: [-1, 0, -0.5], max: [0.5, 1, 1]}}]\n"},
@@ -125,11 +125,11 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_TRANSMISSION,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9}}},\n"
                 "  {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
-    {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" BALL},
+    {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_DIRECTIONAL_LIGHTS,
-     SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" BALL},
+     SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_SPOT_LIGHTS, SCENE_HEAD
-     "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0.5, 0], angle: 12, penumbra: 5}}]\n" BALL},
+     "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0.5, 0], angle: 12, penumbra: 5}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_CHECKERS,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
                 "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},

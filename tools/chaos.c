@@ -458,7 +458,7 @@ __attribute__((constructor)) static void start(void)
     if (what) snprintf(kind, sizeof kind, "%.*s", (int)strcspn(what, " "), what);
     if (space) failing = strtoul(space, NULL, 10);
     dl_iterate_phdr(find_text, NULL);
-    // programs that a driver starts are left alone: the filter would end them before they are ready for it
+    // not in programs that a driver starts: the filter would end them before they are ready for it
     unsetenv("LD_PRELOAD");
     if (is_kind("call") || is_kind("eintr") || is_kind("full") || is_kind("short") || is_kind("count"))
         trap_calls();

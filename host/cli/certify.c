@@ -33,7 +33,7 @@ static const char help_text[] =
     "pixels: "
     "objects, shadows, paths, colors.\n\n"
     "      --size WxH        image size (default: as glint render)\n"
-    "      --pixels N        compare about so many (default: 2000)\n"
+    "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of fast, single, strict, double, certified (default: all that fit)\n" //
     HELP_BOUNCES HELP_DEVICE HELP_LANES                                                            //
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n"         //

@@ -114,7 +114,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_print(json, stdout);
 }
 
-// With the digits that tell any two values of the file apart.
+// With the digits that distinguish any two values of the file.
 static void worst_print(const Comparison *comparison, const Image *image)
 {
     for (uint32_t i = 0; i < image->channels; i++)

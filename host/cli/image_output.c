@@ -118,7 +118,7 @@ static void certified_describe(Text *text, const ImageOutput *output)
                  (unsigned long long)output->repeats.repeated, (unsigned long long)output->repeats.undecided);
 }
 
-// At `certified` EXR's notes, which stand before its pixels, tell what came of all of them.
+// At `certified` EXR's notes, which stand before its pixels, report all of them.
 static bool keeps_bands(const ImageOutput *output)
 {
     return output->settings->precision == PRECISION_CERTIFIED &&

@@ -18,8 +18,8 @@ static Vector3 highlight_middle(Vector3 eye, Vector3 to_light)
 void verify_highlights(VerifyRun *run)
 {
     static const double powers[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
-    // what the tier owes at 1e4 and at 1e6
-    const double owed_power = run->tier == TIER_B ? 1e4 : 1e6, owed = run->tier == TIER_B ? 2e-3 : 1e-4;
+    // the tier's bound, and the power up to which it holds
+    const double power_max = run->tier == TIER_B ? 1e4 : 1e6, bound = run->tier == TIER_B ? 2e-3 : 1e-4;
     const Vector3 eye = {0.4, -0.3, 5}, light_beside = {-0.3, -0.2, -1}, light_behind = {1, 0.1, 0.3};
     for (size_t k = 0; k < 16; k++) {
         double power = powers[k / 2];
@@ -51,14 +51,14 @@ void verify_highlights(VerifyRun *run)
             run->result->wrong += value < 0 || value > 1 + 0x1p-20;
             seen += image.object[i] == 0;
             brightest = fmax(brightest, value);
-            if (run->tier == TIER_A || image.object[i] != 0 || power > owed_power) continue;
+            if (run->tier == TIER_A || image.object[i] != 0 || power > power_max) continue;
             Quad3 normal = quad3_unit(quad3(verify_vector(image.normal + 3 * i)));
             Quad3 ray = quad3_unit(quad3(verify_vector(image.ray + 3 * i)));
             Quad facing = quad3_dot(normal, to_light);
             // whether light that grazes reaches the surface at all is the shadow's matter
             if (quad_absolute(facing) < 16 * verify_roundoff(run)) continue;
             Quad exact = reference_highlight(normal, to_light, quad3_scale(ray, -1), power);
-            verify_note(run, (double)quad_absolute(value - exact), owed, "of 1");
+            verify_note(run, (double)quad_absolute(value - exact), bound, "of 1");
         }
         // closely, the highlight's middle lies in the image's
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);

@@ -195,17 +195,17 @@ void verify_degenerate_meshes(VerifyRun *run)
     free(clean);
 }
 
-enum { CROWD_TRIANGLES = 10000, CROWD_OTHERS = 20, CROWD_RAYS = 1 << 16, CROWD_BATCHES = 16 };
+enum { M6_TRIANGLES = 10000, M6_OTHERS = 20, M6_RAYS = 1 << 16, M6_BATCHES = 16 };
 
 // Triangles, and some of every bounded form of every shape.
-static Scene crowd_make(void)
+static Scene m6_scene(void)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
     Scene scene = scene_empty();
-    add_random_triangles(&scene, CROWD_TRIANGLES, 0.05);
+    add_random_triangles(&scene, M6_TRIANGLES, 0.05);
     Random random = {68};
-    for (size_t i = 0; i < form_count * CROWD_OTHERS; i++) {
+    for (size_t i = 0; i < form_count * M6_OTHERS; i++) {
         Vector3 center = random_point(68, i, 0);
         RandomShape shape =
             random_shape_at(&forms[i % form_count], center, random_between(&random, 0.02, 0.1), &random);
@@ -215,7 +215,7 @@ static Scene crowd_make(void)
 }
 
 // A place far from a triangle in its plane, from which it is seen edge-on.
-static Vector3 crowd_in_plane(const Vector3 vertices[3], uint64_t index)
+static Vector3 m6_point_in_plane(const Vector3 vertices[3], uint64_t index)
 {
     Vector3 ab = vector_subtract(vertices[1], vertices[0]), ac = vector_subtract(vertices[2], vertices[0]);
     Vector3 along = vector_add(vector_scale(ab, random_symmetric(69, index, 1)),
@@ -225,11 +225,11 @@ static Vector3 crowd_in_plane(const Vector3 vertices[3], uint64_t index)
 
 // A quarter of them at random, a quarter along an axis in the plane of a triangle's corner, a quarter at
 // corners, every other one of triangles seen edge-on, a quarter from where another ray was reflected.
-static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first, const TraceHit *reflected,
-                       TraceRay *rays)
+static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, const TraceHit *reflected,
+                    TraceRay *rays)
 {
-    for (uint64_t i = first; i < first + CROWD_RAYS; i++) {
-        uint64_t triangle = (uint64_t)(random_at(69, i, 0) * CROWD_TRIANGLES);
+    for (uint64_t i = first; i < first + M6_RAYS; i++) {
+        uint64_t triangle = (uint64_t)(random_at(69, i, 0) * M6_TRIANGLES);
         Vector3 corner = scene->objects.items[triangle].as.triangle.vertices[i % 3];
         Vector3 origin = vector_scale(random_unit(69, i, 1), 3), direction = random_point(69, i, 4);
         if (i % 4 == 0) direction = vector_subtract(direction, origin);
@@ -240,7 +240,7 @@ static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first,
             origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
         }
         if (i % 4 == 2 && i / 4 % 2)
-            origin = crowd_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);
+            origin = m6_point_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);
         if (i % 4 == 2) direction = vector_subtract(corner, origin);
         if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
             const TraceHit *hit = &reflected[i - first - 3];
@@ -256,25 +256,24 @@ static void crowd_rays(const VerifyRun *run, const Scene *scene, uint64_t first,
 // same as what is hit first: cut an ulp before it and an ulp behind it.
 void verify_bvh(VerifyRun *run)
 {
-    TraceRay *rays = memory_allocate(CROWD_RAYS, sizeof *rays);
-    TraceHit *hits = memory_allocate(CROWD_RAYS, sizeof *hits),
-             *plain = memory_allocate(CROWD_RAYS, sizeof *plain);
-    Scene scene = crowd_make();
+    TraceRay *rays = memory_allocate(M6_RAYS, sizeof *rays);
+    TraceHit *hits = memory_allocate(M6_RAYS, sizeof *hits), *plain = memory_allocate(M6_RAYS, sizeof *plain);
+    Scene scene = m6_scene();
     Renderer *tree = verify_open(run, &scene, true);
     Renderer *list = verify_open(run, &scene, false);
     const double parts[] = {INFINITY, 1 - 2 * verify_roundoff(run), 1 + 2 * verify_roundoff(run)};
-    for (uint64_t batch = 0; batch < CROWD_BATCHES; batch++) {
-        crowd_rays(run, &scene, batch * CROWD_RAYS, NULL, rays);
-        verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
-        crowd_rays(run, &scene, batch * CROWD_RAYS, hits, rays);
-        verify_trace_opened(run, list, rays, CROWD_RAYS, plain);
+    for (uint64_t batch = 0; batch < M6_BATCHES; batch++) {
+        m6_rays(run, &scene, batch * M6_RAYS, NULL, rays);
+        verify_trace_opened(run, tree, rays, M6_RAYS, hits);
+        m6_rays(run, &scene, batch * M6_RAYS, hits, rays);
+        verify_trace_opened(run, list, rays, M6_RAYS, plain);
         double unlimited = rays[0].tmax;
         for (size_t cut = 0; cut < sizeof parts / sizeof *parts; cut++) {
-            for (size_t i = 0; i < CROWD_RAYS; i++)
+            for (size_t i = 0; i < M6_RAYS; i++)
                 if (verify_is_hit(&plain[i]))
                     rays[i].tmax = fmin(unlimited, verify_rounded(run, plain[i].t * parts[cut]));
-            verify_trace_opened(run, tree, rays, CROWD_RAYS, hits);
-            for (size_t i = 0; i < CROWD_RAYS; i++) {
+            verify_trace_opened(run, tree, rays, M6_RAYS, hits);
+            for (size_t i = 0; i < M6_RAYS; i++) {
                 bool hit = verify_is_hit(&plain[i]) && plain[i].t < rays[i].tmax;
                 bool same = verify_is_hit(&hits[i]) == hit && hits[i].light == (hit ? 0 : 1);
                 run->result->differing += !same || (hit && !verify_same_bits(&hits[i], &plain[i]));

@@ -254,7 +254,7 @@ class Sum:
 
 
 def checker_color(hit, rounding, eye):
-    """None where the place is too near a border to tell."""
+    """None where the place is too near a border to decide."""
     material, kind = hit.thing.material, hit.thing.kind
     point = [arb(p + e) for p, e in zip(hit.point, eye)]
     if kind in ("plane", "disc"):

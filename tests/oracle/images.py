@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds small images of glint to the oracle, pixel by pixel: objects, distances, normals, shadows, colors.
+"""Compares small images of glint with the oracle, pixel by pixel: objects, distances, normals, shadows, colors.
 
 usage: images.py GLINT FOLDER [--long]
 
@@ -50,7 +50,7 @@ SHAPES = {
         "cone: {apex: [0, 1, -3], axis: [1, 4, 0], angle: 20, material: tiles}",
     ],
     "torus": ["torus: {center: [0, 0.5, 0], axis: [1, 2, 2], major: 1, minor: 0.375, material: red}"],
-    # Tubes wider than their circles; the transparent one has a ball in it, where it lies in itself.
+    # Tubes wider than their circles; the transparent one has a sphere in it, where it lies in itself.
     "spindle": [
         "torus: {center: [-1, 0.5, 0], axis: [1, 2, 2], major: 0.375, minor: 0.75, material: red}",
         "torus: {center: [1, 0.5, 0.5], axis: [0, 1, 4], major: 0.25, minor: 0.75, material: veil}",

@@ -1,6 +1,6 @@
 """Scenes for the oracle: what the YAML of docs/scene-format.md says, without meshes and images on surfaces.
 
-As docs/verify.md tells it, the eye is subtracted in double, then each number is rounded once to the precision; what is
+As docs/verify.md says, the eye is subtracted in double, then each number is rounded once to the precision; what is
 left is exact."""
 
 import struct
@@ -63,19 +63,19 @@ class Thing:
         def size(name):
             return rounding(given[name])
 
-        def way(name):
+        def vector(name):
             return [float(x) for x in given[name]]
 
         if kind == "sphere":
             return exact.Sphere(from_eye(given["center"]), size("radius"))
         if kind == "plane":
-            return exact.Plane(from_eye(given["point"]), way("normal"))
+            return exact.Plane(from_eye(given["point"]), vector("normal"))
         if kind == "disc":
-            return exact.Disc(from_eye(given["center"]), way("normal"), size("radius"))
+            return exact.Disc(from_eye(given["center"]), vector("normal"), size("radius"))
         if kind == "box":
             return exact.Box(from_eye(given["min"]), from_eye(given["max"]))
         if kind == "torus":
-            return exact.Torus(from_eye(given["center"]), size("major"), size("minor"), way("axis"))
+            return exact.Torus(from_eye(given["center"]), size("major"), size("minor"), vector("axis"))
         if kind == "triangle":
             return exact.Triangle(*map(from_eye, given["vertices"]))
         if "from" in given:
@@ -84,14 +84,14 @@ class Thing:
             radii = given["radius"] if kind == "cone" else [given["radius"]] * 2
             return exact.Revolution(base, axis, map(rounding, radii), caps=given.get("caps", True))
         if kind == "cylinder":
-            return exact.Revolution(from_eye(given["point"]), way("axis"), [size("radius")] * 2, infinite=True)
+            return exact.Revolution(from_eye(given["point"]), vector("axis"), [size("radius")] * 2, infinite=True)
         if kind != "cone":
             raise ValueError(f"the oracle knows no {kind}")
         if "slope" in given:
             slope = rational(given["slope"])
         else:
             slope = exact.middle((arb(rational(float(given["angle"]))) * arb.pi() / 180).tan())
-        return exact.DoubleCone(from_eye(given["apex"]), way("axis"), slope)
+        return exact.DoubleCone(from_eye(given["apex"]), vector("axis"), slope)
 
     def outward(self, point):
         """The normal of the geometry, of any length."""

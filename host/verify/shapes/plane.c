@@ -3,7 +3,8 @@
 static void hit_plane(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad3 point = quad3(object->as.plane.point), normal = quad3(object->as.plane.normal);
-    // The ray has to turn by this angle to be parallel, which moves it so much at the distance of `point`.
+    // The ray has to turn by this angle to be parallel, which moves it by this margin at the distance of
+    // `point`.
     hit_reduce_margin(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(point, ray->origin)));
     // Twice the height of the ray's start: on the plane itself the hit ends.
     hit_reduce_margin(hit, 2 * quad3_dot(quad3_unit(normal), quad3_subtract(point, ray->origin)));
