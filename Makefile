@@ -90,10 +90,14 @@ $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ -lcmocka $(LIBS) -o $@
 
-# All calls of OpenCL go through this test, which makes them fail.
-opencl_calls := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
+# Tests in which calls fail: those of OpenCL, and of the system's two, go through tests/failing.
+opencl_calls    := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
+failing         := $(wildcard tests/failing/*.c)
+failing_objects := $(failing:%.c=$(BUILD)/%.o)
+failing_tests   := $(addprefix $(BUILD)/tests/,test_opencl_failure test_device_loss test_command_failure)
 
-$(BUILD)/tests/test_opencl_failure: private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=pthread_create
+$(failing_tests): private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=pthread_create
+$(failing_tests): $(failing_objects)
 
 # The paces of its workers are exact.
 $(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds
@@ -185,11 +189,11 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
-linted := $(sources) $(test_programs) $(test_helpers) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
+linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
           $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
-             tests/oracle/*.h) $(embree_sources) $(embree_headers)
+             tests/oracle/*.h tests/failing/*.h) $(embree_sources) $(embree_headers)
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)
@@ -254,4 +258,4 @@ clean:
 .PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d)
+-include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)

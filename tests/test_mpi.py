@@ -13,7 +13,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, has_device, main, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, has_device, main, png_read, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
@@ -134,13 +134,21 @@ class Mpi(TestCase):
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
     def test_several_scenes(self):
-        """Each is rendered by all ranks, and a checkpoint that is refused ends them."""
-        Path("frame.yaml").write_text((ROOT / "scenes/boxes.yaml").read_text())
+        """Each is rendered by all ranks, but for one with a mistake; a checkpoint that is refused ends them."""
+        scenes = {"boxes": (ROOT / "scenes/boxes.yaml").read_text(), "bad": "camera: 5"}
+        scenes |= {f"sphere{i}": SPHERE.replace("radius: 1", f"radius: 1.{i}") for i in range(4)}
+        for name, text in scenes.items():
+            write(f"{name}.yaml", text)
         os.mkdir("frames")
-        self.glint("render frame.yaml --size 160x120 -o one.png", env=POCL)
-        self.mpirun(f"-n 3 {RANKS} render {ROOT}/scenes/spheres16.yaml frame.yaml --size 160x120 -o frames")
-        self.assertEqual(sorted(os.listdir("frames")), ["frame.png", "spheres16.png"])
-        self.glint("diff one.png frames/frame.png", env=POCL)
+        os.mkdir("expected")
+        names = " ".join(f"{name}.yaml" for name in scenes)
+        command = f"render {names} --size 160x120 --precision strict --quiet"
+        for errors in self.glint(f"{command} -o expected", 1, env=POCL), self.mpirun(f"-n 3 {RANKS} {command} -o frames", 1):
+            self.assertRegex(errors.stderr, "^bad.yaml:1")
+        self.assertEqual(sorted(os.listdir("frames")), sorted(f"{name}.png" for name in scenes if name != "bad"))
+        for name in os.listdir("frames"):
+            self.assertEqual(png_read(f"frames/{name}")[1], png_read(f"expected/{name}")[1])
+        write("frame.yaml", SPHERE)
         Path("saved").write_text("no checkpoint")
         self.mpirun(f"-n 2 {RANKS} render frame.yaml --size 160x120 --checkpoint saved", status=1)
 

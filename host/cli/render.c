@@ -5,7 +5,7 @@
 #include "host/cli/checkpoint_key.h"
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
-#include "host/cli/ranks.h"
+#include "host/cli/render_devices.h"
 #include "host/cli/render_options.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,48 +48,6 @@ static void device_drop(void *context, size_t index)
 {
     OpenDevices *devices = ((BandContext *)context)->devices;
     if (index < devices->count) devices_drop(devices, index); // else a rank, which said why
-}
-
-// Says why devices do not suit the render, and that the others do their work.
-static void unfit_print(MessageList *unfit)
-{
-    for (size_t i = 0; i < unfit->count; i++)
-        if (unfit->items[i].severity == MESSAGE_ERROR)
-            fprintf(stderr, "glint: warning: the other devices go on without one: %s\n",
-                    unfit->items[i].text);
-    message_list_free(unfit);
-}
-
-// Opens a renderer on each device. If others are left, those that fail are removed, and of all devices those
-// that the scene or settings do not fit. False: with messages, these do not fit a device, else the device
-// failed.
-static bool devices_start(Renderer **renderers, OpenDevices *devices, const Scene *scene,
-                          const RenderSettings *settings, const Ranks *ranks, MessageList *messages)
-{
-    const size_t count = devices->count;
-    Compute **computes = memory_allocate(count, sizeof *computes);
-    MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each), unfit = {0};
-    for (size_t i = 0; i < count; i++)
-        computes[i] = devices->items[i].compute;
-    bool is_done = renderers_open(renderers, computes, count, scene, settings,
-                                  ranks ? &ranks->receivers : NULL, messages, of_each);
-    for (size_t i = 0, kept = 0; i < count; i++) {
-        Renderer *renderer = renderers[i];
-        const bool fits = message_count(&of_each[i], MESSAGE_ERROR) == 0;
-        const bool is_dispensable = is_done && devices->count > 1 && (fits || devices->are_all);
-        message_list_move(renderer || !is_dispensable ? messages : &unfit, &of_each[i]);
-        if (renderer || !is_dispensable) {
-            renderers[kept++] = renderer;
-            is_done = is_done && renderer;
-        } else {
-            if (fits) devices_drop(devices, kept);
-            devices_remove(devices, kept);
-        }
-    }
-    unfit_print(&unfit);
-    free(of_each);
-    free(computes);
-    return is_done;
 }
 
 // False with messages. No checkpoint is requested: true.
@@ -168,8 +126,6 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     if (!whole) rest_print(options);
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderers, devices->count, ranks, settings, times);
-    const bool is_last = options->scene == options->scenes[options->scene_count - 1];
-    if (whole && is_last) fault_output_is_complete(status);
     return status;
 }
 
@@ -194,9 +150,10 @@ static int precision_choose(Pilot *pilot, const RenderOptions *options, RenderSe
     return EXIT_DONE;
 }
 
-static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices *devices, Ranks *ranks,
+static int scene_render(RenderOptions *options, const Scene *scene, RenderDevices *open, Ranks *ranks,
                         HostTimes *times)
 {
+    OpenDevices *devices = &open->devices;
     RenderSettings settings;
     Pilot pilot;
     if (!render_settings_make(&settings, options, scene)) return EXIT_USER;
@@ -209,34 +166,20 @@ static int scene_render(RenderOptions *options, const Scene *scene, OpenDevices 
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
     options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
-    Renderer **renderers = memory_allocate_zeroed(devices->count, sizeof *renderers);
     Checkpoint *checkpoint = NULL;
     int status = EXIT_USER;
     if (!ranks || ranks->begin(ranks, &settings, options->output.aovs, options->common.device, &messages)) {
-        const bool can_start =
-            devices_start(renderers, devices, scene, &settings, ranks, &messages) &&
-            checkpoint_start(&checkpoint, options, &settings, renderers, devices->count, ranks, &messages);
+        const bool can_start = render_devices_start(open, scene, &settings, ranks, &messages) &&
+                               checkpoint_start(&checkpoint, options, &settings, open->renderers,
+                                                devices->count, ranks, &messages);
         if (ranks) ranks->start(can_start);
         if (can_start)
-            status = image_render(options, scene, devices, renderers, ranks, &settings, checkpoint, times,
-                                  &messages);
+            status = image_render(options, scene, devices, open->renderers, ranks, &settings, checkpoint,
+                                  times, &messages);
     }
     messages_print(&messages, NULL);
-    for (size_t i = 0; i < devices->count; i++)
-        renderer_close(renderers[i]);
-    free(renderers);
     times->pilot = options->output.pilot = NULL;
     return status;
-}
-
-// The devices that this process renders on: of several ranks each has one.
-static bool render_devices_open(OpenDevices *devices, const char *selector, const Ranks *ranks)
-{
-    if (!ranks) return devices_open(devices, selector);
-    MessageList messages = {0};
-    bool is_open = devices_open_one(devices, selector, 0, &messages);
-    messages_print(&messages, NULL);
-    return is_open;
 }
 
 int command_render(int argument_count, char **arguments)
@@ -245,20 +188,17 @@ int command_render(int argument_count, char **arguments)
 }
 
 // Renders one of the scenes into a file.
-static int file_render(RenderOptions options, const char *path, Ranks *ranks)
+static int file_render(RenderOptions options, const char *path, RenderDevices *open, Ranks *ranks)
 {
     Scene scene = {0};
-    OpenDevices devices;
     options.output.path = path;
     double start = clock_seconds();
     int status = EXIT_USER;
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
-        if (render_devices_open(&devices, options.common.device, ranks)) {
-            status = scene_render(&options, &scene, &devices, ranks, &times);
-            status = devices_close(&devices, status);
-        }
+        if (render_devices_open(open, options.common.device, ranks))
+            status = scene_render(&options, &scene, open, ranks, &times);
     }
     scene_free(&scene);
     return status;
@@ -290,6 +230,24 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
     return true;
 }
 
+// Renders the scenes, one after the other. A mistake in one does not keep the others from being rendered.
+static int files_render(RenderOptions *options, char *const *paths, Ranks *ranks)
+{
+    RenderDevices open = {0};
+    int status = EXIT_DONE;
+    bool goes_on = true;
+    for (size_t i = 0; i < options->scene_count && goes_on; i++) {
+        options->scene = options->scenes[i];
+        progress_release_signals(); // while a scene is read none asks for them
+        const int of_file =
+            progress_interrupted() ? EXIT_INTERRUPTED : file_render(*options, paths[i], &open, ranks);
+        if (of_file != EXIT_DONE) status = of_file;
+        if (status == EXIT_DONE && i + 1 == options->scene_count) fault_output_is_complete(status);
+        goes_on = render_devices_rest(&open) && (of_file == EXIT_DONE || of_file == EXIT_USER);
+    }
+    return render_devices_close(&open, status);
+}
+
 int command_render_on(Ranks *ranks, int argument_count, char **arguments)
 {
     RenderOptions options;
@@ -299,12 +257,7 @@ int command_render_on(Ranks *ranks, int argument_count, char **arguments)
     char **paths = memory_allocate(count, sizeof *paths);
     for (size_t i = 0; i < count; i++)
         paths[i] = path_make(&options, options.scenes[i]);
-    status = paths_differ(paths, &options) ? EXIT_DONE : EXIT_USER;
-    for (size_t i = 0; i < count && status == EXIT_DONE; i++) {
-        options.scene = options.scenes[i];
-        progress_release_signals(); // while a scene is read none asks for them
-        status = progress_interrupted() ? EXIT_INTERRUPTED : file_render(options, paths[i], ranks);
-    }
+    status = paths_differ(paths, &options) ? files_render(&options, paths, ranks) : EXIT_USER;
     for (size_t i = 0; i < count; i++)
         free(paths[i]);
     free(paths);

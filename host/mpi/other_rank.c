@@ -42,9 +42,10 @@ static bool band_give(void *ended, const Film *band)
     return !has_ended(ended);
 }
 
-// What this rank renders an image with.
+// What this rank renders with.
 typedef struct {
     int rank;
+    size_t local_rank;
     OpenDevices devices;
     bool is_open;
     Renderer *renderer; // NULL: it cannot render, see `messages` or the device's failure
@@ -52,29 +53,34 @@ typedef struct {
     Rank own;
 } Worker;
 
-static void worker_open(Worker *worker, const Job *job, const char *selector, size_t local_rank)
+static void device_close_quietly(Worker *worker)
+{
+    renderer_close(worker->renderer);
+    worker->renderer = NULL;
+    if (worker->is_open) devices_abandon(&worker->devices);
+    worker->is_open = false;
+}
+
+// For another image; a device that failed is opened anew.
+static void worker_begin(Worker *worker, const Job *job, const char *selector)
 {
     Rank *own = &worker->own;
+    *own = (Rank){0};
     gethostname(own->host, sizeof own->host - 1);
-    worker->is_open = devices_open_one(&worker->devices, selector, local_rank, &worker->messages);
+    if (worker->is_open && !compute_ok(worker->devices.items[0].compute)) device_close_quietly(worker);
+    if (!worker->is_open)
+        worker->is_open = devices_open_one(&worker->devices, selector, worker->local_rank, &worker->messages);
     if (!worker->is_open) {
         snprintf(own->failure, sizeof own->failure, "%s", worker->messages.items[0].text);
         return;
     }
     Compute *compute = worker->devices.items[0].compute;
-    worker->renderer = renderer_open_empty(compute, &job->settings, &worker->messages);
+    worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
     snprintf(own->device, sizeof own->device, "%s", compute->device->name);
     snprintf(own->driver, sizeof own->driver, "%s, %s", compute->device->platform_name,
              compute->device->driver);
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
         own->lanes[pass] = renderer_lanes(worker->renderer, pass);
-}
-
-static void worker_close(Worker *worker)
-{
-    renderer_close(worker->renderer);
-    message_list_free(&worker->messages);
-    if (worker->is_open) devices_abandon(&worker->devices);
 }
 
 // All ranks of a variant receive its scene, also those that can render no longer.
@@ -113,19 +119,19 @@ static void worker_render(Worker *worker, unsigned aovs)
     if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
 }
 
-static void job_run(const Job *job, int rank, size_t local_rank)
+static void job_run(Worker *worker, const Job *job)
 {
-    Worker worker = {.rank = rank};
     Order order;
     char *selector = memory_allocate_zeroed(job->selector_size + 1, 1);
     broadcast(selector, job->selector_size, MPI_COMM_WORLD);
-    worker_open(&worker, job, job->selector_size > 0 ? selector : NULL, local_rank);
+    worker_begin(worker, job, job->selector_size > 0 ? selector : NULL);
     free(selector);
-    MPI_Gather(&worker.own, sizeof worker.own, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
+    MPI_Gather(&worker->own, sizeof worker->own, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
     while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.kind == ORDER_SCENE)
-        scene_receive(&worker, order.variant);
-    if (order.kind == ORDER_START) worker_render(&worker, job->aovs);
-    worker_close(&worker);
+        scene_receive(worker, order.variant);
+    if (order.kind == ORDER_START) worker_render(worker, job->aovs);
+    renderer_release_scene(worker->renderer);
+    message_list_free(&worker->messages);
 }
 
 // An interrupt reaches all ranks: the first one ends the render, and the job.
@@ -139,7 +145,9 @@ static void signals_ignore(void)
 void other_rank_run(int rank, size_t local_rank)
 {
     signals_ignore();
+    Worker worker = {.rank = rank, .local_rank = local_rank};
     Job job;
     while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.is_there)
-        job_run(&job, rank, local_rank);
+        job_run(&worker, &job);
+    device_close_quietly(&worker);
 }

@@ -162,7 +162,7 @@ bool renderer_certifies(const Renderer *renderer)
     return renderer->settings.precision == PRECISION_CERTIFIED || renderer->pass == PASS_IN_DOUBT;
 }
 
-static Renderer *prepare(Compute *compute, const RenderSettings *settings, PixelPass pass)
+static Renderer *prepare(Compute *compute, const RenderSettings *settings, PixelPass pass, Renderer *earlier)
 {
     Renderer *renderer = memory_allocate_zeroed(1, sizeof *renderer);
     renderer->compute = compute;
@@ -174,14 +174,20 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
     report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->is_double);
-    if (renderer_certifies(renderer)) renderer->repeat = prepare(compute, settings, pass + 1);
+    if (earlier) renderer_kernels_take(renderer, earlier);
+    if (renderer_certifies(renderer))
+        renderer->repeat = prepare(compute, settings, pass + 1, earlier ? earlier->repeat : NULL);
     return renderer;
 }
 
-Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, MessageList *messages)
+Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, Renderer *earlier,
+                              MessageList *messages)
 {
-    if (!compute_ok(compute) || !settings_fit(settings, compute->device, messages)) return NULL;
-    return prepare(compute, settings, PASS_ALL);
+    Renderer *renderer = NULL;
+    if (compute_ok(compute) && settings_fit(settings, compute->device, messages))
+        renderer = prepare(compute, settings, PASS_ALL, earlier);
+    renderer_close(earlier);
+    return renderer;
 }
 
 // NULL: there is no such pass.
@@ -290,7 +296,7 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
                     MessageList *of_each)
 {
     for (size_t i = 0; i < count; i++)
-        renderers[i] = renderer_open_empty(computes[i], settings, &of_each[i]);
+        renderers[i] = renderer_open_empty(computes[i], settings, renderers[i], &of_each[i]);
     const bool compiles = variants_compile(renderers, count, scene, settings, others, messages, of_each);
     for (size_t i = 0; i < count; i++) {
         if (compiles && compute_ok(computes[i])) continue;
@@ -303,7 +309,7 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages)
 {
-    Renderer *renderer;
+    Renderer *renderer = NULL;
     return renderers_open(&renderer, &compute, 1, scene, settings, NULL, messages, messages) ? renderer
                                                                                              : NULL;
 }
@@ -347,15 +353,25 @@ uint64_t renderer_scene_hash(const Renderer *renderer)
     return hash;
 }
 
+void renderer_release_scene(Renderer *renderer)
+{
+    for (; renderer; renderer = renderer->repeat) {
+        for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+            buffer_release(renderer->arrays[kind]);
+            renderer->arrays[kind] = NULL;
+        }
+        buffer_release(renderer->offsets);
+        renderer->offsets = NULL;
+        compiled_scene_free(&renderer->compiled);
+    }
+}
+
 void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
+    renderer_release_scene(renderer);
     renderer_close(renderer->repeat);
     renderer_kernels_close(renderer);
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        buffer_release(renderer->arrays[kind]);
-    buffer_release(renderer->offsets);
-    compiled_scene_free(&renderer->compiled);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
     free(renderer);

@@ -53,6 +53,13 @@ static void variant_close(Renderer *renderer, KernelVariant *variant)
     *variant = (KernelVariant){0};
 }
 
+void renderer_kernels_take(Renderer *renderer, Renderer *earlier)
+{
+    renderer->variant = earlier->variant;
+    renderer->other_variant = earlier->other_variant;
+    earlier->variant = earlier->other_variant = (KernelVariant){0};
+}
+
 void renderer_kernels_close(Renderer *renderer)
 {
     variant_close(renderer, &renderer->variant);

@@ -44,6 +44,8 @@ bool renderer_certifies(const Renderer *renderer);
 // Chooses the variant of the kernels that the settings, the device and the compiled scene need; of the two
 // last used it takes the one that suits, with its kernels.
 void renderer_kernels_choose(Renderer *renderer);
+// Takes the kernels of an earlier renderer of the device, which is left with none, and has none before.
+void renderer_kernels_take(Renderer *renderer, Renderer *earlier);
 void renderer_kernels_close(Renderer *renderer);
 
 // The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first requested. NULL:

@@ -1,0 +1,25 @@
+// The devices of a command's images, and a renderer on each.
+#pragma once
+
+#include "host/cli/options.h"
+#include "host/cli/ranks.h"
+
+typedef struct {
+    OpenDevices devices;
+    Renderer **renderers; // as many; NULL, or with the last image's scene or only its kernels
+    bool is_open;
+} RenderDevices;
+
+// The devices that the selector lists, or of several ranks this one's. True where they are open already.
+// False, with a message, if there is none.
+bool render_devices_open(RenderDevices *open, const char *selector, const Ranks *ranks);
+// Gives their renderers, and the ranks, another scene. If others are left, those that fail are removed, and
+// of all devices those that the scene or settings do not fit. False: with messages, these do not fit a
+// device, else the device failed.
+bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderSettings *settings,
+                          const Ranks *ranks, MessageList *messages);
+// After an image: frees its scene, and removes the devices that failed while others are left. False: the last
+// one failed.
+bool render_devices_rest(RenderDevices *open);
+// As devices_close.
+int render_devices_close(RenderDevices *open, int status);

@@ -1,0 +1,104 @@
+#include "tests/failing/work.h"
+#include "tests/failing/calls.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { LARGE_BYTES = 4 << 20 };
+
+static DeviceList devices;
+const Device *work_device;
+Scene work_scene;
+Answer right;
+
+bool work_take_band(void *context, const Film *band, double fraction_done)
+{
+    (void)fraction_done;
+    Answer *answer = context;
+    memcpy(answer->colors + (size_t)band->first_row * SIDE * 3, band->layers[LAYER_COLOR],
+           (size_t)band->height * SIDE * 3 * sizeof *answer->colors);
+    answer->band_count++;
+    return true;
+}
+
+RenderSettings work_settings = {.width = SIDE,
+                                .height = SIDE,
+                                .region_width = SIDE,
+                                .region_height = SIDE,
+                                .sample_count = 1,
+                                .precision = PRECISION_SINGLE,
+                                .lanes = 1,
+                                .counting = true,
+                                .shift_to_eye = true,
+                                .band_rows = BAND_ROWS};
+
+bool work(Compute *compute, Answer *answer)
+{
+    static const TraceRay rays[RAY_COUNT] = {{{0, 0, 5}, {0, 0, -1}, 0, 100},
+                                             {{0, 3, 5}, {0, 0, -1}, 0, 100},
+                                             {{1, 1, 5}, {0, -0.25, -1}, 0, 100}};
+    MessageList messages = {0};
+    memset(answer, 0, sizeof *answer);
+    compute_open(compute, work_device);
+    cl_mem large = buffer_take(compute, LARGE_BYTES, buffer_bytes_allocate(LARGE_BYTES));
+    Renderer *renderer = renderer_open(compute, &work_scene, &work_settings, &messages);
+    bool done = renderer && renderer_render(renderer, AOVS_ALL, work_take_band, answer) &&
+                renderer_trace(renderer, rays, RAY_COUNT, answer->hits);
+    if (renderer) memcpy(answer->ray_counts, renderer_report(renderer)->rays, sizeof answer->ray_counts);
+    renderer_close(renderer);
+    buffer_release(large);
+    assert_int_equal(messages.count, 0); // the user made no mistake
+    message_list_free(&messages);
+    assert_int_equal(done, compute_ok(compute));
+    return done;
+}
+
+void compute_close_checked(Compute *compute)
+{
+    compute_close(compute);
+    if (live_count != 0) fail_msg("%ld objects were not released", live_count);
+}
+
+void assert_work_is_right(void)
+{
+    injected.call = NULL;
+    call_counts_clear();
+    Compute compute;
+    Answer answer;
+    assert_true(work(&compute, &answer));
+    compute_close_checked(&compute);
+    assert_memory_equal(&answer, &right, sizeof answer);
+}
+
+int work_set_up(void **state)
+{
+    (void)state;
+    setenv("TMPDIR", "/dev/null", 1); // no place for the text of programs that do not build
+    MessageList messages = {0};
+    device_list_open(&devices);
+    work_device = device_choose(&devices, device_selector(NULL), &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (!work_device) return -1;
+    work_scene = scene_of_text("tiny.yaml", "camera: {position: [0, 1, 5], look_at: [0, 0, 0]}\n"
+                                            "lights: [{point: {position: [3, 5, 4]}}]\n"
+                                            "objects: [{sphere: {center: [0, 0, 0], radius: 1}}]\n");
+    Compute compute;
+    if (!work(&compute, &right)) return -1;
+    compute_close(&compute);
+    bool is_right = right.hits[0].object == 0 && right.colors[(SIDE + 1) * SIDE / 2 * 3] > 0 &&
+                    right.ray_counts[RAYS_CAMERA] == SIDE * SIDE;
+    return is_right ? 0 : -1;
+}
+
+int work_tear_down(void **state)
+{
+    (void)state;
+    scene_free(&work_scene);
+    device_list_close(&devices);
+    return 0;
+}

@@ -1,0 +1,203 @@
+// What a command prints, writes and exits with where an OpenCL call fails or its driver crashes.
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/cli/commands.h"
+#include "tests/child.h"
+#include "tests/failing/calls.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+typedef struct {
+    int (*run)(int argument_count, char **arguments);
+    const char *arguments[9]; // ended by NULL
+} Command;
+
+static const char *failing_call;
+static size_t failing_index;
+static const char *driver_folder; // with PoCL alone, which then has two devices; NULL: as it is
+static int crash;
+static const char *crash_folder; // for caches
+
+static void command_fail(void *result)
+{
+    const Command *command = result;
+    char *arguments[9] = {NULL};
+    int count = 0;
+    for (; command->arguments[count]; count++)
+        arguments[count] = memory_copy_text(command->arguments[count]);
+    injected.call = failing_call;
+    injected.index = failing_index;
+    injected.crash = crash;
+    first_thread = pthread_self();
+    if (driver_folder) {
+        setenv("OCL_ICD_VENDORS", driver_folder, 1);
+        setenv("POCL_DEVICES", "pthread pthread", 1);
+    }
+    if (crash) {
+        setenv("XDG_CACHE_HOME", crash_folder, 1);
+        unsetenv("POCL_CACHE_DIR");
+    }
+    fault_catch_crashes();
+    int status = command->run(count, arguments);
+    while (count > 0)
+        free(arguments[--count]);
+    exit(status);
+}
+
+static void test_commands(void **state)
+{
+    (void)state;
+    static const Command commands[] = {
+        {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", "/dev/null/none.png"}},
+        {command_trace, {"trace", "scenes/spheres16.yaml", "--rays", "/dev/null"}},
+        {command_bench, {"bench", "scenes/spheres16.yaml", "--size", "8x8"}},
+        {command_accuracy, {"accuracy", "scenes/spheres16.yaml", "--size", "8x8"}},
+        {command_verify, {"verify", "P1"}},
+    };
+    static const char *const calls[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer"};
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+        for (size_t k = 0; k < sizeof calls / sizeof *calls; k++) {
+            Command command = commands[i];
+            failing_call = calls[k];
+            ChildEnd end = child_run(command_fail, &command, sizeof command);
+            char expected[64];
+            snprintf(expected, sizeof expected, "glint: %s: CL_OUT_OF_RESOURCES (-5) on ", calls[k]);
+            if (strncmp(end.errors, expected, strlen(expected)) != 0) print_error("%s\n", end.errors);
+            assert_memory_equal(end.errors, expected, strlen(expected));
+            assert_int_equal(end.status, EXIT_MACHINE);
+        }
+}
+
+static void assert_same_bytes(const char *one, const char *other)
+{
+    Text first = {0}, second = {0};
+    MessageList messages = {0};
+    assert_true(text_read_file(&first, one, &messages) && text_read_file(&second, other, &messages));
+    assert_true(first.count > 0);
+    assert_int_equal(first.count, second.count);
+    assert_memory_equal(first.items, second.items, first.count);
+    text_free(&first);
+    text_free(&second);
+}
+
+// One of two devices fails, or has no room for the scene: a warning, and the same image. Both fail, or the
+// one without room is named: an error.
+static void test_several_devices(void **state)
+{
+    (void)state;
+    static const char pocl[] = "/etc/OpenCL/vendors/pocl.icd";
+    if (access(pocl, R_OK) != 0) skip();
+    char one[] = "/tmp/glint-test-XXXXXX.npy", other[] = "/tmp/glint-test-XXXXXX.npy";
+    assert_true(close(mkstemps(one, 4)) == 0 && close(mkstemps(other, 4)) == 0);
+    static const char dropped[] = "glint: warning: the other devices go on without one: ";
+    const struct {
+        const char *call;
+        size_t index;
+        bool first_is_tiny;
+        const char *devices, *file, *expected, *reason;
+        int status;
+    } runs[] = {
+        {NULL, 0, false, "all", one, "", "", EXIT_DONE},
+        {"clEnqueueNDRangeKernel", 0, false, "all", other, dropped,
+         "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_DONE},
+        {"clCreateContext", 0, false, "all", other, dropped, "clCreateContext: CL_OUT_OF_RESOURCES (-5) on ",
+         EXIT_DONE},
+        {NULL, 0, true, "all", other, dropped, "the scene needs ", EXIT_DONE},
+        {"clEnqueueNDRangeKernel", EVERY_CALL, false, "all", "/dev/null/none.npy",
+         "\nglint: ", "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE},
+        {NULL, 0, true, "0,1", "/dev/null/none.npy", "glint: error: ", "the scene needs ", EXIT_USER}};
+    driver_folder = pocl;
+    for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
+        Command command = {command_render,
+                           {"render", "scenes/spheres16.yaml", "--size", "64x48", "--device", runs[i].devices,
+                            "-o", runs[i].file}};
+        char expected[160];
+        snprintf(expected, sizeof expected, "%s%s", runs[i].expected, runs[i].reason);
+        failing_call = runs[i].call;
+        failing_index = runs[i].index;
+        first_is_tiny = runs[i].first_is_tiny;
+        ChildEnd end = child_run(command_fail, &command, sizeof command);
+        if (!strstr(end.errors, expected)) print_error("%s\n", end.errors);
+        assert_non_null(strstr(end.errors, expected));
+        assert_int_equal(end.status, runs[i].status);
+        if (runs[i].file == other) assert_same_bytes(one, other);
+    }
+    driver_folder = NULL;
+    failing_index = 0;
+    first_is_tiny = false;
+    unlink(one);
+    unlink(other);
+}
+
+// An image that is complete is written whatever a release says.
+static void test_release_after_the_output(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/glint-test-XXXXXX.png";
+    assert_true(close(mkstemps(path, 4)) == 0);
+    Command command = {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", path}};
+    failing_call = "clEnqueueUnmapMemObject";
+    ChildEnd end = child_run(command_fail, &command, sizeof command);
+    static const char expected[] = "glint: warning: clEnqueueUnmapMemObject: CL_OUT_OF_RESOURCES (-5) on ";
+    assert_memory_equal(end.errors, expected, strlen(expected));
+    assert_int_equal(end.status, EXIT_DONE);
+    struct stat status;
+    assert_int_equal(stat(path, &status), 0);
+    assert_true(status.st_size > 0);
+    unlink(path);
+}
+
+// A driver that crashes is named with its call; when the output is complete it is a warning.
+static void test_crashes(void **state)
+{
+    (void)state;
+#ifdef __SANITIZE_ADDRESS__
+    skip(); // sanitizers handle crashes
+#else
+    static const char *const calls[] = {"clGetPlatformIDs", "clBuildProgram", "clWaitForEvents",
+                                        "clGetProgramInfo"};
+    static const int signals[] = {SIGSEGV, SIGABRT};
+    char folder[] = "/tmp/glint-test-XXXXXX";
+    assert_non_null(mkdtemp(folder));
+    crash_folder = folder; // an empty cache: no program comes from it
+    for (size_t i = 0; i < sizeof calls / sizeof *calls; i++)
+        for (size_t k = 0; k < 2; k++) {
+            bool is_complete = i == 3;
+            char path[] = "/tmp/glint-test-XXXXXX.png", expected[80];
+            assert_true(close(mkstemps(path, 4)) == 0);
+            Command command = {command_render,
+                               {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", path}};
+            failing_call = calls[i];
+            crash = signals[k];
+            ChildEnd end = child_run(command_fail, &command, sizeof command);
+            snprintf(expected, sizeof expected, "glint: %s%s: the OpenCL driver %s",
+                     is_complete ? "warning: " : "", calls[i], k ? "aborted" : "crashed");
+            if (!strstr(end.errors, expected)) print_error("%s\n", end.errors);
+            assert_non_null(strstr(end.errors, expected));
+            assert_int_equal(end.status, is_complete ? EXIT_DONE : EXIT_MACHINE);
+            struct stat status;
+            assert_int_equal(stat(path, &status), 0);
+            assert_int_equal(status.st_size > 0, is_complete);
+            unlink(path);
+        }
+    crash = 0;
+    scratch_close(memory_copy_text(folder));
+#endif
+}
+
+int main(void)
+{
+    // each command is a process of its own, and forks before this one has opened a device
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_commands), cmocka_unit_test(test_several_devices),
+        cmocka_unit_test(test_release_after_the_output), cmocka_unit_test(test_crashes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

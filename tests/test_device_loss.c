@@ -1,0 +1,158 @@
+// Of two devices that render one image one fails, at each call of its first band in turn, and both: the image
+// is whole where one is left, and the failure is reported.
+#include "tests/failing/calls.h"
+#include "tests/failing/work.h"
+#include <pthread.h>
+#include <semaphore.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+// Two renderers, as on two devices, of which the second renders in a thread. Each waits until the other has
+// taken a band, or the second has failed.
+static struct {
+    sem_t first_goes_on, second_goes_on;
+    bool first_has_waited, second_has_waited;
+    size_t dropped_count, dropped;
+} pair;
+
+static bool pair_wait(void)
+{
+    bool is_first = pthread_equal(pthread_self(), first_thread);
+    bool *has_waited = is_first ? &pair.first_has_waited : &pair.second_has_waited;
+    if (*has_waited) return false;
+    *has_waited = true;
+    sem_post(is_first ? &pair.second_goes_on : &pair.first_goes_on);
+    sem_wait(is_first ? &pair.first_goes_on : &pair.second_goes_on);
+    return false;
+}
+
+static void pair_dropped(void *context, size_t index)
+{
+    (void)context;
+    pair.dropped_count++;
+    pair.dropped = index;
+    sem_post(&pair.first_goes_on);
+    sem_post(&pair.second_goes_on);
+}
+
+// Whether the image is whole; the computes are left open.
+static bool pair_work(Compute computes[2], Answer *answer)
+{
+    call_counts_clear();
+    memset(&pair, 0, sizeof pair);
+    memset(answer, 0, sizeof *answer);
+    sem_init(&pair.first_goes_on, 0, 0);
+    sem_init(&pair.second_goes_on, 0, 0);
+    Renderer *renderers[2];
+    work_settings.stop = pair_wait;
+    for (size_t i = 0; i < 2; i++) {
+        compute_open(&computes[i], work_device);
+        renderers[i] = renderer_open(&computes[i], &work_scene, &work_settings, NULL);
+    }
+    const RenderJob job = {.renderers = renderers,
+                           .count = 2,
+                           .aovs = AOVS_ALL,
+                           .sink = work_take_band,
+                           .dropped = pair_dropped,
+                           .context = answer};
+    bool whole = render_job_run(&job);
+    work_settings.stop = NULL;
+    for (size_t i = 0; i < 2; i++)
+        renderer_close(renderers[i]);
+    sem_destroy(&pair.first_goes_on);
+    sem_destroy(&pair.second_goes_on);
+    return whole;
+}
+
+static void pair_close(Compute computes[2])
+{
+    compute_close(&computes[0]);
+    compute_close_checked(&computes[1]);
+}
+
+// Of two devices one fails, at each call of its first band in turn: the other renders the whole image.
+static void test_one_of_two_devices(void **state)
+{
+    (void)state;
+    static const char *const needed[] = {
+        "clCreateBuffer",       "clCreateKernel",         "clSetKernelArg",
+        "clEnqueueWriteBuffer", "clEnqueueReadBuffer",    "clEnqueueMapBuffer",
+        "clGetEventInfo",       "clEnqueueNDRangeKernel", "clWaitForEvents"};
+    Compute computes[2];
+    Answer answer;
+    injected.in_threads = true;
+    injected.call = NULL;
+    injected.returns_null = false;
+    assert_true(pair_work(computes, &answer));
+    assert_int_equal(pair.dropped_count, 0);
+    assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+    pair_close(computes);
+    CallCount all[CALL_COUNTS];
+    memcpy(all, call_counts, sizeof all);
+    for (size_t i = 0; i < sizeof needed / sizeof *needed; i++) {
+        size_t count = 0;
+        for (size_t k = 0; all[k].call; k++)
+            if (strcmp(all[k].call, needed[i]) == 0) count = all[k].count;
+        assert_true(count > 0);
+        for (injected.index = 0; injected.index < count; injected.index++) {
+            injected.call = needed[i];
+            bool whole = pair_work(computes, &answer);
+            if (!whole) fail_msg("%s, call %zu: no image", needed[i], injected.index);
+            assert_int_equal(pair.dropped_count, 1);
+            assert_int_equal(pair.dropped, 1);
+            assert_int_equal(answer.band_count, 2);
+            assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+            assert_true(compute_ok(&computes[0]));
+            assert_string_equal(computes[1].failure.call, needed[i]);
+            pair_close(computes);
+        }
+    }
+    injected.in_threads = false;
+    injected.call = NULL;
+}
+
+// The second device gets no thread: the first renders the whole image.
+static void test_a_device_without_a_thread(void **state)
+{
+    (void)state;
+    Compute computes[2];
+    Answer answer;
+    injected.call = "pthread_create";
+    injected.index = EVERY_CALL;
+    assert_true(pair_work(computes, &answer));
+    injected.call = NULL;
+    assert_int_equal(pair.dropped_count, 1);
+    assert_int_equal(pair.dropped, 1);
+    assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+    assert_true(compute_ok(&computes[0]));
+    assert_string_equal(computes[1].failure.call, "pthread_create");
+    pair_close(computes);
+}
+
+static void test_both_of_two_devices(void **state)
+{
+    (void)state;
+    Compute computes[2];
+    Answer answer;
+    injected.call = "clEnqueueNDRangeKernel";
+    injected.index = EVERY_CALL;
+    assert_false(pair_work(computes, &answer));
+    assert_int_equal(pair.dropped_count, 1); // the last one reports for all
+    assert_false(compute_ok(&computes[0]) || compute_ok(&computes[1]));
+    assert_int_equal(answer.band_count, 0);
+    pair_close(computes);
+    injected.call = NULL;
+}
+
+int main(void)
+{
+    first_thread = pthread_self();
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_one_of_two_devices),
+                                       cmocka_unit_test(test_a_device_without_a_thread),
+                                       cmocka_unit_test(test_both_of_two_devices)};
+    return cmocka_run_group_tests(tests, work_set_up, work_tear_down);
+}
