@@ -22,7 +22,10 @@ KILLS = 200 if IS_LONG else 6
 
 
 def size(path):
-    return os.stat(path).st_size if os.path.exists(path) else 0
+    try:
+        return os.stat(path).st_size
+    except FileNotFoundError:  # also where it is removed just now
+        return 0
 
 
 class Checkpoints(TestCase):

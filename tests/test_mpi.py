@@ -133,24 +133,53 @@ class Mpi(TestCase):
         subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "faults.so", *flags], input=FAULTS, text=True, check=True)
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
-    def test_several_scenes(self):
-        """Each is rendered by all ranks, but for one with a mistake; a checkpoint that is refused ends them."""
-        scenes = {"boxes": (ROOT / "scenes/boxes.yaml").read_text(), "bad": "camera: 5"}
-        scenes |= {f"sphere{i}": SPHERE.replace("radius: 1", f"radius: 1.{i}") for i in range(4)}
+    def write_frames(self, more=()):
+        """More scenes and six others, and what renders them, also into expected/."""
+        scenes = dict(more) | {f"sphere{i}": SPHERE.replace("radius: 1", f"radius: 1.{i}") for i in range(6)}
         for name, text in scenes.items():
             write(f"{name}.yaml", text)
-        os.mkdir("frames")
         os.mkdir("expected")
-        names = " ".join(f"{name}.yaml" for name in scenes)
-        command = f"render {names} --size 160x120 --precision strict --quiet"
-        for errors in self.glint(f"{command} -o expected", 1, env=POCL), self.mpirun(f"-n 3 {RANKS} {command} -o frames", 1):
-            self.assertRegex(errors.stderr, "^bad.yaml:1")
-        self.assertEqual(sorted(os.listdir("frames")), sorted(f"{name}.png" for name in scenes if name != "bad"))
+        command = f"render {' '.join(f'{name}.yaml' for name in scenes)} --size 160x120 --precision strict --quiet"
+        self.glint(f"{command} -o expected", 1 if more else 0, env=POCL)
+        return command
+
+    def check_frames(self, together=()):
+        """They are as expected; those that the ranks render together say so."""
+        self.assertEqual(sorted(os.listdir("frames")), sorted(os.listdir("expected")))
         for name in os.listdir("frames"):
-            self.assertEqual(png_read(f"frames/{name}")[1], png_read(f"expected/{name}")[1])
-        write("frame.yaml", SPHERE)
+            _, rows, texts, _ = png_read(f"frames/{name}")
+            self.assertEqual(rows, png_read(f"expected/{name}")[1])
+            self.assertEqual("Ranks" in texts, together is all or name in together, name)
+        shutil.rmtree("frames")
+        os.mkdir("frames")
+
+    def test_frames(self):
+        """Each rank renders whole ones, and all together what is left, or what another rank cannot read. A mistake ends one frame."""
+        command = self.write_frames({"bad": "camera: 5", "boxes": (ROOT / "scenes/boxes.yaml").read_text()}.items())
+        os.mkdir("frames")
+        self.assertRegex(self.mpirun(f"-n 3 {RANKS} {command} -o frames", 1).stderr, "(?m)^bad.yaml:1")
+        self.check_frames(["sphere4.png", "sphere5.png"])
+        self.mpirun(f"-n 1 {RANKS} {command} -o frames : -n 2 --wdir / {RANKS} {command} -o frames", 1)
+        self.check_frames(all)
+
+    def test_a_refused_checkpoint(self):
+        """It ends all ranks."""
         Path("saved").write_text("no checkpoint")
-        self.mpirun(f"-n 2 {RANKS} render frame.yaml --size 160x120 --checkpoint saved", status=1)
+        self.mpirun(f"-n 2 {RANKS} {RENDER} --checkpoint saved", status=1)
+
+    def test_frames_of_failing_devices(self):
+        """Others render the frame of a rank whose device fails; with none left the job ends with 2."""
+        self.faults_build()
+        command = self.write_frames()
+        os.mkdir("frames")
+        ranks = [f"-n 1 -x LD_PRELOAD=./faults.so {slow} {RANKS} {command} -o frames" for slow in ("-x FAULT_USEC=200000", "")]
+        for first, second in ranks, reversed(ranks):
+            process = self.mpirun(f"{first} : {second}")
+            self.assertRegex(process.stderr, "warning: the other devices go on without one: clEnqueueNDRangeKernel")
+            self.check_frames()
+        process = self.mpirun(f"{ranks[1]} : {ranks[1]}", 2)
+        self.assertRegex(process.stderr, "no rank is left that can render")
+        self.assertEqual(os.listdir("frames"), [])
 
     def mpirun_faulty(self, *faults, status=0):
         """Each rank is faulty as its variables say."""
@@ -181,7 +210,12 @@ class Mpi(TestCase):
 
     def start(self, command, *options):
         """A job with a checkpoint; returns when that has another band, or the job is done."""
-        size = lambda: os.stat("saved").st_size if os.path.exists("saved") else 0
+        def size():
+            try:
+                return os.stat("saved").st_size
+            except FileNotFoundError:  # also where it is removed just now
+                return 0
+
         before = max(size(), 4096)
         process = subprocess.Popen(["mpirun", "-n", "3", RANKS, *command.split(), "-o", "ranks.npy", "--checkpoint", "saved", *options],
                                    env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,

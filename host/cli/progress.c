@@ -74,7 +74,14 @@ void progress_close(Progress *progress)
     if (progress->visible) fputs("\r\033[K", stderr);
 }
 
+static bool (*other_interrupts)(void);
+
+void progress_ask(bool (*ask)(void))
+{
+    other_interrupts = ask;
+}
+
 bool progress_interrupted(void)
 {
-    return interrupted != 0;
+    return interrupted != 0 || (other_interrupts && other_interrupts());
 }

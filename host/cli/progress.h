@@ -22,3 +22,5 @@ void progress_show(Progress *progress, double fraction_done);
 void progress_release_signals(void);
 void progress_close(Progress *progress); // erases the line; signals still only set the flag
 bool progress_interrupted(void);
+// From now on progress_interrupted is also true where `ask` is, which it calls.
+void progress_ask(bool (*ask)(void));

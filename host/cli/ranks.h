@@ -24,6 +24,3 @@ typedef struct Ranks {
     void (*start)(bool can_start);
     void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker); // see RemoteWorkers
 } Ranks;
-
-// glint render, with other ranks' devices.
-int command_render_on(Ranks *ranks, int argument_count, char **arguments);

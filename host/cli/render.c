@@ -1,4 +1,5 @@
 // glint render: a scene file becomes an image.
+#include "host/cli/render.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -182,11 +183,6 @@ static int scene_render(RenderOptions *options, const Scene *scene, RenderDevice
     return status;
 }
 
-int command_render(int argument_count, char **arguments)
-{
-    return command_render_on(NULL, argument_count, arguments);
-}
-
 // Renders one of the scenes into a file.
 static int file_render(RenderOptions options, const char *path, RenderDevices *open, Ranks *ranks)
 {
@@ -197,7 +193,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
-        if (render_devices_open(open, options.common.device, ranks))
+        if (render_devices_open(open, options.common.device))
             status = scene_render(&options, &scene, open, ranks, &times);
     }
     scene_free(&scene);
@@ -230,36 +226,114 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
     return true;
 }
 
-// Renders the scenes, one after the other. A mistake in one does not keep the others from being rendered.
-static int files_render(RenderOptions *options, char *const *paths, Ranks *ranks)
-{
-    RenderDevices open = {0};
-    int status = EXIT_DONE;
-    bool goes_on = true;
-    for (size_t i = 0; i < options->scene_count && goes_on; i++) {
-        options->scene = options->scenes[i];
-        progress_release_signals(); // while a scene is read none asks for them
-        const int of_file =
-            progress_interrupted() ? EXIT_INTERRUPTED : file_render(*options, paths[i], &open, ranks);
-        if (of_file != EXIT_DONE) status = of_file;
-        if (status == EXIT_DONE && i + 1 == options->scene_count) fault_output_is_complete(status);
-        goes_on = render_devices_rest(&open) && (of_file == EXIT_DONE || of_file == EXIT_USER);
-    }
-    return render_devices_close(&open, status);
-}
+struct RenderCommand {
+    RenderOptions options;
+    char **paths; // of each scene's image
+    RenderDevices open;
+    int status;
+};
 
-int command_render_on(Ranks *ranks, int argument_count, char **arguments)
+RenderCommand *render_command_open(int argument_count, char **arguments, int *status)
 {
     RenderOptions options;
-    int status = render_options_read(&options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    const size_t count = options.scene_count;
-    char **paths = memory_allocate(count, sizeof *paths);
-    for (size_t i = 0; i < count; i++)
-        paths[i] = path_make(&options, options.scenes[i]);
-    status = paths_differ(paths, &options) ? files_render(&options, paths, ranks) : EXIT_USER;
-    for (size_t i = 0; i < count; i++)
-        free(paths[i]);
-    free(paths);
+    *status = render_options_read(&options, argument_count, arguments);
+    if (*status != OPTIONS_READ) return NULL;
+    RenderCommand *command = memory_allocate_zeroed(1, sizeof *command);
+    command->options = options;
+    command->paths = memory_allocate(options.scene_count, sizeof *command->paths);
+    for (size_t i = 0; i < options.scene_count; i++)
+        command->paths[i] = path_make(&options, options.scenes[i]);
+    if (paths_differ(command->paths, &options)) return command;
+    render_command_close(command);
+    *status = EXIT_USER;
+    return NULL;
+}
+
+void render_command_choose_device(RenderCommand *command, size_t number)
+{
+    command->open.is_single = true;
+    command->open.number = number;
+}
+
+size_t render_command_count(const RenderCommand *command)
+{
+    return command->options.scene_count;
+}
+
+const char *render_command_scene(const RenderCommand *command, size_t index)
+{
+    return command->options.scenes[index];
+}
+
+const char *render_command_path(const RenderCommand *command, size_t index)
+{
+    return command->paths[index];
+}
+
+bool render_command_open_devices(RenderCommand *command)
+{
+    return render_devices_open(&command->open, command->options.common.device);
+}
+
+int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
+{
+    RenderDevices *open = &command->open;
+    command->options.scene = command->options.scenes[index];
+    render_devices_rest(open);
+    progress_release_signals(); // while a scene is read none asks for them
+    if (progress_interrupted()) return EXIT_INTERRUPTED;
+    const int status = file_render(command->options, command->paths[index], open, ranks);
+    return render_devices_work(open) ? status : EXIT_MACHINE;
+}
+
+bool render_command_is_unfit(const RenderCommand *command)
+{
+    return command->open.is_unfit;
+}
+
+void render_command_note(RenderCommand *command, int status)
+{
+    if (status != EXIT_DONE) command->status = status;
+}
+
+bool render_status_goes_on(int status)
+{
+    return status == EXIT_DONE || status == EXIT_USER;
+}
+
+void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
+{
+    bool goes_on = render_status_goes_on(command->status);
+    for (size_t i = first; i < command->options.scene_count && goes_on; i++) {
+        const int status = render_command_run(command, i, ranks);
+        render_command_note(command, status);
+        goes_on = render_status_goes_on(status);
+    }
+}
+
+void render_command_drop_devices(RenderCommand *command)
+{
+    OpenDevices *devices = &command->open.devices;
+    for (size_t i = 0; i < devices->count; i++)
+        if (!compute_ok(devices->items[i].compute)) devices_drop(devices, i);
+}
+
+int render_command_close(RenderCommand *command)
+{
+    if (command->status == EXIT_DONE) fault_output_is_complete(EXIT_DONE);
+    const int status = render_devices_close(&command->open, command->status);
+    for (size_t i = 0; i < command->options.scene_count; i++)
+        free(command->paths[i]);
+    free(command->paths);
+    free(command);
     return status;
+}
+
+int command_render(int argument_count, char **arguments)
+{
+    int status;
+    RenderCommand *command = render_command_open(argument_count, arguments, &status);
+    if (!command) return status;
+    render_command_run_from(command, 0, NULL);
+    return render_command_close(command);
 }

@@ -4,12 +4,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-bool render_devices_open(RenderDevices *open, const char *selector, const Ranks *ranks)
+bool render_devices_open(RenderDevices *open, const char *selector)
 {
     if (open->is_open) return true;
     MessageList messages = {0};
-    open->is_open = ranks ? devices_open_one(&open->devices, selector, 0, &messages)
-                          : devices_open(&open->devices, selector);
+    open->is_open = open->is_single ? devices_open_one(&open->devices, selector, open->number, &messages)
+                                    : devices_open(&open->devices, selector);
     messages_print(&messages, NULL);
     if (open->is_open) open->renderers = memory_allocate_zeroed(open->devices.count, sizeof(Renderer *));
     return open->is_open;
@@ -33,6 +33,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
     const size_t count = devices->count;
     Compute **computes = memory_allocate(count, sizeof *computes);
     MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each), unfit = {0};
+    open->is_unfit = false;
     for (size_t i = 0; i < count; i++)
         computes[i] = devices->items[i].compute;
     bool is_done = renderers_open(renderers, computes, count, scene, settings,
@@ -43,6 +44,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
         const bool is_dispensable = is_done && devices->count > 1 && (fits || devices->are_all);
         message_list_move(renderer || !is_dispensable ? messages : &unfit, &of_each[i]);
         if (renderer || !is_dispensable) {
+            open->is_unfit = open->is_unfit || !fits;
             renderers[kept++] = renderer;
             is_done = is_done && renderer;
         } else {
@@ -56,7 +58,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
     return is_done;
 }
 
-bool render_devices_rest(RenderDevices *open)
+void render_devices_rest(RenderDevices *open)
 {
     OpenDevices *devices = &open->devices;
     size_t kept = 0;
@@ -70,10 +72,13 @@ bool render_devices_rest(RenderDevices *open)
             open->renderers[kept++] = renderer;
         }
     }
-    bool works = true;
-    for (size_t i = 0; i < kept; i++)
-        works = works && compute_ok(devices->items[i].compute);
-    return works;
+}
+
+bool render_devices_work(const RenderDevices *open)
+{
+    for (size_t i = 0; i < open->devices.count; i++)
+        if (!open->devices.items[i].is_dropped && !compute_ok(open->devices.items[i].compute)) return false;
+    return true;
 }
 
 int render_devices_close(RenderDevices *open, int status)

@@ -8,18 +8,21 @@ typedef struct {
     OpenDevices devices;
     Renderer **renderers; // as many; NULL, or with the last image's scene or only its kernels
     bool is_open;
+    bool is_single; // only one of those that are listed, see devices_open_one
+    size_t number;  // of that one
+    bool is_unfit;  // the last image's settings or scene do not fit a device
 } RenderDevices;
 
-// The devices that the selector lists, or of several ranks this one's. True where they are open already.
-// False, with a message, if there is none.
-bool render_devices_open(RenderDevices *open, const char *selector, const Ranks *ranks);
+// Those that the selector lists. True where they are open already. False, with a message, if there is none.
+bool render_devices_open(RenderDevices *open, const char *selector);
 // Gives their renderers, and the ranks, another scene. If others are left, those that fail are removed, and
 // of all devices those that the scene or settings do not fit. False: with messages, these do not fit a
 // device, else the device failed.
 bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderSettings *settings,
                           const Ranks *ranks, MessageList *messages);
-// After an image: frees its scene, and removes the devices that failed while others are left. False: the last
-// one failed.
-bool render_devices_rest(RenderDevices *open);
+// After an image: frees its scene, and removes the devices that failed while others are left.
+void render_devices_rest(RenderDevices *open);
+// False: the last one failed.
+bool render_devices_work(const RenderDevices *open);
 // As devices_close.
 int render_devices_close(RenderDevices *open, int status);

@@ -4,6 +4,8 @@
 #include "host/base/memory.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
+#include "host/cli/render.h"
+#include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
 #include <errno.h>
 #include <signal.h>
@@ -28,7 +30,7 @@ static void ranks_start(bool can_start)
 static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                         const char *device_selector, MessageList *messages)
 {
-    Job job = {.is_there = true,
+    Job job = {.kind = JOB_IMAGE,
                .settings = *settings,
                .aovs = aovs,
                .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
@@ -235,9 +237,14 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
     } else {
         char name[] = "glint-mpi render"; // which getopt's messages begin with
         arguments[1] = name;
-        status = command_render_on(&ranks, argument_count - 1, arguments + 1);
+        RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
+        if (command) {
+            render_command_choose_device(command, 0);
+            render_command_run_from(command, frames_deal(command, other_count), &ranks);
+            status = render_command_close(command);
+        }
     }
-    Job none = {.is_there = false};
+    Job none = {.kind = JOB_END};
     broadcast(&none, sizeof none, MPI_COMM_WORLD);
     free(ranks.items);
     free(ranks.shares);

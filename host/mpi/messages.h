@@ -1,5 +1,6 @@
-// What the ranks of a job send each other. For each image the first rank broadcasts
-//   a Job, which the others answer with their Rank;
+// What the ranks of a job send each other. The first rank broadcasts a Job, again and again. For an image
+// follow
+//   the others' answers, their Ranks;
 //   Orders: the compiled scene for each variant that a rank needs, after which it follows, then the start.
 // From then on each asks the first one for rows and sends their bands, until it has sent TAG_DONE and
 // received TAG_END.
@@ -13,8 +14,10 @@ enum {
     TAG_ROWS, // BandRows, the answer; no rows: the end
     TAG_BAND, // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,
-    TAG_END,  // to a rank that renders: the render has ended
-    TAG_DONE, // the last one of a rank: why its device failed, or an empty text
+    TAG_END,        // to a rank that renders: the render has ended
+    TAG_DONE,       // the last one of a rank: why its device failed, or an empty text
+    TAG_FRAME_DONE, // the exit status of a rank's frame; EXIT_DONE, too, before the first
+    TAG_FRAME,      // the answer: the next frame's index, or NO_FRAME
 };
 
 typedef struct {
@@ -22,8 +25,8 @@ typedef struct {
 } Request;
 
 typedef struct {
-    bool is_there; // false: the last image is done
-    RenderSettings settings;
+    enum { JOB_END, JOB_FRAMES, JOB_IMAGE } kind;
+    RenderSettings settings; // of an image, and what follows
     unsigned aovs;
     size_t selector_size; // the device selector's, which follows, with its NUL; 0: none
 } Job;

@@ -2,6 +2,7 @@
 
 #include "host/base/memory.h"
 #include "host/cli/options.h"
+#include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
 #include <signal.h>
 #include <stdio.h>
@@ -142,12 +143,16 @@ static void signals_ignore(void)
         signal(signals[i], SIG_IGN);
 }
 
-void other_rank_run(int rank, size_t local_rank)
+void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments)
 {
     signals_ignore();
     Worker worker = {.rank = rank, .local_rank = local_rank};
     Job job;
-    while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.is_there)
-        job_run(&worker, &job);
+    while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.kind != JOB_END) {
+        if (job.kind == JOB_FRAMES)
+            frames_work(local_rank, argument_count, arguments);
+        else
+            job_run(&worker, &job);
+    }
     device_close_quietly(&worker);
 }

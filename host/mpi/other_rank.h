@@ -4,5 +4,5 @@
 #include <stddef.h>
 
 // Runs until the first rank has no more images. `local_rank`: among those of this machine, by which they
-// share its devices.
-void other_rank_run(int rank, size_t local_rank);
+// share its devices. The arguments are the first rank's.
+void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments);

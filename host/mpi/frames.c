@@ -1,0 +1,281 @@
+#include "host/mpi/frames.h"
+
+#include "host/base/array.h"
+#include "host/base/fault.h"
+#include "host/base/hash.h"
+#include "host/base/memory.h"
+#include "host/base/text.h"
+#include "host/cli/options.h"
+#include "host/cli/progress.h"
+#include "host/mpi/messages.h"
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const size_t NO_FRAME = SIZE_MAX;
+// The status of a frame that another device may be able to render.
+enum { FRAME_UNFIT = 256 };
+
+static int frame_render(RenderCommand *command, size_t frame)
+{
+    const int status = render_command_run(command, frame, NULL);
+    return status == EXIT_USER && render_command_is_unfit(command) ? FRAME_UNFIT : status;
+}
+
+// Whether the files are shared.
+
+enum { MARKER_BYTES = 4096 };
+
+// Of the scenes' names and files: the same for two ranks only if they see the same files.
+static uint64_t files_hash(const RenderCommand *command)
+{
+    uint64_t hash = HASH_START;
+    for (size_t i = 0; i < render_command_count(command); i++) {
+        const char *scene = render_command_scene(command, i), *path = render_command_path(command, i);
+        struct stat file = {0};
+        if (stat(scene, &file) != 0) file.st_size = -1;
+        const uint64_t facts[] = {file.st_ino, (uint64_t)file.st_size, (uint64_t)file.st_mtim.tv_sec,
+                                  (uint64_t)file.st_mtim.tv_nsec};
+        hash = hash_bytes(hash, scene, strlen(scene) + 1);
+        hash = hash_bytes(hash, path, strlen(path) + 1);
+        hash = hash_bytes(hash, facts, sizeof facts);
+    }
+    return hash;
+}
+
+// A new file in the images' folder; its name is empty where there can be none.
+static void marker_make(const RenderCommand *command, char *name)
+{
+    const char *path = render_command_path(command, 0), *slash = strrchr(path, '/');
+    const int length =
+        snprintf(name, MARKER_BYTES, "%.*s.glint-XXXXXX", slash ? (int)(slash + 1 - path) : 0, path);
+    const int descriptor = length < MARKER_BYTES ? mkstemp(name) : -1;
+    if (descriptor >= 0)
+        close(descriptor);
+    else
+        name[0] = '\0';
+}
+
+// All ranks call it; `command` is NULL where the arguments could not be read. True: all see the scenes and
+// the images' folder.
+static bool files_are_shared(RenderCommand *command, bool is_first)
+{
+    char marker[MARKER_BYTES] = "";
+    const uint64_t own = command ? files_hash(command) : 0;
+    uint64_t hash = own;
+    if (is_first) marker_make(command, marker);
+    broadcast(marker, sizeof marker, MPI_COMM_WORLD);
+    broadcast(&hash, sizeof hash, MPI_COMM_WORLD);
+    int sees = command && render_command_open_devices(command) && own == hash && marker[0] != '\0' &&
+               access(marker, F_OK) == 0,
+        all_see;
+    MPI_Allreduce(&sees, &all_see, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    if (is_first && marker[0] != '\0') unlink(marker);
+    return all_see;
+}
+
+// The first rank's side: its own device renders in a thread.
+
+typedef struct {
+    pthread_mutex_t mutex;
+    RenderCommand *command;
+    size_t next, end; // of the frames that were not dealt yet
+    struct {
+        size_t *items; // that a rank with a failed device had
+        size_t count, capacity;
+    } again;
+    size_t workers, dealt; // workers whose devices work, frames that are being rendered
+    bool has_ended, is_unfit;
+} Deal;
+
+// NO_FRAME: there is none now; later there may be where a rank fails that has one.
+static size_t frame_take(Deal *deal)
+{
+    size_t frame = NO_FRAME;
+    pthread_mutex_lock(&deal->mutex);
+    if (!deal->has_ended && deal->again.count > 0)
+        frame = deal->again.items[--deal->again.count];
+    else if (!deal->has_ended && deal->next < deal->end)
+        frame = deal->next++;
+    deal->dealt += frame != NO_FRAME;
+    pthread_mutex_unlock(&deal->mutex);
+    return frame;
+}
+
+// False: the worker's device failed; others render its frame, and then all that are left.
+static bool frame_note(Deal *deal, size_t frame, int status)
+{
+    pthread_mutex_lock(&deal->mutex);
+    const bool works = status != EXIT_MACHINE && status != FRAME_UNFIT;
+    deal->is_unfit = deal->is_unfit || status == FRAME_UNFIT;
+    deal->dealt--;
+    if (works) {
+        render_command_note(deal->command, status);
+    } else {
+        array_push(deal->again, frame);
+        deal->end = render_command_count(deal->command);
+        deal->workers--;
+    }
+    if (status == EXIT_INTERRUPTED || deal->workers == 0) deal->has_ended = true;
+    pthread_mutex_unlock(&deal->mutex);
+    return works;
+}
+
+// Whether no frame will be free any more.
+static bool deal_is_over(Deal *deal)
+{
+    pthread_mutex_lock(&deal->mutex);
+    const bool is_over =
+        deal->has_ended || (deal->dealt == 0 && deal->again.count == 0 && deal->next == deal->end);
+    pthread_mutex_unlock(&deal->mutex);
+    return is_over;
+}
+
+static void deal_end(Deal *deal)
+{
+    pthread_mutex_lock(&deal->mutex);
+    deal->has_ended = true;
+    pthread_mutex_unlock(&deal->mutex);
+}
+
+static void *own_frames_render(void *context)
+{
+    Deal *deal = context;
+    for (bool works = true; works && !deal_is_over(deal);) {
+        const size_t frame = frame_take(deal);
+        if (frame == NO_FRAME) {
+            rest();
+            continue;
+        }
+        works = frame_note(deal, frame, frame_render(deal->command, frame));
+        if (!works) render_command_drop_devices(deal->command);
+    }
+    return NULL;
+}
+
+typedef struct {
+    size_t frame; // NO_FRAME: none
+    bool wants, has_failed, end_sent, is_over;
+} RankFrames;
+
+// Receives what the rank says of its last frame.
+static void frame_done_receive(Deal *deal, RankFrames *state, int rank)
+{
+    int status;
+    receive_bytes(&status, sizeof status, rank, TAG_FRAME_DONE);
+    if (state->frame != NO_FRAME) state->has_failed = !frame_note(deal, state->frame, status);
+    state->frame = NO_FRAME;
+    state->wants = true;
+}
+
+// Answers a rank that wants a frame, and reports the end to each once. False: there is nothing to do.
+static bool rank_answer(Deal *deal, RankFrames *state, int rank)
+{
+    if (!state->end_sent && (state->has_failed || deal_is_over(deal))) {
+        send_bytes(NULL, 0, rank, TAG_END);
+        return state->end_sent = true;
+    }
+    if (!state->wants) return false;
+    if (!state->end_sent) state->frame = frame_take(deal);
+    if (state->frame == NO_FRAME && !state->end_sent) return false;
+    send_bytes(&state->frame, sizeof state->frame, rank, TAG_FRAME);
+    state->wants = false;
+    state->is_over = state->frame == NO_FRAME;
+    return true;
+}
+
+static void frames_serve(Deal *deal, size_t other_count)
+{
+    RankFrames *states = memory_allocate_zeroed(other_count, sizeof *states);
+    for (size_t i = 0; i < other_count; i++)
+        states[i].frame = NO_FRAME;
+    for (size_t over_count = 0; over_count < other_count;) {
+        MPI_Status status;
+        bool is_busy = has_message(MPI_ANY_SOURCE, TAG_FRAME_DONE, &status);
+        if (is_busy) frame_done_receive(deal, &states[status.MPI_SOURCE - 1], status.MPI_SOURCE);
+        if (progress_interrupted()) deal_end(deal);
+        over_count = 0;
+        for (size_t i = 0; i < other_count; i++) {
+            is_busy |= rank_answer(deal, &states[i], (int)i + 1);
+            over_count += states[i].is_over;
+        }
+        if (!is_busy) rest();
+    }
+    free(states);
+}
+
+size_t frames_deal(RenderCommand *command, size_t other_count)
+{
+    const size_t worker_count = other_count + 1, whole = render_command_count(command) / worker_count;
+    if (other_count == 0 || whole == 0) return 0;
+    Job job = {.kind = JOB_FRAMES};
+    broadcast(&job, sizeof job, MPI_COMM_WORLD);
+    if (!files_are_shared(command, true)) return 0;
+    Deal deal = {.command = command, .end = whole * worker_count, .workers = worker_count};
+    pthread_t thread;
+    if (pthread_mutex_init(&deal.mutex, NULL) != 0) fault("out of memory: mutex");
+    if (pthread_create(&thread, NULL, own_frames_render, &deal) != 0) fault("cannot start a thread");
+    frames_serve(&deal, other_count);
+    pthread_join(thread, NULL);
+    pthread_mutex_destroy(&deal.mutex);
+    free(deal.again.items);
+    if (deal.workers == 0) {
+        fprintf(stderr, "glint: no rank is left that can render\n");
+        render_command_note(command, deal.is_unfit ? EXIT_USER : EXIT_MACHINE);
+    } else if (progress_interrupted()) {
+        render_command_note(command, EXIT_INTERRUPTED);
+    }
+    return deal.end;
+}
+
+// Another rank's side.
+
+static bool end_received;
+
+static bool has_ended(void)
+{
+    MPI_Status status;
+    if (!end_received && has_message(0, TAG_END, &status)) {
+        receive_bytes(NULL, 0, 0, TAG_END);
+        end_received = true;
+    }
+    return end_received;
+}
+
+static size_t frame_await(void)
+{
+    MPI_Status status;
+    while (!has_message(0, TAG_FRAME, &status)) {
+        has_ended();
+        rest();
+    }
+    size_t frame;
+    receive_bytes(&frame, sizeof frame, 0, TAG_FRAME);
+    return frame;
+}
+
+void frames_work(size_t local_rank, int argument_count, char **arguments)
+{
+    int status;
+    RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
+    if (command) render_command_choose_device(command, local_rank);
+    if (files_are_shared(command, false)) {
+        size_t frame;
+        status = EXIT_DONE;
+        end_received = false;
+        progress_ask(has_ended);
+        for (;;) {
+            send_bytes(&status, sizeof status, 0, TAG_FRAME_DONE);
+            frame = frame_await();
+            if (frame == NO_FRAME) break;
+            status = frame_render(command, frame);
+        }
+        progress_ask(NULL);
+        if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
+        render_command_drop_devices(command);
+    }
+    if (command) render_command_close(command);
+}
