@@ -75,13 +75,14 @@ class Checkpoints(TestCase):
 
     def test_counts_of_certified(self):
         """The pixels of saved bands that were repeated in double count as in an undisturbed render."""
+        write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # the nearer of two equal ones is in doubt
         command = f"{RENDER} --precision certified --timing=json"
         self.end_early("--precision certified --device all", TWO)
         whole = self.json(f"{command} -o whole.png", env=TWO)
         resumed = self.json(f"{command} -o image.npy --device all --checkpoint saved", env=TWO)
         self.assertSameBytes("image.npy", "whole.npy")
         self.assertTrue(0 < sum(device["share"] for device in resumed["by_device"]) < 1)
-        self.assertGreater(whole["repeated_samples"], 0)
+        self.assertGreater(whole["undecided_samples"], 0)
         for key in "repeated_samples", "undecided_samples":
             self.assertEqual(resumed[key], whole[key])
         self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['repeated_samples']} samples repeated in double, ")

@@ -103,11 +103,12 @@ class Mpi(TestCase):
 
     def test_certified(self):
         """The pixels that any rank repeats in double count. The other rank has no file of the scene's."""
+        write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # the nearer of two equal ones is in doubt
         command = f"{RENDER} --precision certified --timing=json"
         one = self.json(f"{command} -o one.npy", env=POCL)
         ranks = json.loads(self.mpirun(f"-n 1 {RANKS} {command} -o ranks.npy : -n 1 --wdir / {RANKS} {command} -o ranks.npy").stdout)
         self.assertSameBytes("one.npy", "ranks.npy")
-        self.assertGreater(one["repeated_samples"], 0)
+        self.assertGreater(one["undecided_samples"], 0)
         for key in "repeated_samples", "undecided_samples":
             self.assertEqual(ranks[key], one[key])
 
