@@ -172,6 +172,20 @@ def png_read(path):
     return struct.unpack(">IIBB", chunks[0][1][:10]), rows, texts, [kind for kind, _ in chunks]
 
 
+def checkpoint_rows(path):
+    """The rows of all whole records; 0 where there is no such file."""
+    data = Path(path).read_bytes() if Path(path).exists() else b""
+    head, record = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQQQ16s")
+    if len(data) < head.size:
+        return 0
+    at, rows = head.size + head.unpack_from(data)[2], 0
+    while at + record.size <= len(data):
+        _, _, row_count, *_, size, _ = record.unpack_from(data, at)
+        at += record.size + size
+        rows += row_count if at <= len(data) else 0
+    return rows
+
+
 def csv_rows(text):
     """Lists of numbers below the head, None where a cell is empty."""
     head, *rows = csv.reader(text.splitlines())

@@ -4,12 +4,11 @@ interrupt and a device's failure, on one device and on two. GLINT_LONG_TESTS=1: 
 import os
 import random
 import resource
-import struct
 import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, SPHERE, TestCase, find_icd, has_device, main, png_read, skip_all, write
+from glint import IS_LONG, PROGRAM, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, skip_all, write
 
 # one compute unit: bands are short
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
@@ -50,17 +49,7 @@ class Checkpoints(TestCase):
         return sum(device["share"] for device in report["by_device"])
 
     def share_saved(self):
-        """Of the rows, in whole records."""
-        data = Path("saved").read_bytes()
-        head = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQQQ16s")  # of the file and of a record
-        if len(data) < head[0].size:
-            return 0
-        at, rows = head[0].size + head[0].unpack_from(data)[2], 0
-        while at + head[1].size <= len(data):
-            _, _, row_count, *_, size, _ = head[1].unpack_from(data, at)
-            at += head[1].size + size
-            rows += row_count if at <= len(data) else 0
-        return rows / ROWS
+        return checkpoint_rows("saved") / ROWS
 
     def test_undisturbed(self):
         self.assertEqual(self.go_on(), 1)
@@ -148,7 +137,7 @@ class Checkpoints(TestCase):
                 renders += 1
             else:
                 self.assertEqual(status, -9)
-        saved = self.share_saved() if os.path.exists("saved") else 0
+        saved = self.share_saved()
         self.assertAlmostEqual(self.go_on("--device all --samples 3000", TWO), 1 - saved)
         print(f"{kills} kills, {renders} images complete between them")
 

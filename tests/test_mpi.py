@@ -13,7 +13,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, has_device, main, png_read, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
@@ -254,7 +254,7 @@ class Mpi(TestCase):
         command = f"{RENDER.replace('20', '5000')} --precision strict"
         self.glint(f"{command} -o one.npy", env=POCL)
         killed = 0
-        for kill in range(60 if IS_LONG else 3):
+        for kill in range(200 if IS_LONG else 3):
             process = self.start(command)
             rank = self.ranks_of(process).get(kill % 3) if process.poll() is None else None
             if rank:
@@ -264,8 +264,11 @@ class Mpi(TestCase):
                 self.assertSameBytes("one.npy", "ranks.npy")
             killed += process.returncode != 0
         self.assertGreater(killed, 0, "each job was done before one of its ranks was killed")
-        self.mpirun(f"-n 3 {RANKS} {command} -o ranks.npy --checkpoint saved")
+        saved = checkpoint_rows("saved") / 96
+        report = json.loads(self.mpirun(f"-n 3 {RANKS} {command} -o ranks.npy --checkpoint saved --timing=json").stdout)
         self.assertSameBytes("one.npy", "ranks.npy")
+        self.assertAlmostEqual(sum(part["share"] for part in report["by_device"] + report["by_rank"]), 1 - saved)
+        print(f"{killed} jobs ended by the kill of a rank")
         self.assertFalse(os.path.exists("saved"))
 
 
