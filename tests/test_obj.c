@@ -223,6 +223,13 @@ static void missing_materials_are_reported(void **state)
     assert_vector(material_of(&scene, 0)->color, 1, 0, 0);
     assert_vector(material_of(&scene, 1)->color, 0, 0, 1);
     scene_free(&scene);
+    // what might wait or never end is not read
+    unlink("a.mtl");
+    assert_int_equal(symlink("/dev/null", "a.mtl"), 0);
+    scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
+                         "a.obj:1:8: warning: the material file 'a.mtl' cannot be read: the default material "
+                         "is used\n");
+    scene_free(&scene);
     unlink("a.mtl");
     scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE,
                          "a.obj:1:8: warning: the material file 'missing.mtl' cannot be read: the default "
@@ -267,6 +274,8 @@ static void images_of_materials_are_used(void **state)
     } cases[] = {
         {"map_Kd none.png\n",
          "a.mtl:2:8: warning: cannot read 'none.png': No such file or directory: the color is used\n"},
+        {"map_Kd /dev/null\n",
+         "a.mtl:2:8: warning: cannot read '/dev/null': not a regular file: the color is used\n"},
         {"map_Kd a.tga\n", "a.mtl:2:8: warning: 'a.tga' is no PNG, JPEG, PPM or EXR: the color is used\n"},
         {"map_Kd -s 2 2 1 -clamp on -bm 3 a.ppm\n", "a.mtl:2:8: warning: options of textures are not used\n"},
     };
@@ -277,7 +286,7 @@ static void images_of_materials_are_used(void **state)
         text_free(&mtl);
         scene =
             scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", cases[i].expected);
-        assert_int_equal(scene.textures.count, i == 2);
+        assert_int_equal(scene.textures.count, i == 3);
         scene_free(&scene);
     }
 }

@@ -411,6 +411,9 @@ static void texture_faults_are_reported(void **state)
     (void)state;
     unlink(texture_path);
     check_refused("No such file");
+    assert_int_equal(symlink("/dev/null", texture_path), 0);
+    check_refused("not a regular file");
+    unlink(texture_path);
     FILE *file = fopen(texture_path, "w");
     fputs("not a texture", file);
     fclose(file);

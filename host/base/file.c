@@ -36,6 +36,14 @@ int file_folder_open(const char *path)
     return descriptor;
 }
 
+const char *file_obstacle(const char *path)
+{
+    struct stat status;
+    if (stat(path, &status) != 0) return strerror(errno);
+    if (!S_ISREG(status.st_mode)) return "not a regular file";
+    return access(path, R_OK) == 0 ? NULL : strerror(errno);
+}
+
 bool file_sync(int descriptor)
 {
     return fsync(descriptor) == 0 || errno == EINVAL || errno == ENOSYS || errno == EBADF;

@@ -1,4 +1,4 @@
-// What files that outlive their process need: locks, names and syncs.
+// What files that outlive their process, or that others name, need: locks, names and syncs.
 #pragma once
 
 #include <stdbool.h>
@@ -14,6 +14,8 @@ bool file_has_name(int descriptor, int folder, const char *name);
 // Opens the folder of a file. One that may be written but not listed is opened, but cannot be synced. -1: see
 // errno.
 int file_folder_open(const char *path);
+// What keeps a file that another one names from being read, or NULL: a pipe might wait, a device never end.
+const char *file_obstacle(const char *path);
 // Syncs a file or folder. False where a write failed; not every file system can sync every file, which is no
 // failure.
 bool file_sync(int descriptor);

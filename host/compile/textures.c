@@ -1,6 +1,7 @@
 #include "host/compile/stages.h"
 
 #include "host/base/array.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/image/image.h"
 #include "host/image/srgb.h"
@@ -123,7 +124,10 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
     const Source source = scene_source(scene);
     Image image;
     MessageList problems = {0};
-    bool done = image_read(&image, scene_texture->path, &problems);
+    const char *obstacle = file_obstacle(scene_texture->path);
+    if (obstacle)
+        message_add(&problems, MESSAGE_ERROR, "cannot read '%s': %s", scene_texture->path, obstacle);
+    bool done = !obstacle && image_read(&image, scene_texture->path, &problems);
     if (done) {
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
         *texture = (CompiledTexture){image.width, image.height, first_level,

@@ -1,11 +1,10 @@
 // Chooses a mesh's reader, and makes what it read a mesh of the scene.
 #include "host/import/mesh/mesh_import.h"
+#include "host/base/file.h"
 #include "host/import/mesh/draft.h"
 
-#include <errno.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 static bool (*reader_of(const char *path))(MeshDraft *draft)
 {
@@ -19,20 +18,14 @@ static bool (*reader_of(const char *path))(MeshDraft *draft)
     return foreign_read;
 }
 
-static bool file_is_there(MeshDraft *draft)
-{
-    struct stat status;
-    if (stat(draft->import->path, &status) != 0) return draft_refuse(draft, "%s", strerror(errno));
-    return S_ISREG(status.st_mode) || draft_refuse(draft, "not a regular file");
-}
-
 // The text is gone before the draft becomes a mesh, which needs memory too.
 static bool file_read(MeshDraft *draft, Mesh *mesh)
 {
     bool (*read)(MeshDraft *) = reader_of(draft->import->path);
     Text text = {0};
     MessageList problems = {0};
-    bool done = file_is_there(draft);
+    const char *obstacle = file_obstacle(draft->import->path);
+    bool done = !obstacle || draft_refuse(draft, "%s", obstacle);
     if (done && read != foreign_read) {
         done = text_read_file(&text, draft->import->path, &problems);
         if (!done) report_error(draft->import->report, draft->import->offset, "%s", problems.items[0].text);

@@ -1,14 +1,13 @@
 // Wavefront MTL (Alias|Wavefront, Advanced Visualizer manual, MTL material format, 1995), as far as materials
 // of scenes have it: docs/scene-format.md.
 #include "host/import/mesh/mtl.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/image/image.h"
 #include "host/import/mesh/scan.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 typedef struct {
     char *name;
@@ -156,9 +155,10 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
     if (options && options->file_named) options->file_named(options->context, path);
     free(material->image);
     material->image = NULL;
-    if (access(path, R_OK) != 0)
+    const char *obstacle = file_obstacle(path);
+    if (obstacle)
         report_warning(&reader->report, name.offset, "cannot read '%s': %s: the color is used", path,
-                       strerror(errno));
+                       obstacle);
     else if (!image_is_known(path))
         report_warning(&reader->report, name.offset, "'%s' is no PNG, JPEG, PPM or EXR: the color is used",
                        path);
@@ -219,7 +219,7 @@ static bool library_read(MtlReader *reader, const char *path)
     if (options && options->file_named) options->file_named(options->context, path);
     Text text = {0};
     MessageList ignored = {0}, messages = {0};
-    const bool is_there = access(path, R_OK) == 0 && text_read_file(&text, path, &ignored);
+    const bool is_there = !file_obstacle(path) && text_read_file(&text, path, &ignored);
     if (is_there) {
         const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         reader->path = path;
