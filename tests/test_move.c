@@ -209,6 +209,24 @@ static void turned_camera_changes_the_header_alone(void **state)
     scene_free(&scene);
 }
 
+// A kernel may be built for a BVH that the scene has not: its one node stays empty.
+static void missing_bvh_stays_empty(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("move.yaml", scene_text);
+    CompileSettings settings = single;
+    settings.bvh = BVH_OFF;
+    settings.extra_features = FEATURE_BVH;
+    CompiledScene compiled = compiled_make(&scene, &settings), expected = compiled_make(&scene, &settings);
+    scene.camera.position.z -= 1;
+    MessageList messages = {0};
+    assert_true(scene_move(&compiled, &scene, &settings, &messages));
+    check_array(&compiled, &expected, FLAT_NODES);
+    compiled_scene_free(&expected);
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
+}
+
 // Where the device's unit changes, or the eye does not fit, and afterwards.
 static void far_eyes(void **state)
 {
@@ -305,6 +323,7 @@ int main(void)
         cmocka_unit_test(moved_scene_has_the_numbers_of_a_compiled_one),
         cmocka_unit_test(powers_come_and_go),
         cmocka_unit_test(turned_camera_changes_the_header_alone),
+        cmocka_unit_test(missing_bvh_stays_empty),
         cmocka_unit_test(far_eyes),
         cmocka_unit_test(moves_after_a_failure),
         cmocka_unit_test(loops_over_threads_cover_each_index_once),

@@ -240,7 +240,7 @@ static Bounds node_bounds(const FlatNode *node)
 
 void bvh_refit(CompiledScene *compiled)
 {
-    if (!(compiled->features & FEATURE_BVH)) return;
+    if (compiled->pending_children_max == 0) return; // no BVH, though the kernel may be built for one
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     compiled->changed[FLAT_NODES] = true;
     parallel_run(nodes->count, FLAT_RANGE_MIN / 16, leaves_fit, compiled);
