@@ -5,6 +5,7 @@
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <unistd.h>
@@ -385,7 +386,8 @@ static void damaged_gltf_is_survived(void **state)
     text_free(&got);
 }
 
-// What the process that runs assimp may do (tests/foreign_child.c); its limits are lower here.
+// What the process that runs assimp may do (tests/foreign_child.c); its limits are lower here. Who started
+// glint may ignore the signals that end it.
 static void child_is_limited(void **state)
 {
     (void)state;
@@ -398,11 +400,15 @@ static void child_is_limited(void **state)
         {"hang.fbx", "assimp needs more than 60 s to read it"},
         {"bloat.fbx", "assimp needs more than 4096 MiB to read it"},
     };
+    void (*const on_processor)(int) = signal(SIGXCPU, SIG_IGN),
+                 (*const on_alarm)(int) = signal(SIGALRM, SIG_IGN);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         file_write(cases[i].name, "");
         assert_file_refused(cases[i].name, cases[i].reason);
         unlink(cases[i].name);
     }
+    signal(SIGXCPU, on_processor);
+    signal(SIGALRM, on_alarm);
 }
 
 static void scene_file_faults_are_reported(void **state)

@@ -272,11 +272,13 @@ static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
     if (pipe2(ends, O_CLOEXEC) != 0) return errno;
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
+    // glint ignores the first two; who started it may ignore the others, which end this process in time
+    static const int ending[] = {SIGPIPE, SIGXFSZ, SIGXCPU, SIGALRM};
     sigset_t none, defaults;
     sigemptyset(&none);
     sigemptyset(&defaults);
-    sigaddset(&defaults, SIGPIPE);
-    sigaddset(&defaults, SIGXFSZ);
+    for (size_t i = 0; i < sizeof ending / sizeof *ending; i++)
+        sigaddset(&defaults, ending[i]);
     posix_spawn_file_actions_init(&actions);
     posix_spawnattr_init(&attributes);
     // first: the pipe has one of the standard descriptors where that was closed
