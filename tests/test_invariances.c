@@ -1,11 +1,10 @@
 // Random scenes of every shape, light and kind of material: settings that must not change any bit of an image
 // or its AOVs (hard cases R6, R7, P7, M6 of docs/verify.md). test_variants has a scene made by hand.
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/compile/random_shape.h"
 #include "host/compile/transform.h"
 #include "tests/film.h"
 #include "tests/probe.h"
+#include "tests/random_scene.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -27,89 +26,6 @@ typedef struct {
     Film film;
     const char *name;
 } Case;
-
-// A point at a distance of least .. most from the origin, in a random direction.
-static Vector3 random_point(Random *random, double least, double most)
-{
-    Vector3 direction = vector_normalize(random_in_sphere(random));
-    return vector_scale(direction, random_between(random, least, most));
-}
-
-static Color random_color(Random *random)
-{
-    double red = random_between(random, 0.1, 1), green = random_between(random, 0.1, 1);
-    return (Color){red, green, random_between(random, 0.1, 1)};
-}
-
-static Material random_material(Random *random, size_t index)
-{
-    Material material = material_default();
-    material.color = random_color(random);
-    material.diffuse = random_color(random);
-    material.specular = random_between(random, 0, 1);
-    material.shininess = random_between(random, 0, 100);
-    if (index == 1) material.reflection = random_between(random, 0.2, 0.8);
-    if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
-    if (index == 3) {
-        material.checker = true;
-        material.checker_size = random_between(random, 0.3, 1);
-        material.checker_colors[0] = random_color(random);
-        material.checker_colors[1] = random_color(random);
-    }
-    return material;
-}
-
-static ShapeForm forms[SHAPE_FORMS_MAX];
-static size_t form_count;
-
-// One of each form, then bounded ones; none so large that it hides the rest.
-static Object random_object(Random *random, size_t index)
-{
-    for (;;) {
-        const bool first = index < form_count;
-        const ShapeForm *form = &forms[first ? index : (size_t)random_between(random, 0, (double)form_count)];
-        RandomShape shape = random_shape(form, random);
-        if (shape.radius > 3 || (!form->bounded && !first)) continue;
-        Object *object = &shape.object;
-        // a plane behind the objects and a narrow cone beside them, not across the view
-        if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
-        if (form->kind == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
-        // the order of a triangle's vertices distinguishes glass from air, and the mirror reverses it
-        object->material = (uint32_t)index % (form->kind == SHAPE_TRIANGLE ? 2 : 4);
-        return *object;
-    }
-}
-
-// The same for the same seed.
-static Scene random_scene(uint64_t seed)
-{
-    Random random = {seed};
-    Scene scene = {.background = random_color(&random), .ambient = {0.1, 0.1, 0.1}};
-    for (size_t i = 0; i < 4; i++)
-        array_push(scene.materials, random_material(&random, i));
-    for (size_t i = 0; i < OBJECTS; i++)
-        array_push(scene.objects, random_object(&random, i));
-    // from where the plane is not in the way
-    size_t plane = 0;
-    while (forms[plane].kind != SHAPE_PLANE)
-        plane++;
-    Vector3 up = vector_normalize(scene.objects.items[plane].as.plane.normal);
-    Vector3 position = vector_subtract(random_point(&random, 10, 13), vector_scale(up, 6));
-    scene.camera = (Camera){.position = position,
-                            .look_at = random_point(&random, 0, 2),
-                            .up = random_point(&random, 1, 1),
-                            .half_tangent = random_between(&random, 0.4, 0.8)};
-    for (int i = 0; i < 4; i++) {
-        static const LightKind kinds[] = {LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT, LIGHT_POINT};
-        Light light = {.kind = kinds[i], .color = random_color(&random)};
-        light.position = vector_subtract(random_point(&random, 5, 15), vector_scale(up, 8));
-        light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
-        light.half_angle = random_between(&random, 15, 40);
-        light.penumbra = random_between(&random, 0, 10);
-        array_push(scene.lights, light);
-    }
-    return scene;
-}
 
 static Film render(const Scene *scene, const RenderSettings *settings)
 {
@@ -174,7 +90,7 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
 {
     static const int exponents[] = {-60, -10, 3, 10, 60};
     for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
-        Scene scene = random_scene(seed);
+        Scene scene = random_scene(seed, OBJECTS);
         scene_scale(&scene, ldexp(1, exponents[i]));
         Film film = render(&scene, &c->settings);
         for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++) {
@@ -207,7 +123,7 @@ static void columns_flip(void *values, size_t size)
 // Without checkers: in a plane they lie along axes made from its normal, which mirror to others.
 static Scene unchecked_scene(uint64_t seed)
 {
-    Scene scene = random_scene(seed);
+    Scene scene = random_scene(seed, OBJECTS);
     for (size_t i = 0; i < scene.materials.count; i++)
         scene.materials.items[i].checker = false;
     return scene;
@@ -240,7 +156,7 @@ static void order_changes_ids_alone(const Case *c, uint64_t seed)
 {
     Random random = {seed};
     for (int permutation = 0; permutation < 2; permutation++) {
-        Scene given = random_scene(seed), scene = random_scene(seed);
+        Scene given = random_scene(seed, OBJECTS), scene = random_scene(seed, OBJECTS);
         uint32_t from[OBJECTS];
         for (uint32_t i = 0; i < OBJECTS; i++)
             from[i] = OBJECTS - 1 - i;
@@ -264,7 +180,7 @@ static void precision_holds(Precision precision)
 {
     if (!probe_has(precision)) skip();
     for (uint64_t seed = 1; seed <= (tests_are_long() ? SEEDS : 2); seed++) {
-        Scene scene = random_scene(seed);
+        Scene scene = random_scene(seed, OBJECTS);
         char name[48];
         snprintf(name, sizeof name, "%s, seed %u", precision_names[precision], (unsigned)seed);
         Case c = {.scene = &scene, .settings = film_settings(WIDTH, HEIGHT, precision), .name = name};
@@ -315,7 +231,6 @@ static void double_holds(void **state)
 
 int main(void)
 {
-    form_count = shape_forms(forms);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fast_holds),
         cmocka_unit_test(single_holds),

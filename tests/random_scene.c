@@ -1,0 +1,84 @@
+#include "tests/random_scene.h"
+
+#include "host/base/array.h"
+#include "host/base/memory.h"
+
+Vector3 random_point(Random *random, double least, double most)
+{
+    Vector3 direction = vector_normalize(random_in_sphere(random));
+    return vector_scale(direction, random_between(random, least, most));
+}
+
+static Color random_color(Random *random)
+{
+    double red = random_between(random, 0.1, 1), green = random_between(random, 0.1, 1);
+    return (Color){red, green, random_between(random, 0.1, 1)};
+}
+
+static Material random_material(Random *random, size_t index)
+{
+    Material material = material_default();
+    material.color = random_color(random);
+    material.diffuse = random_color(random);
+    material.specular = random_between(random, 0, 1);
+    material.shininess = random_between(random, 0, 100);
+    if (index == 1) material.reflection = random_between(random, 0.2, 0.8);
+    if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
+    if (index == 3) {
+        material.checker = true;
+        material.checker_size = random_between(random, 0.3, 1);
+        material.checker_colors[0] = random_color(random);
+        material.checker_colors[1] = random_color(random);
+    }
+    return material;
+}
+
+// One of each form, then bounded ones; none so large that it hides the rest.
+static Object random_object(Random *random, size_t index)
+{
+    ShapeForm forms[SHAPE_FORMS_MAX];
+    const size_t form_count = shape_forms(forms);
+    for (;;) {
+        const bool first = index < form_count;
+        const ShapeForm *form = &forms[first ? index : (size_t)random_between(random, 0, (double)form_count)];
+        RandomShape shape = random_shape(form, random);
+        if (shape.radius > 3 || (!form->bounded && !first)) continue;
+        Object *object = &shape.object;
+        // a plane behind the objects and a narrow cone beside them, not across the view
+        if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
+        if (form->kind == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
+        // the order of a triangle's vertices distinguishes glass from air, and the mirror reverses it
+        object->material = (uint32_t)index % (form->kind == SHAPE_TRIANGLE ? 2 : 4);
+        return *object;
+    }
+}
+
+Scene random_scene(uint64_t seed, size_t object_count)
+{
+    Random random = {seed};
+    Scene scene = {.background = random_color(&random), .ambient = {0.1, 0.1, 0.1}};
+    for (size_t i = 0; i < 4; i++)
+        array_push(scene.materials, random_material(&random, i));
+    for (size_t i = 0; i < object_count; i++)
+        array_push(scene.objects, random_object(&random, i));
+    // from where the plane is not in the way
+    size_t plane = 0;
+    while (scene.objects.items[plane].kind != SHAPE_PLANE)
+        plane++;
+    Vector3 up = vector_normalize(scene.objects.items[plane].as.plane.normal);
+    Vector3 position = vector_subtract(random_point(&random, 10, 13), vector_scale(up, 6));
+    scene.camera = (Camera){.position = position,
+                            .look_at = random_point(&random, 0, 2),
+                            .up = random_point(&random, 1, 1),
+                            .half_tangent = random_between(&random, 0.4, 0.8)};
+    for (int i = 0; i < 4; i++) {
+        static const LightKind kinds[] = {LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT, LIGHT_POINT};
+        Light light = {.kind = kinds[i], .color = random_color(&random)};
+        light.position = vector_subtract(random_point(&random, 5, 15), vector_scale(up, 8));
+        light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
+        light.half_angle = random_between(&random, 15, 40);
+        light.penumbra = random_between(&random, 0, 10);
+        array_push(scene.lights, light);
+    }
+    return scene;
+}
