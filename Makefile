@@ -102,8 +102,8 @@ $(failing_tests): $(failing_objects)
 # The paces of its workers are exact.
 $(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds
 
-# A file is removed before it is locked.
-$(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock
+# A file is removed before it is locked, or cannot be removed.
+$(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock -Wl,--wrap=unlink
 
 ladder: $(BUILD)/tools/numerics/ladder
 

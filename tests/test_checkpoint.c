@@ -4,6 +4,7 @@
 #include "host/base/text.h"
 #include "host/render/scheduler.h"
 #include "tests/child.h"
+#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -296,6 +297,31 @@ static void test_symbolic_links(void **state)
 }
 
 // Another process completes its image and removes the file before this one has locked it.
+static bool removal_fails;
+
+int __real_unlink(const char *name);
+int __wrap_unlink(const char *name);
+int __wrap_unlink(const char *name)
+{
+    errno = EPERM;
+    return removal_fails ? -1 : __real_unlink(name);
+}
+
+static void test_a_file_that_stays(void **state)
+{
+    (void)state;
+    Checkpoint *checkpoint = open_checked();
+    MessageList messages = {0};
+    removal_fails = true;
+    checkpoint_close(checkpoint, true, &messages);
+    removal_fails = false;
+    assert_int_equal(messages.count, 1);
+    assert_non_null(strstr(messages.items[0].text, "cannot remove the checkpoint"));
+    assert_non_null(strstr(messages.items[0].text, strerror(EPERM)));
+    message_list_free(&messages);
+    assert_int_equal(unlink(path), 0);
+}
+
 static bool file_is_removed;
 
 int __real_flock(int descriptor, int operation);
@@ -399,6 +425,7 @@ int main(void)
                                        cmocka_unit_test(test_other_sizes),
                                        cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_symbolic_links),
+                                       cmocka_unit_test(test_a_file_that_stays),
                                        cmocka_unit_test(test_a_file_removed_before_the_lock),
                                        cmocka_unit_test(test_a_render_goes_on)};
     return cmocka_run_group_tests(tests, set_up, tear_down);

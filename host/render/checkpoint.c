@@ -411,17 +411,21 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
 }
 
 // Unless another file has the name now, such as the image itself.
-static void file_remove(const Checkpoint *checkpoint)
+static void file_remove(const Checkpoint *checkpoint, MessageList *messages)
 {
-    char *name = file_name(checkpoint);
-    if (name) unlink(name);
+    char *name = realpath(checkpoint->path, NULL);
+    int error = name || errno == ENOENT ? 0 : errno;
+    if (name && file_has_name(checkpoint->descriptor, AT_FDCWD, name) && unlink(name) != 0) error = errno;
     free(name);
+    if (error != 0)
+        message_add(messages, MESSAGE_WARNING, "cannot remove the checkpoint '%s': %s", checkpoint->path,
+                    strerror(error));
 }
 
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages)
 {
     if (checkpoint->failure) message_add(messages, MESSAGE_ERROR, "%s", checkpoint->failure);
-    if (is_complete) file_remove(checkpoint);
+    if (is_complete) file_remove(checkpoint, messages);
     if (checkpoint->descriptor >= 0) {
         if (!is_complete) fdatasync(checkpoint->descriptor);
         close(checkpoint->descriptor);

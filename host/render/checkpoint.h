@@ -25,5 +25,5 @@ bool checkpoint_append(Checkpoint *checkpoint, const Film *band);
 // Reads the band that starts at a row; film_free frees it. False: it cannot be read, as there.
 bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band);
 // Adds an error message if a band could not be written or read. Removes the file where the image
-// `is_complete`.
+// `is_complete`, with a warning where it cannot.
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages);
