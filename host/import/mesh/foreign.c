@@ -313,8 +313,8 @@ static bool child_fails(MeshDraft *draft, int status)
 bool foreign_read(MeshDraft *draft)
 {
     draft->places = DRAFT_NO_PLACES;
-    pid_t process;
-    int descriptor, status = 0;
+    pid_t process = -1;
+    int descriptor = -1, status = 0;
     const int error = child_start(draft, &process, &descriptor);
     if (error != 0) return draft_refuse(draft, "no process to read it in: %s", strerror(error));
     FILE *reply = fdopen(descriptor, "rb");
