@@ -1,13 +1,15 @@
 #!/bin/bash
 # Images and traces of every shape under Oclgrind: no access outside a buffer, no data race, no value used before it is
-# set, no wrong OpenCL call. Whatever it reports is a failure. More pixels with GLINT_LONG_TESTS=1: it interprets kernels.
+# set, no wrong OpenCL call. Whatever it reports is a failure. It interprets kernels: more pixels, and each shape, light and
+# kind of material alone, with GLINT_LONG_TESTS=1.
 . "$(dirname "$0")/support.bash"
 command -v oclgrind >/dev/null || skip_all 'Oclgrind is not here'
 is_sanitized && skip_all 'a sanitized program does not run under Oclgrind'
 
 # optimised, LLVM leaves in calls that Oclgrind 21.10 does not know
+uninitialized=--uninitialized
 oclgrind_run() {
-    oclgrind --build-options -cl-opt-disable --check-api --data-races --uninitialized --log "$scratch/log" \
+    oclgrind --build-options -cl-opt-disable --check-api --data-races $uninitialized --log "$scratch/log" \
         "$GLINT" "$@" >"$scratch/out" 2>&1
 }
 
@@ -40,4 +42,34 @@ for lanes in 1 $(is_long && echo 4); do
         --lanes $lanes --quiet --aov t,normal,position,object,shadow,ray,path -o "$scratch/b.png"
 done
 clean 'double' render $scene --size $small --precision double --lanes 1 --quiet -o "$scratch/d.npy"
+is_long || finish
+
+# alone LIGHT OBJECT OPTION…: a scene of both, and what the materials of every_shape.yaml are.
+alone() {
+    local light=$1 object=$2
+    shift 2
+    {
+        sed '/^lights:/,$d' $scene
+        printf 'lights:\n%s\n' "$light"
+        sed -n '/^materials:/,/^objects:/p' $scene
+        printf '%s\n' "$object"
+    } >"$scratch/alone.yaml"
+    clean "$light $object $*" render "$scratch/alone.yaml" --size $small --quiet "$@" -o "$scratch/e.png"
+}
+
+point=$(grep -m 1 '^  - point:' $scene) sphere=$(grep -m 1 '^  - sphere:' $scene)
+while read -r object; do
+    alone "$point" "  $object" --lanes 4
+done < <(sed '1,/^objects:/d' $scene)
+while read -r light; do
+    alone "  $light" "$sphere" --lanes 4
+done < <(sed -n '/^lights:/,/^materials:/{/^  - [ds]/p}' $scene)
+alone "$point" '  - sphere: {center: [0.6, 2, -10.2], radius: 1, material: matt}' --lanes 4
+for precision in single double certified; do
+    clean "with a BVH at $precision" render $scene --size $small --bvh on --precision $precision --quiet -o "$scratch/f.png"
+done
+# its check of values ends Oclgrind 21.10 at a frexp
+uninitialized=
+cp scenes/images/globe.png "$scratch"
+alone "$point" '  - sphere: {center: [0, 1, 0], radius: 2, material: {image: globe.png}}' --lanes 4
 finish
