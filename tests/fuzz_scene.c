@@ -1,6 +1,7 @@
-// Feeds damaged scenes to one reader, in this process: fuzz_scene FORMAT RUNS SEED SCENE…
-// FORMAT: yaml, rt, cfg or nff. The same arguments give the same inputs. Build it with sanitizers; it ends
-// with a failure only where a reader crashes, leaks or hangs; it then leaves the input in fuzz_scene.input
+// Feeds damaged files to one reader, in this process: fuzz_scene FORMAT RUNS SEED FILE…
+// FORMAT: of a scene, yaml, rt, cfg or nff, or the ending of a mesh: those that assimp reads it reads in a
+// process each. The same arguments give the same inputs. Build it with sanitizers; it ends with a failure
+// only where a reader crashes, leaks or hangs, which assimp may; it then leaves the input in fuzz_scene.input
 // (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
 #include "host/base/array.h"
 #include "host/base/clock.h"
@@ -8,6 +9,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/import/load.h"
+#include "host/import/mesh/mesh_import.h"
 #include "host/scene/scene.h"
 
 #include <fcntl.h>
@@ -16,7 +18,8 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { SECONDS_ALLOWED = 5, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };
+// Assimp's process ends by itself in 120 s.
+enum { SECONDS_ALLOWED = 5, MESH_SECONDS_ALLOWED = 150, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };
 
 typedef struct {
     Text *items;
@@ -162,6 +165,41 @@ static bool scene_read(const char *format, const char *bytes, size_t length)
     return read;
 }
 
+static size_t crash_count; // of assimp's processes, and of those that reached a limit
+
+// A file of the format in the working folder.
+static bool mesh_read(const char *format, const char *bytes, size_t length)
+{
+    char path[32];
+    snprintf(path, sizeof path, "fuzz_scene.%s", format);
+    FILE *file = fopen(path, "wb");
+    if (!file || fwrite(bytes, 1, length, file) != length || fclose(file) != 0)
+        fault("cannot write '%s'", path);
+    const Source source = {.file = "fuzz.yaml", .bytes = ""};
+    MessageList messages = {0};
+    Report report = report_open(&source, &messages);
+    const MeshImport import = {
+        .path = path, .transform.scale = {1, 1, 1}, .own_materials = random_below(2), .report = &report};
+    Scene scene = {0};
+    uint32_t index;
+    const bool read = mesh_import(&scene, &import, &index);
+    report_close(&report);
+    for (size_t i = 0; i < messages.count; i++)
+        crash_count += strstr(messages.items[i].text, "assimp crashes") ||
+                       strstr(messages.items[i].text, "assimp needs");
+    if (read == (message_count(&messages, MESSAGE_ERROR) > 0)) abort();
+    scene_free(&scene);
+    message_list_free(&messages);
+    unlink(path);
+    return read;
+}
+
+static bool is_scene(const char *format)
+{
+    return !strcmp(format, "yaml") || !strcmp(format, "rt") || !strcmp(format, "cfg") ||
+           !strcmp(format, "nff");
+}
+
 static void keep_input(int signal_number)
 {
     static const char hang[] = "fuzz_scene: a hang\n", crash[] = "fuzz_scene: a crash\n";
@@ -177,7 +215,7 @@ static void keep_input(int signal_number)
 int main(int argument_count, char **arguments)
 {
     if (argument_count < 5) {
-        fputs("usage: fuzz_scene FORMAT RUNS SEED SCENE...\n", stderr);
+        fputs("usage: fuzz_scene FORMAT RUNS SEED FILE...\n", stderr);
         return EXIT_USER;
     }
     const char *format = arguments[1];
@@ -207,16 +245,17 @@ int main(int argument_count, char **arguments)
         memcpy(bytes, text.items, text.count);
         input = bytes;
         input_length = text.count;
-        alarm(SECONDS_ALLOWED);
-        read_count += scene_read(format, bytes, text.count);
+        alarm(is_scene(format) ? SECONDS_ALLOWED : MESH_SECONDS_ALLOWED);
+        read_count += (is_scene(format) ? scene_read : mesh_read)(format, bytes, text.count);
         alarm(0);
         input_length = 0;
         free(bytes);
         text_free(&text);
     }
     double seconds = clock_seconds() - start;
-    printf("%s: %ld runs, %ld of them valid scenes, %.0f runs a second\n", format, run_count, read_count,
+    printf("%s: %ld runs, %ld of them valid, %.0f runs a second", format, run_count, read_count,
            (double)run_count / seconds);
+    printf(crash_count > 0 ? ", %zu that assimp fails on\n" : "\n", crash_count);
     for (size_t i = 0; i < seeds.count; i++)
         text_free(&seeds.items[i]);
     free(seeds.items);

@@ -17,10 +17,12 @@
     "lights: [{point: {position: [0, 0, -5]}}]\n"
 
 static char folder[] = "/tmp/glint-mesh-XXXXXX";
+static char *corpus; // one file for each format that assimp reads
 
 static int folder_open(void **state)
 {
-    return mkdtemp(folder) && chdir(folder) == 0 ? probe_open(state) : -1;
+    corpus = realpath("tests/fuzz/corpus/assimp", NULL);
+    return corpus && mkdtemp(folder) && chdir(folder) == 0 ? probe_open(state) : -1;
 }
 
 static int folder_close(void **state)
@@ -29,6 +31,7 @@ static int folder_close(void **state)
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         unlink(names[i]);
     probe_close(state);
+    free(corpus);
     return chdir("/") == 0 ? rmdir(folder) : -1;
 }
 
@@ -367,6 +370,20 @@ static void assert_file_refused(const char *name, const char *reason)
     text_free(&expected);
 }
 
+static void other_formats_are_read(void **state)
+{
+    (void)state;
+    static const char *const endings[] = {"gltf", "fbx", "dae", "3ds", "off"};
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        Text object = {0};
+        text_appendf(&object, "  - mesh: {file: %s/triangle.%s}\n", corpus, endings[i]);
+        Scene scene = scene_of_objects(text_c(&object));
+        assert_int_equal(scene.meshes.items[0].triangle_count, 1);
+        text_free(&object);
+        scene_free(&scene);
+    }
+}
+
 // Files that assimp does not survive: it descends into lists and nodes by recursion, and copies a node for
 // each reference to it.
 static void damaged_gltf_is_survived(void **state)
@@ -565,6 +582,7 @@ int main(void)
         cmocka_unit_test(concave_polygon_is_cut_in_full),
         cmocka_unit_test(polygons_that_cannot_be_filled_are_reported),
         cmocka_unit_test(faults_name_file_and_vertex),
+        cmocka_unit_test(other_formats_are_read),
         cmocka_unit_test(damaged_gltf_is_survived),
         cmocka_unit_test(child_is_limited),
         cmocka_unit_test(scene_file_faults_are_reported),
