@@ -8,8 +8,10 @@
 //   eintr N   the same: EINTR
 //   full N    the same from call N on, if it writes or creates: ENOSPC
 //   short     reads and writes there do half of what they are asked for
+//   deny N    system call of number N, always: EPERM
 //   device    the device has work-groups of 1, 64 MiB of memory, 16 KiB of constant memory, and no images
 //   (else)    nothing
+//   child …   the same in the processes that this one starts, not in itself
 // GLINT_CHAOS_LOG is a file that receives "failed NAME" when something is made to fail, and the number of
 // calls of each kind when the process ends.
 //
@@ -27,6 +29,7 @@
 #include <linux/filter.h>
 #include <linux/seccomp.h>
 #include <signal.h>
+#include <spawn.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -290,6 +293,28 @@ ALLOCATING(FILE *, fopen, (const char *path, const char *mode), (path, mode))
 ALLOCATING(FILE *, fdopen, (int descriptor, const char *mode), (descriptor, mode))
 ALLOCATING(FILE *, tmpfile, (void), ())
 
+int pipe2(int ends[2], int flags)
+{
+    return ALLOCATION_FAILS("pipe2") ? -1 : ((int (*)(int *, int))real("pipe2"))(ends, flags);
+}
+
+int posix_spawn(pid_t *process, const char *path, const posix_spawn_file_actions_t *actions,
+                const posix_spawnattr_t *attributes, char *const arguments[], char *const environment[])
+{
+    if (ALLOCATION_FAILS("posix_spawn")) return ENOMEM;
+    return ((int (*)(pid_t *, const char *, const posix_spawn_file_actions_t *, const posix_spawnattr_t *,
+                     char *const *, char *const *))real("posix_spawn"))(process, path, actions, attributes,
+                                                                        arguments, environment);
+}
+
+pid_t waitpid(pid_t process, int *status, int options)
+{
+    if (!ALLOCATION_FAILS("waitpid"))
+        return ((pid_t(*)(pid_t, int *, int))real("waitpid"))(process, status, options);
+    errno = ECHILD;
+    return -1;
+}
+
 int vasprintf(char **result, const char *format, va_list arguments)
 {
     if (ALLOCATION_FAILS("vasprintf")) return -1;
@@ -404,6 +429,14 @@ int sigaction(int signal, const struct sigaction *action, struct sigaction *old)
     return function(signal, action, old);
 }
 
+static void filter_install(struct sock_filter *filter, unsigned short count)
+{
+    const struct sock_fprog program = {.len = count, .filter = filter};
+    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) != 0)
+        log_line("failed seccomp\n");
+}
+
 static void trap_calls(void)
 {
     struct sigaction action = {.sa_sigaction = on_trap, .sa_flags = SA_SIGINFO | SA_NODEFER};
@@ -428,10 +461,19 @@ static void trap_calls(void)
     filter[n++] = (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, (uint32_t)end, 1, 0);
     filter[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
     filter[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP);
-    const struct sock_fprog program = {.len = n, .filter = filter};
-    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
-        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) != 0)
-        log_line("failed seccomp\n");
+    filter_install(filter, n);
+}
+
+// A sandbox that knows less than glint and its driver ask for: here and in all that they start.
+static void deny_call(unsigned number)
+{
+    struct sock_filter filter[] = {
+        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, nr)),
+        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, number, 0, 1),
+        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM),
+        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+    };
+    filter_install(filter, sizeof filter / sizeof *filter);
 }
 
 // ---- start and end
@@ -452,6 +494,11 @@ __attribute__((constructor)) static void start(void)
 {
     const char *what = getenv("GLINT_CHAOS"), *where = getenv("GLINT_CHAOS_FOLDER"),
                *log = getenv("GLINT_CHAOS_LOG");
+    static const char child[] = "child ";
+    if (what && strncmp(what, child, strlen(child)) == 0) {
+        setenv("GLINT_CHAOS", what + strlen(child), 1);
+        return;
+    }
     if (where) snprintf(folder, sizeof folder, "%s", where);
     if (log) snprintf(log_path, sizeof log_path, "%s", log);
     const char *space = what ? strchr(what, ' ') : NULL;
@@ -462,6 +509,7 @@ __attribute__((constructor)) static void start(void)
     unsetenv("LD_PRELOAD");
     if (is_kind("call") || is_kind("eintr") || is_kind("full") || is_kind("short") || is_kind("count"))
         trap_calls();
+    if (is_kind("deny")) deny_call((unsigned)failing);
 }
 
 __attribute__((destructor)) static void end(void)
@@ -470,6 +518,14 @@ __attribute__((destructor)) static void end(void)
     log_line("null %lu\n", null_count);
     log_line("alloc %lu\n", alloc_count);
     log_line("call %lu\n", call_count);
+}
+
+// What reads a mesh for another process ends so.
+void _exit(int status)
+{
+    end();
+    for (;;)
+        pass_through(SYS_exit_group, status, 0, 0, 0, 0, 0);
 }
 
 // NOLINTEND(readability-inconsistent-declaration-parameter-name)
