@@ -215,6 +215,22 @@ static void coarse_frames_are_in_time(void **state)
     check_pace(0.1, 1e-7, 16);
 }
 
+static void one_slow_frame_changes_nothing(void **state)
+{
+    (void)state;
+    Preview preview = {0};
+    const uint32_t divisor = 2;
+    const double pixels = (double)size.width / divisor * size.height / divisor;
+    for (int frame = 0; frame < 6; frame++) {
+        const double times_slower = frame == 3 ? 20 : 1;
+        preview_note(&preview, divisor, times_slower * 0.001, times_slower * pixels * 1e-7, pixels);
+        assert_int_equal(preview_divisor(&preview, size.width, size.height), divisor);
+    }
+    preview_note(&preview, divisor, 0.001, 20 * pixels * 1e-7, pixels);
+    preview_note(&preview, divisor, 0.001, 20 * pixels * 1e-7, pixels);
+    assert_true(preview_divisor(&preview, size.width, size.height) > divisor);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -225,6 +241,7 @@ int main(void)
         cmocka_unit_test(yaml_gives_the_same_camera),
         cmocka_unit_test(camera_is_written_into_the_file),
         cmocka_unit_test(coarse_frames_are_in_time),
+        cmocka_unit_test(one_slow_frame_changes_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -55,11 +55,11 @@ SAMPLES = 3
 DEADLINE = 60  # seconds until a test gives up what it waits for
 
 
-def display_open():
+def display_open(width=320, height=360):
     """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process."""
     read, write_end = os.pipe()
     folder = os.environ["VIEW_FOLDER"]
-    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "320x360x24", "-fbdir", folder]
+    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", f"{width}x{height}x24", "-fbdir", folder]
     process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write_end)
     with os.fdopen(read) as file:

@@ -1,4 +1,5 @@
-// How coarse the frames of a moving camera are, so that each takes at most PREVIEW_SECONDS.
+// How coarse the frames of a moving camera are, so that each takes at most PREVIEW_SECONDS, judged by the
+// medians of the last three: one that something else delayed is ignored.
 #pragma once
 
 #include <stdint.h>
@@ -8,9 +9,9 @@
 
 // Initially zero.
 typedef struct {
-    double fixed_seconds;    // of the last frame, whatever its size
-    double seconds_of_pixel; // beyond them
-    uint32_t divisor;        // of the last frame
+    double fixed_seconds[3];    // of the last frames, whatever their size
+    double seconds_of_pixel[3]; // beyond them
+    uint32_t divisor;           // of the last frame
 } Preview;
 
 // By how much both sides of the image are divided in the next frame: 1 to 16.
