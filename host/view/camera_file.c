@@ -34,7 +34,7 @@ static bool camera_file_read(CameraFile *file, const Source *source, MessageList
     return false;
 }
 
-// A copy of the source with some values replaced; `next`: of the source, up to there it is copied.
+// A copy of the source with some values replaced. The source is copied up to `next`.
 typedef struct {
     const Source *source;
     size_t next;

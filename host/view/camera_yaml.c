@@ -31,7 +31,7 @@ static void vector_write(Text *text, const char *name, Vector3 v)
     text_appendf(text, ", ");
 }
 
-// As the reader has it.
+// As the reader computes it.
 static double half_tangent_of(double degrees)
 {
     return tan(degrees * (M_PI / 360));

@@ -61,7 +61,7 @@ void caption_close(Caption *caption)
     free(caption);
 }
 
-// Lines of a text, and characters of the longest.
+// Characters of the longest line, and number of lines.
 static SDL_Point extent_of(const char *text)
 {
     SDL_Point extent = {0, 1};

@@ -1,6 +1,6 @@
-// Renders what the window shows, on a thread of its own: while the camera moves coarse frames in time, at
-// rest the image in passes, until it has all samples. A new request ends the work on the last. Reads the
-// scene again when its files change.
+// Renders what the window shows, on a thread of its own: coarse frames while the camera moves; at rest the
+// image in passes, until it has all samples. A new request ends the work on the last one. When the scene's
+// files change they are read again.
 #pragma once
 
 #include "host/image/image.h"
@@ -14,7 +14,7 @@ typedef struct {
     const char *scene_path;
     SceneOptions scene_options;
     RenderSettings settings; // all but the size
-    // The size of the scene's image, where `width` is 0.
+    // Sets a size whose `width` is 0 to that of the scene's image.
     void (*choose_size)(const Scene *scene, uint32_t *width, uint32_t *height);
     // Called on the loop's thread when there is something to take.
     void (*notify)(void *context);
@@ -35,7 +35,7 @@ typedef struct {
     uint32_t samples; // per pixel; 0: a coarse frame
     bool complete;
     double largest_error; // of a heat map of errors; of other frames negative
-    char *summary;        // of the times and what they are of, some lines
+    char *summary;        // lines of text: device, precision, samples, times
 } Frame;
 
 void frame_free(Frame *frame); // and zeroes
@@ -47,8 +47,8 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options);
 // Ends the work and waits for it.
 void frame_loop_close(FrameLoop *loop);
 
-// Appends what the loop is doing where it is not rendering, such as "reading bunny.obj 41%", and sets for how
-// many seconds it has. False: it renders, or rests.
+// Appends the stage of the work that the next frame waits for, such as "reading bunny.obj 41%", and sets the
+// seconds since that work began. False: there is none.
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds);
 
 // LOADED once the scene was read; `size` is then its image's. REFUSED: its file has a mistake, which the

@@ -21,66 +21,66 @@ struct FrameLoop {
     char *save_path, *message;
     Frame ready;
     Camera file_camera;
-    uint32_t probe[2]; // a pixel
-    char *facts;       // of the last one
-    Text written;      // into the scene's file, and not yet noticed
+    uint32_t probe[2]; // the pixel of the last question
+    char *facts;       // the answer
+    Text written;      // into the scene's file; the watch has not reported it yet
     bool has_ready, has_camera, has_probe, quits;
     bool reloads; // the scene's files have changed, or have not been read
 
     // the thread's own
-    bool is_mistaken; // the scene's file, as it is now
+    bool is_mistaken; // whether the scene's file, as it is now, has a mistake
     bool has_preview; // the request's first frame is coarse, or of arrays that another eye saw
-    uint32_t divisor; // of that
+    uint32_t divisor; // the coarse frame's
     Scene scene;      // with the request's camera
     Watch *watch;
     RenderSettings settings;
     Compute compute;
     Renderer *renderer;  // NULL: not open, or failed
-    Renderer *reference; // in double, of the view of errors; NULL: not open
+    Renderer *reference; // in double, for the error view; NULL: not open
     FrameRequest current;
     unsigned current_number;
     double move_seconds, render_start;
-    double expected_move; // to another eye, in seconds: of the scene as it is, little by little forgotten
-    Film film;            // of the image or the coarse frame: sums of samples, at the end their mean
+    double expected_move; // to another eye, in seconds; slow moves are forgotten little by little
+    Film film; // of the image or the coarse frame; its color is a sum of samples, at the end their mean
     Frame frame;
     Preview preview;
 };
 
 // frame_exchange.c
 
-// The `stop` of the renderers, which has no context: so there is one loop per process.
+// The renderers' `stop`. It takes no context, so there is one loop per process.
 bool render_stops(void);
-// Ends all renders, now and to come; else allows them.
+// True ends the current render and all later ones; false allows them again.
 void renders_end(bool end);
-// Whether a frame is due that must appear, whatever is asked for meanwhile.
+// While it is due, new requests do not end the render.
 void first_frame_set_due(bool is_due);
 bool first_frame_is_due(void);
 
-// The scene's files have changed: called by the thread that watches them.
+// Called by the thread that watches the scene's files.
 void files_changed(void *context);
 
 typedef enum { WORK_RENDER, WORK_SAVE, WORK_PROBE, WORK_RELOAD, WORK_END } Work;
 
-// Waits for the next work, and takes it: of a save its path, which the caller frees.
+// Waits for the next work and takes it. WORK_SAVE sets the path, which the caller frees.
 Work work_wait(FrameLoop *loop, bool can_save, char **save_path);
-// The pixel of a question that was not yet answered. False: there is none.
+// Takes the pixel of a question that has no answer yet. False: there is none.
 bool probe_take(FrameLoop *loop, uint32_t pixel[2]);
-// Takes the facts.
+// Takes ownership of the facts.
 void facts_publish(FrameLoop *loop, char *facts);
-// Takes the message. "" removes the last one; others are added to those that were not yet taken.
+// Takes ownership of the message. "" removes the last one; others follow those that the window has not taken.
 void message_publish(FrameLoop *loop, char *message);
-// Takes the messages.
+// Takes ownership of the messages.
 void messages_publish(FrameLoop *loop, MessageList *messages);
 void frame_publish(FrameLoop *loop, uint32_t samples, bool complete);
 // A camera that was changed in the file becomes the view's: the window asks for its image.
 void scene_publish(FrameLoop *loop);
-// The scene cannot be read, or not be rendered.
+// The scene cannot be read or rendered.
 void refusal_publish(FrameLoop *loop);
 
 // frame_fill.c
 
-// The display values of the film, the sum of so many samples, and the report. In the view of errors they are
-// those of the color.
+// Fills the frame with the film's display values and the report. The film's color is the sum of `samples`
+// samples; the error view shows it until the errors are known.
 void frame_fill(FrameLoop *loop, uint32_t samples);
 void distances_fill(FrameLoop *loop);
 
@@ -91,9 +91,9 @@ bool request_render(FrameLoop *loop);
 // Answers the question about a pixel, if there is one.
 void probe_answer(FrameLoop *loop);
 void renderers_close(FrameLoop *loop);
-// Shows what the device has failed at. The next request opens it again.
+// Publishes the device's failure and closes the device; the next request opens it again.
 void failure_publish(FrameLoop *loop);
-// The time of a move to another eye, before one is timed.
+// Estimates the time of a move to another eye before one was measured.
 double move_guess(const Renderer *renderer);
 
 // scene_reload.c

@@ -46,7 +46,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     if (is_first && loop->current.is_moving && !loop->has_preview)
         preview_note(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
                      (double)film_pixel_count(&loop->film));
-    if (is_first && view_aovs[loop->current.view]) return true; // what it is made of is yet to come
+    if (is_first && view_aovs[loop->current.view]) return true; // its AOVs follow the first pass
     frame_fill(loop, samples);
     if (!is_first) distances_fill(loop);
     bool complete = !is_first && samples == loop->settings.sample_count && loop->current.view != VIEW_ERROR;
@@ -82,7 +82,7 @@ void failure_publish(FrameLoop *loop)
     compute_close(&loop->compute);
 }
 
-// Several threads do what one did.
+// It runs on several threads, compiling on one.
 double move_guess(const Renderer *renderer)
 {
     return renderer_report(renderer)->flatten_seconds / 2;
@@ -121,8 +121,8 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
     return prepared;
 }
 
-// Large scenes take long to move to another eye: that waits until no other request has come for a while.
-// False: one came.
+// Moving a large scene to another eye takes long: waits until no request has come for a while. False: one
+// came.
 static bool camera_rests(FrameLoop *loop)
 {
     if (loop->expected_move > PREVIEW_SECONDS) {

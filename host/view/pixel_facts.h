@@ -12,7 +12,7 @@ typedef struct {
     uint32_t bounce_count;
 } PixelView;
 
-// Traces the ray through the center of a pixel, and the tree of the rays that it is reflected and refracted
-// into, as an image of the size has them: a line for each with the object, its place in the scene's file, its
-// material, t and, of the first, hit point and normal. The device's failure ends the text. Caller frees.
+// Traces the ray through the center of a pixel and its tree of reflected and refracted rays. A line per ray:
+// the object, its place in the scene's file, its material and t; for the first ray also hit point and normal.
+// A failure of the device ends the text. Caller frees.
 char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y);

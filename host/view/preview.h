@@ -4,19 +4,19 @@
 
 #include <stdint.h>
 
-// Of a frame, which leaves some of 33 ms for the display and for a launch that the frame had to wait for.
+// Per frame. Of 33 ms this leaves some to the display, and to a launch that the frame had to wait for.
 #define PREVIEW_SECONDS 0.022
 
 // Initially zero.
 typedef struct {
-    double fixed_seconds[3];    // of the last frames, whatever their size
+    double fixed_seconds[3];    // of the last frames, independent of their size
     double seconds_of_pixel[3]; // beyond them
     uint32_t divisor;           // of the last frame
 } Preview;
 
-// By how much both sides of the image are divided in the next frame: 1 to 16.
+// The factor by which both sides of the next frame are smaller than the image's: 1 to 16.
 uint32_t preview_divisor(const Preview *preview, uint32_t width, uint32_t height);
 
-// The times of a frame of this divisor: to move the camera, and to render its pixels.
+// Notes the times of a frame of this divisor: to move the camera, and to render its pixels.
 void preview_note(Preview *preview, uint32_t divisor, double move_seconds, double render_seconds,
                   double pixels);

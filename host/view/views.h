@@ -4,7 +4,7 @@
 #include "host/image/image.h"
 #include "host/render/film.h"
 
-// VIEW(NAME, name, aovs): those that it is made of, beside the color.
+// VIEW(NAME, name, aovs): `aovs` are those it shows, besides the color.
 #define VIEW_LIST(VIEW)                                                                                      \
     VIEW(COLOR, "color", 0)                                                                                  \
     VIEW(DEPTH, "depth", AOV_T | AOV_OBJECT)                                                                 \
@@ -19,11 +19,11 @@ typedef enum { VIEW_LIST(VIEW_NUMBER) VIEW_COUNT } View;
 extern const char *const view_names[VIEW_COUNT];
 extern const unsigned view_aovs[VIEW_COUNT];
 
-// Display values, RGB, of a film's color: sums of so many samples.
+// Display values (RGB) of a film's color, which is the sum of `sample_count` samples.
 void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer);
 
-// Of its AOVs: the depth as distance_half / (distance_half + t); normals from -1..1 to 0..1 per axis; a
-// random color for each object; the share of lights that are not occluded. Nothing hit is black.
+// Display values of the view's AOVs: depth as distance_half / (distance_half + t); normals from -1..1 to 0..1
+// per axis; a random color for each object; the share of lights that are not occluded. Nothing hit is black.
 void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half);
 
 // The error that is white in the heat map of errors.

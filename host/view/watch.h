@@ -8,6 +8,6 @@ typedef struct Watch Watch;
 // Calls `changed` on a thread of its own. NULL: the system cannot watch files.
 Watch *watch_open(void (*changed)(void *context), void *context);
 void watch_close(Watch *watch); // accepts NULL
-// Watches this file alone, or it, too, whether it exists or not. Accept NULL.
+// watch_only watches this file alone, watch_add this one, too. It need not exist. Both accept NULL.
 void watch_only(Watch *watch, const char *path);
 void watch_add(Watch *watch, const char *path);

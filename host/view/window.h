@@ -12,6 +12,6 @@ typedef struct {
 
 typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT, WINDOW_REFUSED } WindowEnd;
 
-// Opens the window and returns when it is closed. WINDOW_ABSENT: it could not be opened; WINDOW_REFUSED: the
-// scene's file has a mistake; what was printed.
+// Opens the window and returns when it is closed. WINDOW_ABSENT: it cannot be opened; WINDOW_REFUSED: the
+// scene's file has a mistake. The reason was printed.
 WindowEnd window_run(const WindowOptions *options);

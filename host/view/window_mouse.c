@@ -71,7 +71,7 @@ void drag_move(Window *window, const SDL_MouseMotionEvent *event)
     } else if (window->drag == DRAG_PAN) {
         camera_pan(camera, window->size, window->pan_distance, window->mouse, to);
     } else {
-        // what is ahead follows the mouse's way
+        // what is seen ahead follows the mouse
         double tangent = camera->half_tangent * 2 /
                          (camera->field_axis == FIELD_VERTICAL ? window->size.height : window->size.width);
         double angle = fmin(tangent, M_PI / window->size.height);
