@@ -52,7 +52,7 @@ int clEnqueueNDRangeKernel(void *queue, void *kernel, unsigned dimensions, const
 """
 WIDTH, HEIGHT = 160, 120
 SAMPLES = 3
-DEADLINE = 60  # seconds until a test gives up what it waits for
+DEADLINE = 300  # seconds until a test gives up what it waits for, also on a machine that hardly lets it run
 
 
 def display_open(width=320, height=360):
@@ -82,10 +82,10 @@ def xdotool(*arguments):
     return subprocess.run(["xdotool", *map(str, arguments)], check=True, capture_output=True, text=True).stdout
 
 
-def xdotool_finds(process):
-    """Whether a window of the process is shown."""
+def windows_shown(process):
+    """Of the process. None, too, where a window of another one is destroyed during the search, which then fails."""
     command = ["xdotool", "search", "--onlyvisible", "--pid", str(process)]
-    return subprocess.run(command, check=False, capture_output=True).returncode == 0
+    return subprocess.run(command, check=False, capture_output=True, text=True).stdout.split()
 
 
 def png_rows(path):
@@ -120,10 +120,20 @@ class Window:
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
         test.addCleanup(self.kill)
-        self.id = xdotool("search", "--sync", "--onlyvisible", "--pid", self.process.pid).split()[0]
+        self.id = self.shown_at_last()
         xdotool("windowfocus", "--sync", self.id, "windowmove", self.id, 0, 0)
         if waits:
             self.title_at_last(" sample")  # until the scene is loaded, there is no camera
+
+    def shown_at_last(self):
+        """The window's number."""
+        end = time.monotonic() + DEADLINE
+        while not (shown := windows_shown(self.process.pid)):
+            if self.process.poll() is not None:
+                self.line("a window")  # fails with what was printed
+            self.test.assertLess(time.monotonic(), end, "no window is shown")
+            time.sleep(0.01)
+        return shown[0]
 
     def read(self):
         for line in self.process.stdout:
@@ -414,7 +424,7 @@ class View(TestCase):
                 if closes:
                     window.key("Escape")
                     end = time.monotonic() + DEADLINE
-                    while xdotool_finds(window.process.pid):
+                    while windows_shown(window.process.pid):
                         self.assertLess(time.monotonic(), end, "the window is still shown")
                 with open("slow.yaml", "w") as pipe:
                     self.write_by_rename("slow.yaml", later)  # while the pipe is read

@@ -51,7 +51,7 @@ void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half
         bool is_hit = film->object[i] != UINT32_MAX;
         for (int channel = 0; channel < 3; channel++) {
             double value = 0;
-            if (view == VIEW_DEPTH) value = distance_half / (distance_half + film->t[i]);
+            if (view == VIEW_DEPTH) value = 1 / (1 + pow(film->t[i] / distance_half, 2));
             if (view == VIEW_NORMAL && is_hit) value = (film->normal[3 * i + (size_t)channel] + 1) / 2;
             if (view == VIEW_SHADOW && is_hit) value = lit_share(film, i);
             rgb[channel] = byte_of(value);

@@ -22,7 +22,7 @@ extern const unsigned view_aovs[VIEW_COUNT];
 // Display values (RGB) of a film's color, which is the sum of `sample_count` samples.
 void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer);
 
-// Display values of the view's AOVs: depth as distance_half / (distance_half + t); normals from -1..1 to 0..1
+// Display values of the view's AOVs: depth as 1 / (1 + (t / distance_half)^2); normals from -1..1 to 0..1
 // per axis; a random color for each object; the share of lights that are not occluded. Nothing hit is black.
 void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half);
 
