@@ -56,10 +56,13 @@ DEADLINE = 300  # seconds until a test gives up what it waits for, also on a mac
 
 
 def display_open(width=320, height=360):
-    """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process."""
+    """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process.
+
+    By default it resets itself when its last client has gone, and refuses those that come meanwhile.
+    """
     read, write_end = os.pipe()
     folder = os.environ["VIEW_FOLDER"]
-    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", f"{width}x{height}x24", "-fbdir", folder]
+    command = ["Xvfb", "-noreset", "-displayfd", str(write_end), "-screen", "0", f"{width}x{height}x24", "-fbdir", folder]
     process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write_end)
     with os.fdopen(read) as file:
@@ -83,7 +86,7 @@ def xdotool(*arguments):
 
 
 def windows_shown(process):
-    """Of the process. None, too, where a window of another one is destroyed during the search, which then fails."""
+    """The windows that the process shows."""
     command = ["xdotool", "search", "--onlyvisible", "--pid", str(process)]
     return subprocess.run(command, check=False, capture_output=True, text=True).stdout.split()
 
