@@ -292,6 +292,30 @@ static void list_is_complete(void **state)
     }
 }
 
+// As many structs as several threads narrow, of each layout.
+static void arrays_taken_are_arrays_written(void **state)
+{
+    (void)state;
+    enum { COUNT = 5 * FLAT_RANGE_MIN + 1 };
+    FlatLayout layouts[FLAT_COUNT];
+    layouts_of_host(layouts, true);
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        const FlatLayout *layout = &layouts[kind];
+        const size_t words = COUNT * layout->size / sizeof(uint32_t);
+        FlatArray array = {memory_allocate_large(COUNT * layout->size), COUNT, *layout};
+        for (size_t i = 0; i < words; i++) // doubles that are floats, about 1
+            ((uint32_t *)array.items)[i] = i % 2 ? 0x3ff00000u + (uint32_t)(i & 0xffff) : 0;
+        const size_t size = flat_array_size(&array, false);
+        char *written = memory_allocate(size, 1);
+        flat_array_write(&array, false, written);
+        char *taken = flat_array_take(&array, false);
+        assert_memory_equal(taken, written, size);
+        assert_null(array.items);
+        free(written);
+        free(taken);
+    }
+}
+
 static void layout_in_float(void **state)
 {
     (void)state;
@@ -321,8 +345,11 @@ static void values_in_double(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(list_is_complete), cmocka_unit_test(layout_in_float),
-        cmocka_unit_test(layout_in_double), cmocka_unit_test(values_in_float),
+        cmocka_unit_test(arrays_taken_are_arrays_written),
+        cmocka_unit_test(list_is_complete),
+        cmocka_unit_test(layout_in_float),
+        cmocka_unit_test(layout_in_double),
+        cmocka_unit_test(values_in_float),
         cmocka_unit_test(values_in_double),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);

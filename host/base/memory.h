@@ -8,3 +8,13 @@ void *memory_allocate(size_t count, size_t size);
 void *memory_allocate_zeroed(size_t count, size_t size);
 void *memory_resize(void *memory, size_t count, size_t size);
 char *memory_copy_text(const char *text);
+
+// From this size on memory_allocate_large uses large pages.
+enum { MEMORY_LARGE_MIN = 1 << 22 };
+
+// Memory that an OpenCL device may use as it is, for free(): aligned for its largest type, and where it is
+// large on large pages if the system has them, which spares a CPU that reads it at random most address
+// translations.
+void *memory_allocate_large(size_t size);
+// Returns to the system what pages of such memory lie from `begin` up to `end`; what they held is lost.
+void memory_discard(void *memory, size_t begin, size_t end);

@@ -19,6 +19,20 @@ typedef struct {
     uint32_t kind_counts[KIND_COUNT];
 } Bounded;
 
+typedef struct {
+    const FlatArray *array;
+    size_t kind;
+    Bounds *boxes; // of the array's primitives; empty where unbounded
+} Boxing;
+
+static void range_box(void *context, size_t begin, size_t end)
+{
+    const Boxing *boxing = context;
+    for (size_t i = begin; i < end; i++)
+        if (!primitive_bounds(boxing->kind, flat_array_at(boxing->array, i), &boxing->boxes[i]))
+            boxing->boxes[i] = bounds_empty();
+}
+
 static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
 {
     size_t capacity = 0;
@@ -31,8 +45,11 @@ static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
     };
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
+        Boxing boxing = {array, kind, bounded->boxes + bounded->count};
+        parallel_run(array->count, FLAT_RANGE_MIN, range_box, &boxing);
         for (size_t i = 0; i < array->count; i++) {
-            if (!primitive_bounds(kind, flat_array_at(array, i), &bounded->boxes[bounded->count])) continue;
+            if (bounds_is_empty(&boxing.boxes[i])) continue;
+            bounded->boxes[bounded->count] = boxing.boxes[i];
             bounded->kinds[bounded->count] = (uint8_t)kind;
             bounded->places[bounded->count++] = (uint32_t)i;
             bounded->kind_counts[kind]++;
@@ -48,12 +65,12 @@ static void bounded_free(Bounded *bounded)
 }
 
 // Where each primitive of the tree's order stands in its shape's new array.
-static uint32_t *order_in_kinds(const Bvh *bvh, const Bounded *bounded)
+static uint32_t *order_in_kinds(const Bvh *bvh)
 {
     uint32_t *order = memory_allocate(bvh->primitive_count + 1, sizeof *order);
     uint32_t counts[KIND_COUNT] = {0};
     for (size_t i = 0; i < bvh->primitive_count; i++)
-        order[i] = counts[bounded->kinds[bvh->order[i]]]++;
+        order[i] = counts[bvh->kinds[i]]++;
     return order;
 }
 
@@ -61,14 +78,18 @@ static uint32_t *order_in_kinds(const Bvh *bvh, const Bounded *bounded)
 // up.
 static void array_permute(FlatArray *array, uint32_t *from)
 {
-    size_t size = array->layout.size;
+    enum { CACHE_LINE = 64 };
+    const size_t size = array->layout.size;
     void *first = memory_allocate(1, size);
     for (uint32_t i = 0; i < array->count; i++) {
         if (from[i] == i) continue;
         memcpy(first, flat_array_at(array, i), size);
         uint32_t place = i;
         while (from[place] != i) {
-            uint32_t next = from[place];
+            const uint32_t next = from[place];
+            const char *later = flat_array_at(array, from[from[next]]);
+            for (size_t k = 0; k < size; k += CACHE_LINE)
+                __builtin_prefetch(later + k, 1);
             memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
             from[place] = place;
             place = next;
@@ -77,6 +98,20 @@ static void array_permute(FlatArray *array, uint32_t *from)
         from[place] = place;
     }
     free(first);
+}
+
+typedef struct {
+    const FlatArray *array;
+    ObjectEntry *entries;
+} Entering;
+
+static void range_enter(void *context, size_t begin, size_t end)
+{
+    const Entering *entering = context;
+    for (size_t i = begin; i < end; i++) {
+        const uint32_t id = *flat_id(entering->array, flat_array_at(entering->array, i));
+        entering->entries[id].kind_index_material.y = (uint32_t)i;
+    }
 }
 
 // Moves a shape's primitives into the leaves' order, the unbounded behind them, and updates the objects'
@@ -88,15 +123,14 @@ static void array_reorder(CompiledScene *compiled, size_t kind, const Bvh *bvh, 
     uint32_t *from = memory_allocate(array->count, sizeof *from);
     size_t count = 0;
     for (size_t i = 0; i < bvh->primitive_count; i++)
-        if (bounded->kinds[bvh->order[i]] == kind) from[count++] = bounded->places[bvh->order[i]];
+        if (bvh->kinds[i] == kind) from[count++] = bounded->places[bvh->order[i]];
     Bounds box;
     for (size_t i = 0; count < array->count; i++)
         if (!primitive_bounds(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
     array_permute(array, from);
     free(from);
-    ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
-    for (size_t i = 0; i < array->count; i++)
-        entries[*flat_id(array, flat_array_at(array, i))].kind_index_material.y = (uint32_t)i;
+    Entering entering = {array, compiled->arrays[FLAT_OBJECTS].items};
+    parallel_run(array->count, FLAT_RANGE_MIN, range_enter, &entering);
 }
 
 // Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
@@ -132,8 +166,8 @@ static void child_box_write(const FlatNode *node, unsigned child, const Bounds *
     }
 }
 
-static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *bounded, const uint32_t *order,
-                       const Bounds *empty, const FlatNode *node)
+static void node_write(const BvhWideNode *wide, const Bvh *bvh, const uint32_t *order, const Bounds *empty,
+                       const FlatNode *node)
 {
     uint32_t next_node = wide->first_node;
     for (unsigned i = 0; i < node->width; i++) {
@@ -141,7 +175,7 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
         child_box_write(node, i, child ? &child->box : empty);
         if (child && child->count > 0) {
             node->child_index[i] = order[child->first];
-            node->child_kind[i] = child->count << 8 | bounded->kinds[bvh->order[child->first]];
+            node->child_kind[i] = child->count << 8 | bvh->kinds[child->first];
         } else if (child) {
             node->child_index[i] = next_node++;
             node->child_kind[i] = BVH_NODE;
@@ -149,7 +183,7 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const Bounded *b
     }
 }
 
-static void nodes_write(CompiledScene *compiled, const Bvh *bvh, const Bounded *bounded, unsigned width)
+static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
@@ -157,53 +191,40 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, const Bounded *
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     // a visit replaces a node by at most `width` children: a ray from far away meets the empty places, too
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
-    uint32_t *order = order_in_kinds(bvh, bounded);
+    uint32_t *order = order_in_kinds(bvh);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
     for (size_t i = 0; i < wide.node_count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
-        node_write(&wide.nodes[i], bvh, bounded, order, &empty, &node);
+        node_write(&wide.nodes[i], bvh, order, &empty, &node);
     }
     free(order);
     bvh_wide_free(&wide);
 }
 
-static size_t bounded_primitive_count(const CompiledScene *compiled)
-{
-    size_t count = 0;
-    Bounds box;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
-        for (size_t i = 0; i < array->count; i++)
-            count += primitive_bounds(kind, flat_array_at(array, i), &box);
-    }
-    return count;
-}
-
-static bool bvh_is_wanted(const CompiledScene *compiled, BvhChoice choice)
-{
-    if (choice == BVH_OFF) return false;
-    size_t count = bounded_primitive_count(compiled);
-    return count > 0 && (choice == BVH_ON || count >= BVH_WORTHWHILE);
-}
-
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
 {
     flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
-    if (!bvh_is_wanted(compiled, settings->bvh)) return;
-    compiled->features |= FEATURE_BVH;
+    if (settings->bvh == BVH_OFF) return;
     Bounded bounded;
     bounded_collect(&bounded, compiled);
+    if (bounded.count < (settings->bvh == BVH_ON ? 1 : BVH_WORTHWHILE)) {
+        bounded_free(&bounded);
+        return;
+    }
+    compiled->features |= FEATURE_BVH;
     Bvh bvh;
     stage_begin(settings->stage, "building the BVH", NULL, bounded.count);
     bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count, settings->stage);
     free(bounded.boxes);
     bounded.boxes = NULL;
     stage_begin(settings->stage, "widening the BVH", NULL, 0);
-    nodes_write(compiled, &bvh, &bounded, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
+    nodes_write(compiled, &bvh, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
+    compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
+    free(bvh.nodes);
+    bvh.nodes = NULL;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         array_reorder(compiled, kind, &bvh, &bounded);
     memcpy(compiled->bounded_counts, bounded.kind_counts, sizeof compiled->bounded_counts);
-    compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
     bvh_free(&bvh);
     bounded_free(&bounded);
 }

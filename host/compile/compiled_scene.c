@@ -1,6 +1,6 @@
 #include "host/compile/compiled_scene.h"
 
-#include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include <stdlib.h>
 #include <string.h>
@@ -30,14 +30,23 @@ static const FlatLayout layouts[FLAT_COUNT] = {
 };
 // clang-format on
 
+enum { FLAT_STRUCT_MAX = 1024 };
+_Static_assert(sizeof(SceneHeader) <= FLAT_STRUCT_MAX, "no flat struct is larger");
+_Static_assert(BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)) <= FLAT_STRUCT_MAX,
+               "nor a node");
+
+static void range_zero(void *context, size_t begin, size_t end)
+{
+    const FlatArray *array = context;
+    memset(flat_array_at(array, begin), 0, (end - begin) * array->layout.size);
+}
+
 static void array_renew(CompiledScene *compiled, size_t kind, FlatLayout layout, size_t count)
 {
     FlatArray *array = &compiled->arrays[kind];
-    size_t size = count * layout.size;
     free(array->items);
-    *array = (FlatArray){aligned_alloc(64, (size + 127) / 64 * 64), count, layout};
-    if (!array->items) fault("out of memory for %zu flat structs", count);
-    memset(array->items, 0, size);
+    *array = (FlatArray){memory_allocate_large(count * layout.size), count, layout};
+    parallel_run(count, FLAT_RANGE_MIN, range_zero, array);
     compiled->changed[kind] = true;
 }
 
@@ -73,41 +82,69 @@ void compiled_scene_free(CompiledScene *compiled)
     *compiled = (CompiledScene){0};
 }
 
+static size_t narrow_size(const FlatLayout *layout)
+{
+    return 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+}
+
 size_t flat_array_size(const FlatArray *array, bool is_double)
 {
     const FlatLayout *layout = &array->layout;
-    size_t size = is_double ? layout->size
-                            : 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
-    return array->count * size;
+    return array->count * (is_double ? layout->size : narrow_size(layout));
 }
 
 typedef struct {
     const FlatArray *array;
-    void *target;
+    char *target;
+    size_t first; // of the array's structs, which the ranges count from
 } Narrowing;
 
+// The target may be the array's own memory: a struct is copied before its place is written.
 static void range_narrow(void *context, size_t begin, size_t end)
 {
     const Narrowing *narrowing = context;
     const FlatLayout *layout = &narrowing->array->layout;
-    char *out = narrowing->target;
-    out += begin * (4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count);
-    for (size_t i = begin; i < end; i++) {
-        const double *numbers = flat_array_at(narrowing->array, i);
-        float *narrow = (float *)(void *)out;
-        for (size_t k = 0; k < 4 * layout->scalar4_count; k++)
-            narrow[k] = (float)numbers[k];
-        out += 4 * sizeof(float) * layout->scalar4_count;
-        memcpy(out, numbers + 4 * layout->scalar4_count, sizeof(uint4) * layout->uint4_count);
-        out += sizeof(uint4) * layout->uint4_count;
+    const size_t number_count = 4 * layout->scalar4_count;
+    double item[FLAT_STRUCT_MAX / sizeof(double)];
+    for (size_t i = narrowing->first + begin; i < narrowing->first + end; i++) {
+        memcpy(item, flat_array_at(narrowing->array, i), layout->size);
+        float *narrow = (float *)(void *)(narrowing->target + i * narrow_size(layout));
+        for (size_t k = 0; k < number_count; k++)
+            narrow[k] = (float)item[k];
+        memcpy(narrow + number_count, item + number_count, sizeof(uint4) * layout->uint4_count);
     }
 }
 
 void flat_array_write(const FlatArray *array, bool is_double, void *target)
 {
-    Narrowing narrowing = {array, target};
+    Narrowing narrowing = {array, target, 0};
     if (is_double)
         memcpy(target, array->items, flat_array_size(array, is_double));
     else
         parallel_run(array->count, FLAT_RANGE_MIN, range_narrow, &narrowing);
+}
+
+// By threads as far as what they write stays before what they read, which is ever farther.
+static void array_narrow(const FlatArray *array)
+{
+    const size_t from_size = array->layout.size, to_size = narrow_size(&array->layout);
+    if (from_size == to_size) return;
+    Narrowing narrowing = {array, array->items, 0};
+    size_t end = array->count < FLAT_RANGE_MIN ? array->count : FLAT_RANGE_MIN;
+    range_narrow(&narrowing, 0, end);
+    while (end < array->count) {
+        narrowing.first = end;
+        end = end * from_size / to_size;
+        if (end > array->count) end = array->count;
+        parallel_run(end - narrowing.first, FLAT_RANGE_MIN / 4, range_narrow, &narrowing);
+    }
+    memory_discard(array->items, array->count * to_size, array->count * from_size);
+}
+
+void *flat_array_take(FlatArray *array, bool is_double)
+{
+    if (!is_double) array_narrow(array);
+    void *items = array->items;
+    array->items = NULL;
+    return items;
 }

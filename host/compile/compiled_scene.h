@@ -81,3 +81,6 @@ enum { FLAT_RANGE_MIN = 16384 };
 // Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
 size_t flat_array_size(const FlatArray *array, bool is_double);
 void flat_array_write(const FlatArray *array, bool is_double, void *target);
+// The same in the array's own memory (memory_allocate_large), which the caller then owns; the array has none
+// left.
+void *flat_array_take(FlatArray *array, bool is_double);

@@ -2,12 +2,12 @@
 #include "host/opencl/compute.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 
 bool compute_open(Compute *compute, const Device *device)
 {
@@ -161,26 +161,6 @@ void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped)
     compute_try(compute, clEnqueueUnmapMemObject(compute->queue, buffer, mapped, 0, NULL, NULL));
 }
 
-// The largest type of OpenCL C has 128 bytes, and no device requires more alignment than that.
-enum { BUFFER_ALIGNMENT = 128, LARGE_PAGE = 1 << 21 };
-
-static bool is_large(size_t size)
-{
-    return size >= 2 * (size_t)LARGE_PAGE;
-}
-
-void *buffer_bytes_allocate(size_t size)
-{
-    size_t alignment = is_large(size) ? LARGE_PAGE : BUFFER_ALIGNMENT;
-    size_t rounded = (size / alignment + 1) * alignment;
-    void *bytes = aligned_alloc(alignment, rounded);
-    if (!bytes) fault("out of memory for a buffer of %zu bytes", size);
-#ifdef MADV_HUGEPAGE
-    if (is_large(size)) madvise(bytes, rounded, MADV_HUGEPAGE); // a hint: no harm if ignored
-#endif
-    return bytes;
-}
-
 static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
 {
     (void)buffer;
@@ -190,7 +170,7 @@ static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
 cl_mem buffer_take(Compute *compute, size_t size, void *bytes)
 {
     // small contents are copied: Oclgrind reports memory that it did not copy as uninitialized
-    bool in_place = (compute->device->type & CL_DEVICE_TYPE_CPU) && is_large(size);
+    bool in_place = (compute->device->type & CL_DEVICE_TYPE_CPU) && size >= MEMORY_LARGE_MIN;
     cl_mem buffer = buffer_make(compute, size, bytes,
                                 CL_MEM_READ_ONLY | (in_place ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR));
     if (in_place && compute_try(compute, clSetMemObjectDestructorCallback(buffer, bytes_free, bytes)))

@@ -93,12 +93,8 @@ bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *byte
 void *buffer_map(Compute *compute, cl_mem buffer, size_t size);
 void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
 
-// Memory for a buffer's contents, at least `size` bytes, to be passed to buffer_take. Large contents use
-// large pages where the system has them, which spares a CPU that reads them at random most address
-// translations.
-void *buffer_bytes_allocate(size_t size);
-// A read-only buffer of those bytes. Takes ownership of them, even on failure: a CPU may read large contents
-// in place, other devices get a copy. Fails as buffer_create does.
+// A read-only buffer of bytes of memory_allocate_large. Takes ownership of them, even on failure: a CPU may
+// read large contents in place, other devices get a copy. Fails as buffer_create does.
 cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
 
 // One command's time by its event and by the host's clock.

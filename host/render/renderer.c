@@ -78,7 +78,8 @@ static bool is_without_eye(size_t kind)
            kind == FLAT_TEXELS;
 }
 
-static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array)
+// `takes`: the host array is not needed any more.
+static void array_upload(Renderer *renderer, size_t kind, FlatArray *array, bool takes)
 {
     Compute *compute = renderer->compute;
     const bool is_double = renderer->report.is_double;
@@ -90,8 +91,8 @@ static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array
         buffer_write_mapped(compute, renderer->arrays[kind], mapped);
         return;
     }
-    void *bytes = buffer_bytes_allocate(size);
-    flat_array_write(array, is_double, bytes);
+    void *bytes = takes ? flat_array_take(array, is_double) : memory_allocate_large(size);
+    if (!takes) flat_array_write(array, is_double, bytes);
     if (renderer->settings.hashes_scene && kind != FLAT_NODES)
         renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
     buffer_release(renderer->arrays[kind]);
@@ -99,19 +100,20 @@ static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array
     renderer->array_sizes[kind] = size;
 }
 
-// The arrays that have changed, to each of the renderers. Frees each host array after its upload, so that the
-// scene is never in memory twice, unless the renderer moves.
+// The arrays that have changed, to each of the renderers. The last takes each host array, so that the scene
+// is never in memory twice, unless the renderer moves.
 static void arrays_upload(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
     if (count > 0) stage_begin(renderers[0]->settings.stage, "uploading the scene", NULL, 0);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        const bool stays = count > 0 && renderers[0]->settings.moves && !is_without_eye(kind);
         for (size_t i = 0; i < count && compiled->changed[kind]; i++) {
             const double start = clock_seconds();
-            array_upload(renderers[i], kind, &compiled->arrays[kind]);
+            array_upload(renderers[i], kind, &compiled->arrays[kind], i + 1 == count && !stays);
             renderers[i]->report.upload_seconds += clock_seconds() - start;
         }
         compiled->changed[kind] = false;
-        if (count > 0 && renderers[0]->settings.moves && !is_without_eye(kind)) continue;
+        if (stays) continue;
         free(compiled->arrays[kind].items);
         compiled->arrays[kind].items = NULL;
     }
