@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_BESIDE = 3, SEEDS_BESIDE = 60 };
+enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_BESIDE = 3, SEEDS_BESIDE = 80 };
 
 static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
@@ -24,12 +24,10 @@ typedef struct {
     ReferenceHit hits[RAYS_PER_SHAPE];
 } Trial;
 
-// What a precision owes, with u its unit roundoff, S the distance from the ray's origin to the far side of
-// the object. Two roundings are owed beyond it:
-// - The plane of an axis' end, at compensated forms: its height |w|^2, that of the ray's origin and w itself
-//   are rounded, to u |w| each, and |w| is twice the size at most.
-// - The side of a cone near its apex, where the eye's power defines the cone: that number, up to the squared
-//   distance D from the eye, is rounded once, which moves the side by u D^2 / 2 r where its radius is r.
+// The bounds of a precision, with u its unit roundoff, S the distance from the ray's origin to the far side
+// of the object. Two roundings come beyond it (docs/numerics.md derives both):
+// - The plane of an axis' end, at compensated forms: 2 u size.
+// - The side of a cone near its apex, where the eye's power defines the cone: cone_moved_by_power.
 typedef struct {
     double ulps;  // of t
     double slack; // of t, over the cosine; in u S, or in u size where the forms are compensated
@@ -39,8 +37,8 @@ typedef struct {
 } Tolerance;
 
 // Those of `single` and `strict` are the tiers B and C of the hard cases, with the slack at every angle,
-// since near a surface no ulp of a small t can be owed after a subtraction of larger numbers; those of `fast`
-// are twice `single`'s.
+// since near a surface no bound can be an ulp of a small t after a subtraction of larger numbers; those of
+// `fast` are twice `single`'s.
 static const Tolerance tolerances[ARITHMETIC_COUNT] = {
     [PRECISION_FAST] = {16, 32, 10, 32, false},
     [PRECISION_SINGLE] = {8, 16, 5, 16, false},
@@ -50,7 +48,7 @@ static const Tolerance tolerances[ARITHMETIC_COUNT] = {
 
 typedef struct {
     size_t compared, wrong;
-    double t, normal, length; // the largest errors as parts of what is owed
+    double t, normal, length; // the largest errors as parts of their bounds
 } Tally;
 
 static Scene scene_of(Object *objects, size_t count, Material *material)
@@ -74,15 +72,32 @@ static Vector3 vector_from(const double parts[3])
     return (Vector3){parts[0], parts[1], parts[2]};
 }
 
-// What a cylinder's or cone's surface may move by beyond the slack (Tolerance); the eye is the origin.
-static double moved_beyond(const Scene *scene, bool has_eye_powers, const ReferenceHit *hit, double u,
-                           double size, double eye_distance)
+// How far a cone's side moves at a point where its radius is r when the numbers that define it beside the
+// eye's power C are rounded once: C, the axis' point F nearest to the eye, which is the origin, and the
+// radius there.
+static double cone_moved_by_power(const Object *cone, Vector3 point, double r, double u)
 {
-    const ShapeKind kind = scene->objects.items[hit->object].kind;
-    if (kind != SHAPE_CYLINDER && kind != SHAPE_CONE) return 0;
-    if (hit->curvature_radius == LDBL_MAX) return 2 * u * size;
-    if (!has_eye_powers || kind != SHAPE_CONE) return 0;
-    return u * eye_distance * eye_distance / (2 * (double)hit->curvature_radius);
+    const double *radii = cone->as.cone.radius, length = vector_length(cone->as.cone.axis);
+    const bool finite = cone->as.cone.finite;
+    const Vector3 axis = vector_scale(cone->as.cone.axis, 1 / length);
+    const double slope = finite ? (radii[1] - radii[0]) / length : cone->as.cone.slope;
+    const double base_height = vector_dot(cone->as.cone.from, axis), height = vector_dot(point, axis);
+    const double foot_radius = (finite ? radii[0] : 0) - slope * base_height;
+    const double foot = vector_length(vector_subtract(cone->as.cone.from, vector_scale(axis, base_height)));
+    const double off = vector_length(vector_subtract(point, vector_scale(axis, height)));
+    const double power = foot * foot - foot_radius * foot_radius;
+    return u * (fabs(power) + 2 * off * foot + 2 * fabs(slope * height * foot_radius)) /
+           (2 * r * hypot(1, slope));
+}
+
+// What a surface may move by beyond the slack (Tolerance).
+static double moved_beyond(const Object *object, const ReferenceHit *hit, Vector3 point, bool has_eye_powers,
+                           bool compensated, double u, double size)
+{
+    if (object->kind != SHAPE_CYLINDER && object->kind != SHAPE_CONE) return 0;
+    if (hit->curvature_radius == LDBL_MAX) return compensated ? 2 * u * size : 0;
+    if (!has_eye_powers || object->kind != SHAPE_CONE) return 0;
+    return cone_moved_by_power(object, point, (double)hit->curvature_radius, u);
 }
 
 static void compare(const Trial *trial, size_t index, const TraceHit *hit, const Scene *scene,
@@ -90,16 +105,16 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
 {
     const ReferenceHit *expected = &trial->hits[index];
     const TraceRay *ray = &trial->rays[index];
-    const Tolerance *owed = &tolerances[precision];
+    const Tolerance *tolerance = &tolerances[precision];
     const int bits = bits_of(precision);
     const double u = ldexp(1, -bits);
     Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
     double distance = vector_length(vector_subtract(origin, trial->center)) + trial->radius;
     // A plane may be hit far beyond the radius.
     if (expected->found) distance = fmax(distance, fabs((double)expected->t) * vector_length(direction));
-    double scale = u * (owed->compensated ? trial->radius : distance);
+    double scale = u * (tolerance->compensated ? trial->radius : distance);
     // Flat shapes have no compensated edges.
-    double band = fmax(owed->band * scale, 4 * u * distance);
+    double band = fmax(tolerance->band * scale, 4 * u * distance);
     if (expected->margin <= band) return;
 
     tally->compared++;
@@ -110,19 +125,19 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
     if (!expected->found) return;
 
     double cosine = (double)expected->cosine;
-    double t_owed = owed->ulps * reference_ulp(expected->t, bits);
-    double moved = owed->slack * scale;
-    if (owed->compensated) {
-        const Vector3 point = vector_add(origin, vector_scale(direction, (double)expected->t));
-        moved += moved_beyond(scene, has_eye_powers, expected, u, trial->radius, vector_length(point));
-    }
-    t_owed += moved / (cosine * vector_length(direction));
-    tally->t = fmax(tally->t, (double)((hit->t - expected->t) / t_owed));
-    tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_owed));
+    double t_bound = tolerance->ulps * reference_ulp(expected->t, bits);
+    const Vector3 point = vector_add(origin, vector_scale(direction, (double)expected->t));
+    const double moved =
+        tolerance->slack * scale + moved_beyond(&scene->objects.items[hit->object], expected, point,
+                                                has_eye_powers, tolerance->compensated, u, trial->radius);
+    t_bound += moved / (cosine * vector_length(direction));
+    tally->t = fmax(tally->t, (double)((hit->t - expected->t) / t_bound));
+    tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_bound));
 
     Vector3 normal = vector_from(hit->normal);
-    double normal_owed = 8 * u + owed->turn * u * distance / (cosine * (double)expected->curvature_radius);
-    tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_owed);
+    double normal_bound =
+        8 * u + tolerance->turn * u * distance / (cosine * (double)expected->curvature_radius);
+    tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_bound);
     tally->length = fmax(tally->length, fabs(vector_length(normal) - 1) / (4 * u));
     if (vector_dot(normal, direction) > 0) tally->wrong++;
 }
@@ -176,8 +191,8 @@ static bool scene_has_eye_powers(const Scene *scene, Precision precision)
     return has;
 }
 
-static void hold_at(const Trial *trial, const Scene *scene, Precision precision, uint32_t lanes,
-                    const char *what)
+static void check_at(const Trial *trial, const Scene *scene, Precision precision, uint32_t lanes,
+                     const char *what)
 {
     static TraceHit hits[RAYS_PER_SHAPE];
     if (!probe_has(precision)) return;
@@ -188,16 +203,16 @@ static void hold_at(const Trial *trial, const Scene *scene, Precision precision,
         compare(trial, i, &hits[i], scene, has_eye_powers, precision, &tally);
     bool right = tally.wrong == 0 && tally.t <= 1 && tally.normal <= 1 && tally.length <= 1;
     if (!right)
-        print_message(
-            "%s, %s, lanes %u: %zu of %zu wrong; of what is owed: t %.2f, normal %.2f, its length %.2f\n",
-            what, precision_names[precision], lanes, tally.wrong, tally.compared, tally.t, tally.normal,
-            tally.length);
+        print_message("%s, %s, lanes %u: %zu of %zu wrong; as parts of their bounds: t %.2f, normal %.2f, "
+                      "its length %.2f\n",
+                      what, precision_names[precision], lanes, tally.wrong, tally.compared, tally.t,
+                      tally.normal, tally.length);
     assert_true(tally.compared > RAYS_PER_SHAPE / 2);
     assert_true(right);
 }
 
-static void hold(const RandomShape *shapes, size_t count, Vector3 center, double radius, bool beside,
-                 const char *what, Random *random)
+static void check(const RandomShape *shapes, size_t count, Vector3 center, double radius, bool beside,
+                  const char *what, Random *random)
 {
     static Trial trial;
     Object objects[SHAPES_IN_SCENE];
@@ -211,8 +226,8 @@ static void hold(const RandomShape *shapes, size_t count, Vector3 center, double
         prepare(&trial, &scene, shapes, count, is_double, beside, random);
         for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (is_double != (precision == PRECISION_DOUBLE)) continue;
-            hold_at(&trial, &scene, precision, 1, what);
-            hold_at(&trial, &scene, precision, 0, what);
+            check_at(&trial, &scene, precision, 1, what);
+            check_at(&trial, &scene, precision, 0, what);
         }
     }
 }
@@ -233,7 +248,7 @@ static void hits_each_shape(void **state)
     Random random = {(uint64_t)(form - forms)};
     for (int i = 0; i < shapes_of_a_form(); i++) {
         RandomShape shape = random_shape(form, &random);
-        hold(&shape, 1, shape.center, shape.radius, false, form->name, &random);
+        check(&shape, 1, shape.center, shape.radius, false, form->name, &random);
     }
 }
 
@@ -248,7 +263,7 @@ static void hits_the_nearest_of_many(void **state)
             shapes[i] = random_shape(&forms[i % form_count], &random);
             radius = fmax(radius, vector_length(shapes[i].center) + shapes[i].radius);
         }
-        hold(shapes, SHAPES_IN_SCENE, (Vector3){0, 0, 0}, radius, false, "many shapes", &random);
+        check(shapes, SHAPES_IN_SCENE, (Vector3){0, 0, 0}, radius, false, "many shapes", &random);
     }
 }
 
@@ -271,7 +286,7 @@ static void hits_from_beside_the_side(void **state)
             for (int i = 0; i < SHAPES_BESIDE; i++) {
                 RandomShape shape = random_shape(form, &random);
                 if (i == 0 && form->kind == SHAPE_CONE) make_steep(&shape);
-                hold(&shape, 1, shape.center, shape.radius, true, form->name, &random);
+                check(&shape, 1, shape.center, shape.radius, true, form->name, &random);
             }
         }
     }
