@@ -88,11 +88,8 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
-        real distance = vector_norm(shadow_ray->direction);
-        mask apart = distance > (real)(4) * place_error;
-        real relative = real_divide(place_error, lanes_select(apart, distance, (real)(1)));
-        relative = lanes_select(apart, relative, (real)(1));
-        far_off = relative > SHADOW_DOUBT_MAX;
+        real relative = place_error * shadow_ray->inverse_length;
+        far_off = !(relative <= SHADOW_DOUBT_MAX) | !(shadow_ray->squared > zero);
         is_loose = relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF);
         angle_error = angle_error + relative + relative;
         shadow_ray->ends_at_light = true;

@@ -241,7 +241,7 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     real geometric_error = point->normal_error + (real)(16 * UNIT_ROUNDOFF);
     mask flat = vector_dot(point->shading_normal, point->normal) == vector_dot(point->normal, point->normal);
     geometric_error = lanes_select(flat, surface->normal_error, geometric_error);
-    real cosine = vector_dot(point->normal, ray->direction) * real_sqrt(ray->inverse_squared);
+    real cosine = vector_dot(point->normal, ray->direction) * ray->inverse_length;
     real shading_cosine = vector_dot(point->shading_normal, point->normal);
     mask is_open = fabs(cosine) <= geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
     is_open = is_open | (fabs(shading_cosine) <= geometric_error + surface->normal_error);

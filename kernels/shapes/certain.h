@@ -22,6 +22,13 @@ typedef struct {
 // perpendicular, two sums to 2, an offset in the pixel to 1, the unit length's to 1.
 enum { CAMERA_DIRECTION_ERROR = 7 };
 
+// a / b, or `otherwise` where that is out of range.
+static inline real divide_or(real a, real b, real otherwise)
+{
+    mask usable = quotient_is_bounded(a, b);
+    return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
+}
+
 // How far the exact ray is from the packet's, up to a distance.
 static inline real ray_place_error(const Ray *ray, real distance)
 {
@@ -80,13 +87,12 @@ static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
 
 // A sphere: with l the line's closest point to the center, r^2 - l^2 is half the chord squared.
 typedef struct {
-    mask active;
-    mask certain, perhaps;       // the line crosses it
+    mask certain, perhaps;       // the line crosses it, not behind the ray's start or beyond its end
     real near_t, far_t, t_error; // its crossings
     real middle_t, middle_error; // the closest point
 } CertainSphere;
 
-static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray)
+static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
 {
     Vector f = vector_subtract(ray->origin, center);
     CertainSphere crossed;
@@ -100,16 +106,20 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real place = ray_place_error(ray, distance) + rounding;
     real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
     real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
-    crossed.active = RAY_ACTIVE(ray);
-    crossed.certain = crossed.active & (squared > band);
-    crossed.perhaps = crossed.active & !(squared < -band);
+    // not where all of it is behind the start, or beyond the end
+    real reach = ray->inverse_length * (radius + (real)(2) * (place + along));
+    mask behind = crossed.middle_t + reach<ray->tmin, beyond = crossed.middle_t - reach> ray->tmax *
+                                         (real)(1 + 64 * UNIT_ROUNDOFF);
+    crossed.certain = lanes & (squared > band);
+    crossed.perhaps = lanes & !((squared < -band) | behind | beyond);
     crossed.near_t = crossed.far_t = crossed.middle_error = crossed.t_error = (real)(0);
     if (!lanes_any(crossed.perhaps)) return crossed;
-    real half_chord = real_sqrt(real_max(squared, (real)(0)) * ray->inverse_squared);
-    real chord_error = real_divide(band, real_sqrt(real_max(squared, band)));
+    // in t; where it is in doubt, of half the band: between 0 and that of twice the band
+    real half_chord = real_sqrt(real_max(squared, band) * ray->inverse_squared);
+    real chord_error = real_divide((real)(1.5f) * band * ray->inverse_squared,
+                                   lanes_select(half_chord > (real)(0), half_chord, (real)(1)));
     crossed.middle_error = ray->inverse_length * (place + along);
-    crossed.t_error = real_fma(ray->inverse_length * (real)(1.5f), chord_error, crossed.middle_error) +
-                      (real)(16 * UNIT_ROUNDOFF) * half_chord;
+    crossed.t_error = chord_error + real_fma((real)(16 * UNIT_ROUNDOFF), half_chord, crossed.middle_error);
     crossed.near_t = crossed.middle_t - half_chord;
     crossed.far_t = crossed.middle_t + half_chord;
     return crossed;

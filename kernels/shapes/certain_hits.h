@@ -17,8 +17,11 @@
 static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
 {
     if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray);
+    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
+    mask lanes = RAY_ACTIVE(ray) & !(left & ray->leaves_outward);
+    if (!lanes_any(lanes)) return certain_miss();
     CertainSphere crossed =
-        certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray);
+        certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);
     if (!lanes_any(crossed.perhaps)) return certain_miss();
     real near_high = crossed.near_t + crossed.t_error, far_high = crossed.far_t + crossed.t_error;
     CertainHit far =
@@ -29,14 +32,12 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
                                            crossed.near_t - crossed.t_error, near_high);
         hit = certain_first(ray, near, near_high, far);
     }
-    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
+    left = left & lanes;
     if (lanes_any(left)) {
         // one crossing is the start; the other lies twice as far as the closest point
         real t = (real)(2) * crossed.middle_t, t_error = (real)(2.5f) * crossed.middle_error;
-        mask on = left & crossed.active;
-        CertainHit other = certain_crossing(ray, on, on, t - t_error, t + t_error);
+        CertainHit other = certain_crossing(ray, left, left, t - t_error, t + t_error);
         hit = certain_select(left, other, hit);
-        hit = certain_restrict(hit, !(left & ray->leaves_outward));
     }
     return hit;
 }
@@ -48,7 +49,7 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
 {
     Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
-    real size = real_divide((real)(1 + 16 * UNIT_ROUNDOFF), (real)(normal_and_inverse.w));
+    real size = (real)((1 + 16 * UNIT_ROUNDOFF) / normal_and_inverse.w);
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
     real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
                                                  (real)(2) * vector_norm1_along(unsigned_normal, point)) +
@@ -56,10 +57,13 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
     real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
                        size * (ray->length * ray->direction_error);
     mask crosses = fabs(along) > (real)(8) * along_error;
-    real divisor = lanes_select(crosses, along, (real)(1));
-    real t = real_divide(height, divisor);
-    real t_error = real_divide((real)(1.2f) * real_fma(fabs(t), along_error, height_error), fabs(divisor)) +
+    real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
+    real t = height * inverse;
+    real t_error = (real)(1.2f) * real_fma(fabs(t), along_error, height_error) * fabs(inverse) +
                    (real)(8 * UNIT_ROUNDOFF) * fabs(t);
+    *low = t - t_error;
+    *high = t + t_error;
+    if (lanes_all(crosses)) return crosses;
     // nearly parallel: beyond the least distance over the greatest approach
     real least = real_max(fabs(height) - height_error, (real)(0));
     real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
@@ -67,14 +71,15 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
     real parallel_low =
         lanes_select(moves, real_divide(least, lanes_select(moves, greatest, (real)(1))), (real)(LARGEST)) *
         (real)(1 - 16 * UNIT_ROUNDOFF);
-    *low = lanes_select(crosses, t - t_error, parallel_low);
-    *high = lanes_select(crosses, t + t_error, (real)(LARGEST));
+    *low = lanes_select(crosses, *low, parallel_low);
+    *high = lanes_select(crosses, *high, (real)(LARGEST));
     return crosses;
 }
 
 static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
 {
     mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, plane->id.x, true);
+    if (!lanes_any(lanes)) return certain_miss();
     real low, high;
     mask crosses = certain_plane(vector_of(plane->point), plane->normal, ray, &low, &high);
     return certain_crossing(ray, lanes & crosses, lanes, low, high);
@@ -85,7 +90,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 {
     Vector center = vector_of(disc->center_radius);
     real radius = (real)(disc->center_radius.w);
-    CertainSphere bounding = certain_sphere(center, radius, ray);
+    CertainSphere bounding = certain_sphere(center, radius, ray, RAY_ACTIVE(ray));
     mask lanes = bounding.perhaps & !ray_left_for_good(ray, disc->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
@@ -157,6 +162,14 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     return certain_select(left & certain, far, certain_first(ray, near, near_high, far));
 }
 
+// No vertex is farther from the origin.
+static inline scalar triangle_size(const Triangle *triangle)
+{
+    scalar4 largest = fmax(fmax(fabs(triangle->a), fabs(triangle->b)), fabs(triangle->c));
+    scalar squared = largest.x * largest.x + largest.y * largest.y + largest.z * largest.z;
+    return sqrt(squared) * (1 + 16 * UNIT_ROUNDOFF);
+}
+
 // In the ray's frame a vertex is off by `error` along each axis, and so an edge function by twice that times
 // the coordinates it is made of. t is between those of the vertices, weighted by the edge functions.
 static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
@@ -164,40 +177,50 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, triangle->id.x, true);
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
     TriangleEdges edges = triangle_edges(corners, ray);
-    Vector max_abs = corners_max_abs((Corners){edges.a, edges.b, edges.c});
-    real distance = vector_norm(max_abs);
-    real place = ray_place_error(ray, distance) +
-                 (real)(UNIT_ROUNDOFF)*real_fma((real)(5), distance, (real)(2) * vector_norm1(ray->origin));
     Vector u = ray->across_u, v = ray->across_v;
-    real error = place * ray->across_length;
+    real size = (real)(triangle_size(triangle)),
+         error = real_fma(ray->across_error1, size, ray->across_error0);
     real ax = vector_dot(edges.a, u), ay = vector_dot(edges.a, v);
     real bx = vector_dot(edges.b, u), by = vector_dot(edges.b, v);
     real cx = vector_dot(edges.c, u), cy = vector_dot(edges.c, v);
     real a_sum = fabs(ax) + fabs(ay) + error, b_sum = fabs(bx) + fabs(by) + error,
          c_sum = fabs(cx) + fabs(cy) + error;
+    // first by what all three are off by together
+    real edge_error = (error + error) * (a_sum + b_sum + c_sum);
+    real highest = real_max(real_max(edges.u, edges.v), edges.w),
+         lowest = real_min(real_min(edges.u, edges.v), edges.w);
+    mask perhaps = lanes & !((highest > edge_error) & (lowest < -edge_error));
+    if (!lanes_any(perhaps)) return certain_miss();
+    // then by each one's own errors, by its distance from the ray's start
+    real distance = vector_norm(corners_max_abs((Corners){edges.a, edges.b, edges.c}));
+    real place = ray_place_error(ray, distance) +
+                 (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, size);
+    error = real_min(error, place * ray->across_length);
     real u_error = error * (b_sum + c_sum), v_error = error * (c_sum + a_sum),
-         w_error = error * (a_sum + b_sum), edge_error = u_error + v_error + w_error;
-    mask all_above = (edges.u > u_error) & (edges.v > v_error) & (edges.w > w_error);
-    mask all_below = (edges.u < -u_error) & (edges.v < -v_error) & (edges.w < -w_error);
-    mask any_above = (edges.u > u_error) | (edges.v > v_error) | (edges.w > w_error);
-    mask any_below = (edges.u < -u_error) | (edges.v < -v_error) | (edges.w < -w_error);
-    mask misses = (any_above & any_below) | (real_min(real_min(ax, bx), cx) > error) |
+         w_error = error * (a_sum + b_sum);
+    edge_error = u_error + v_error + w_error;
+    highest = real_max(real_max(edges.u - u_error, edges.v - v_error), edges.w - w_error);
+    lowest = real_min(real_min(edges.u + u_error, edges.v + v_error), edges.w + w_error);
+    mask misses = ((highest > (real)(0)) & (lowest < (real)(0))) | (real_min(real_min(ax, bx), cx) > error) |
                   (real_max(real_max(ax, bx), cx) < -error) | (real_min(real_min(ay, by), cy) > error) |
                   (real_max(real_max(ay, by), cy) < -error);
-    mask perhaps = lanes & !misses;
+    perhaps = perhaps & !misses;
     if (!lanes_any(perhaps)) return certain_miss();
+    mask all_above = (edges.u > u_error) & (edges.v > v_error) & (edges.w > w_error);
+    mask all_below = (edges.u < -u_error) & (edges.v < -v_error) & (edges.w < -w_error);
     mask certain = perhaps & (all_above | all_below);
 
     real a_t = vector_dot(edges.a, ray->along), b_t = vector_dot(edges.b, ray->along),
          c_t = vector_dot(edges.c, ray->along);
     real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
-    real vertex_error = ray->inverse_length * real_fma((real)(16 * UNIT_ROUNDOFF), distance, place);
+    real vertex_error = ray->inverse_length * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
     // in doubt as well: if it is hit, then where the weights say
     mask narrows = perhaps & (fabs(edges.determinant) > (real)(8) * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges.determinant, (real)(1)));
-    real t = real_fma(a_t, edges.u * inverse, real_fma(b_t, edges.v * inverse, c_t * (edges.w * inverse)));
+    real t = c_t + real_fma(a_t - c_t, edges.u * inverse, (b_t - c_t) * (edges.v * inverse));
     real part = (real)(2.5f) * edge_error * fabs(inverse); // of all weights
-    real t_error = (high - low) * part + (real)(16 * UNIT_ROUNDOFF) * (fabs(low) + fabs(high)) + vertex_error;
+    real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
+                   real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
     low = low - vertex_error;
     high = high + vertex_error;
     low = lanes_select(narrows, real_max(low, t - t_error), low);
@@ -211,11 +234,10 @@ static inline real triangle_slimness(Corners corners)
 {
     Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
            bc = vector_subtract(corners.c, corners.b);
-    real longest = real_max(real_max(vector_norm1(ab), vector_norm1(ac)), vector_norm1(bc));
-    real area = vector_norm(vector_cross(ab, ac));
-    mask flat = area > longest * (real)(SMALLEST_RATIO);
-    return lanes_select(flat, real_divide(longest, lanes_select(flat, area, (real)(1))),
-                        (real)(1 / SMALLEST_RATIO));
+    Vector across = vector_cross(ab, ac);
+    real longest_squared = real_max(real_max(vector_dot(ab, ab), vector_dot(ac, ac)), vector_dot(bc, bc)),
+         area_squared = vector_dot(across, across);
+    return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
 }
 
 // The errors of the normals: each vertex is off by u of its length, and where normals are blended the weights
@@ -225,15 +247,11 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
 {
     real slimness = triangle_slimness(corners);
     real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
-    real apart = vector_norm1(vector_subtract(normals.a, normals.b)) +
-                 vector_norm1(vector_subtract(normals.b, normals.c));
+    Vector ab = vector_subtract(normals.a, normals.b), bc = vector_subtract(normals.b, normals.c);
+    real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
     Vector blend = triangle_blend(weights, normals);
-    real length = vector_norm(blend);
-    mask bends = (apart > (real)(0)) & (length > (real)(SMALLEST_RATIO));
-    point->curvature = lanes_select(bends,
-                                    (real)(1.25f) * apart * slimness *
-                                        real_divide((real)(1), lanes_select(bends, length, (real)(1))),
-                                    (real)(0));
+    real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
+    point->curvature = (real)(1.25f) * bend * slimness;
     point->normal_error = vertex_error * (slimness + point->curvature);
 }
 

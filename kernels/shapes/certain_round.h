@@ -122,12 +122,6 @@ static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
     return quadratic;
 }
 
-static inline real divide_or(real a, real b, real otherwise)
-{
-    mask usable = quotient_is_bounded(a, b);
-    return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
-}
-
 // Whether a height above a plane, which is linear, stays above 0 between `from` and `to`, and beyond but in
 // the lanes `ends`.
 static inline mask height_is_positive(real height, real slope, real slope_error, real t, real from, real to,
@@ -369,7 +363,8 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
 // The part of the line in a sphere that contains a finite shape.
 static inline mask round_bounds(Vector center, real radius, const Ray *ray, real *from, real *to)
 {
-    CertainSphere bounding = certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray);
+    CertainSphere bounding =
+        certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
     *from = bounding.near_t - bounding.t_error;
     *to = bounding.far_t + bounding.t_error;
     return bounding.perhaps & (*to >= ray->tmin);

@@ -109,8 +109,8 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
 {
     const CertainTorus certain = certain_torus(torus, ray);
     const real radius = certain.major + certain.minor;
-    CertainSphere bounding =
-        certain_sphere(vector_of(torus->center_major), radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray);
+    CertainSphere bounding = certain_sphere(vector_of(torus->center_major),
+                                            radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
     real from = bounding.near_t - bounding.t_error, to = bounding.far_t + bounding.t_error;
     mask lanes = bounding.perhaps & (to >= ray->tmin);
     if (!lanes_any(lanes)) return certain_miss();

@@ -25,8 +25,10 @@ typedef struct {
     mask leaves_outward;
     bool ends_at_light;
     mask is_loose;               // too far off for cull spheres
-    real length, inverse_length; // of the direction, within 16 u; the latter is not below the exact one
-    real across_length;          // by ray_prepare: a bound on that of across_u and across_v
+    real length, inverse_length; // of the direction, not below the exact ones, within 32 u
+    // by ray_prepare: a bound on the length of across_u and across_v, and on the error of a triangle's corner
+    // in the frame if it is no farther from the origin than `size`: across_error0 + across_error1 size
+    real across_length, across_error0, across_error1;
     // by ray_prepare: 1 / direction, huge where the component is 0
     Vector inverse;
     // for triangles: two vectors across the direction, of length O(1) since they are computed from a
@@ -112,15 +114,21 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
         ray.is_loose = mask_none();
-        ray.length = real_sqrt(ray.squared);
     }
     ray.active = active & (ray.squared > (real)(0));
     // 0 in inactive lanes: only a sphere around the origin still examines them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
-    if (IS_CERTIFIED) ray.inverse_length = real_sqrt(ray.inverse_squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) {
+        ray.inverse_length = real_sqrt(ray.inverse_squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
+        ray.length = ray.squared * ray.inverse_length * (real)(1 + 16 * UNIT_ROUNDOFF);
+    }
     return ray;
 }
+
+// Of a triangle's corner, in u of its distance: its own rounding, that of the difference from the ray's
+// start, and those of two products.
+enum { TRIANGLE_ERROR = 5 };
 
 // Computes what boxes, triangles and the BVH need. Lazy and idempotent: called before the BVH is traversed
 // and before boxes and triangles outside it are tested.
@@ -135,6 +143,10 @@ static inline void ray_prepare(Ray *ray)
     if (IS_CERTIFIED) {
         shear_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
         ray->across_length = (real)(1.42f) * (largest * scale);
+        real per_distance = ray->direction_error + (real)(TRIANGLE_ERROR * UNIT_ROUNDOFF);
+        ray->across_error1 = (per_distance + (real)(UNIT_ROUNDOFF)) * ray->across_length;
+        ray->across_error0 =
+            real_fma(per_distance, vector_norm1(ray->origin), ray->origin_error) * ray->across_length;
     } else {
         frame_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
     }
@@ -145,6 +157,7 @@ static inline void ray_prepare(Ray *ray)
 static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 {
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
+    if (IS_CERTIFIED) ray.length = ray.inverse_length = (real)(1 + 8 * UNIT_ROUNDOFF);
     if (IS_COMPENSATED) return ray;
     ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
     return ray;
