@@ -1,4 +1,5 @@
 // The native format: every key's value, every default, warnings, and the scene that is read.
+#include "host/import/load.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
@@ -281,6 +282,19 @@ static void test_a_failed_scene_is_empty(void **state)
     message_list_free(&messages);
 }
 
+// Beyond what a node's offsets count; the rest of its bytes is not read.
+static void test_more_than_2_gibibytes_are_refused(void **state)
+{
+    (void)state;
+    const Source source = {.file = "s.yaml", .bytes = CAMERA SPHERE, .length = ((size_t)1 << 31) + 1};
+    MessageList messages = {0};
+    Scene scene;
+    assert_false(scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages));
+    assert_int_equal(messages.count, 1);
+    assert_string_equal(messages.items[0].text, "a scene of more than 2 GiB");
+    message_list_free(&messages);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -299,6 +313,7 @@ int main(void)
         cmocka_unit_test(test_materials_may_follow_objects),
         cmocka_unit_test(test_warnings),
         cmocka_unit_test(test_a_failed_scene_is_empty),
+        cmocka_unit_test(test_more_than_2_gibibytes_are_refused),
     };
     return cmocka_run_group_tests(tests, complete_open, complete_close);
 }

@@ -9,6 +9,9 @@
 
 enum { DEPTH_MAX = 32, ANCHORS_MAX = 1000 };
 
+// Offsets are of 32 bits, of texts too, which may be twice as long with the NUL behind each.
+static const size_t source_length_max = (size_t)1 << 31;
+
 typedef struct {
     size_t text, length; // name in the source
     uint32_t node;
@@ -64,7 +67,7 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
 {
     Text *texts = &builder->tree->texts;
     node.kind = YAML_SCALAR;
-    node.text = texts->count;
+    node.text = (uint32_t)texts->count;
     if (token && !token_append_text(texts, token)) {
         report_error(builder->report, node.offset, "not well-formed YAML");
         return false;
@@ -95,7 +98,7 @@ static void collection_close(TreeBuilder *builder)
     YamlNode *node = &builder->tree->nodes.items[builder->open[--builder->depth].node];
     const char first = builder->report->source->bytes[node->offset];
     if (first == '[' || first == '{') builder->value_end = builder->end;
-    node->end = builder->value_end;
+    node->end = (uint32_t)builder->value_end;
 }
 
 // Later anchors of a name hide earlier ones (YAML 1.2.2, section 7.1).
@@ -145,9 +148,9 @@ static bool anchor_add(TreeBuilder *builder, struct fy_token *token)
 static bool event_take(TreeBuilder *builder, struct fy_event *event)
 {
     const struct fy_mark *start = fy_event_start_mark(event), *end = fy_event_end_mark(event);
-    YamlNode node = {.offset = start ? start->input_pos : builder->end};
+    YamlNode node = {.offset = (uint32_t)(start ? start->input_pos : builder->end)};
     if (end) builder->end = end->input_pos;
-    node.end = builder->end;
+    node.end = (uint32_t)builder->end;
     bool is_node =
         event->type == FYET_SCALAR || event->type == FYET_SEQUENCE_START || event->type == FYET_MAPPING_START;
     if (is_node && fy_event_get_tag_token(event)) {
@@ -166,10 +169,10 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
         }
         return true;
     case FYET_SCALAR:
-        builder->value_end = node.end;
+        builder->value_end = builder->end;
         return scalar_append(builder, event->scalar.value, node);
     case FYET_ALIAS: {
-        builder->value_end = node.end;
+        builder->value_end = builder->end;
         size_t length;
         const char *name = fy_token_get_text(event->alias.anchor, &length);
         return alias_append(builder, name, length, node.offset - strlen("*"));
@@ -259,6 +262,10 @@ static bool source_is_text(const Source *source, Report *report)
 
 bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
 {
+    if (report->source->length > source_length_max) {
+        report_error(report, 0, "a scene of more than 2 GiB");
+        return false;
+    }
     if (!source_is_text(report->source, report)) return false;
     struct fy_diag_cfg quiet;
     fy_diag_cfg_default(&quiet);
@@ -289,7 +296,7 @@ void yaml_tree_free(YamlTree *tree)
 
 const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node)
 {
-    return node->first ? &tree->nodes.items[node->first] : NULL;
+    return node->kind != YAML_SCALAR && node->first ? &tree->nodes.items[node->first] : NULL;
 }
 
 const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node)
