@@ -30,7 +30,7 @@ OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconve
 LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
             $(shell pkg-config --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) \
-            $(if $(has_window),$(shell pkg-config --libs $(window_packages))) -lm -lpthread -Wl,--export-dynamic-symbol=abort
+            -lm -lpthread -Wl,--export-dynamic-symbol=abort
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
@@ -41,10 +41,12 @@ version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_C
 # (tools/numerics/textbook), never to ship.
 kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h)),$(or \
            $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
-sources := $(filter-out $(if $(has_window),,$(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c), \
+window_sources := $(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c
+sources := $(filter-out $(if $(has_window),,$(window_sources) host/cli/view_start.c), \
            $(filter-out host/mpi/%,$(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))))
 pages   := $(sort $(wildcard host/cli/page/*))
-objects := $(sources:%.c=$(BUILD)/%.o) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
+window_objects := $(if $(has_window),$(patsubst %.c,$(BUILD)/%.o,$(window_sources) host/cli/view.c))
+objects := $(filter-out $(window_objects),$(sources:%.c=$(BUILD)/%.o)) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
 
 # Each tests/test_*.c, fuzz_*.c and oracle/*.c is a program; the other files are linked with all of them.
@@ -55,8 +57,12 @@ tests         := $(test_programs:%.c=$(BUILD)/%)
 
 all: $(BUILD)/glint
 
-$(BUILD)/glint: $(objects)
+$(BUILD)/glint: $(objects) | $(if $(has_window),$(BUILD)/glint-view)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+
+# What glint view starts.
+$(BUILD)/glint-view: $(filter-out %/view_start.o,$(objects)) $(window_objects)
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell pkg-config --libs $(window_packages)) -o $@
 
 # glint render on the devices of an MPI job; needs libopenmpi-dev.
 mpi_flags := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags ompi-c 2>/dev/null))
@@ -234,7 +240,9 @@ data := $(DESTDIR)$(PREFIX)/share
 
 install: all
 	install -D $(BUILD)/glint $(DESTDIR)$(PREFIX)/bin/glint
-	if [ -e $(BUILD)/glint-mpi ]; then install $(BUILD)/glint-mpi $(DESTDIR)$(PREFIX)/bin/glint-mpi; fi
+	for program in glint-view glint-mpi; do \
+	    if [ -e $(BUILD)/$$program ]; then install $(BUILD)/$$program $(DESTDIR)$(PREFIX)/bin/$$program; fi; \
+	done
 	install -D -m 644 docs/glint.1 $(data)/man/man1/glint.1
 	install -D -m 644 tools/completions/glint.bash $(data)/bash-completion/completions/glint
 	install -D -m 644 tools/completions/glint.zsh $(data)/zsh/site-functions/_glint
@@ -248,7 +256,7 @@ install: all
 	install -m 644 docs/*.md docs/*.png docs/*.gif docs/*.svg $(data)/doc/glint/docs
 
 uninstall:
-	rm -f $(DESTDIR)$(PREFIX)/bin/glint $(DESTDIR)$(PREFIX)/bin/glint-mpi $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,glint glint-view glint-mpi) $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
 	    $(data)/zsh/site-functions/_glint $(data)/fish/vendor_completions.d/glint.fish
 	rm -rf $(data)/glint $(data)/doc/glint
 

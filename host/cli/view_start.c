@@ -1,0 +1,34 @@
+// glint view, of glint itself: the window is a program beside it, so that no other command loads its
+// libraries, which took a tenth of the processor time of a small render.
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/base/text.h"
+#include "host/cli/commands.h"
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+int command_view(int argument_count, char **arguments)
+{
+    char self[PATH_MAX];
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof self);
+    if (length < 0 || length == sizeof self) {
+        fprintf(stderr, "glint: cannot find where it lies itself: %s\n", strerror(errno));
+        return EXIT_MACHINE;
+    }
+    Text path = {0};
+    text_append(&path, self, (size_t)length);
+    text_appendf(&path, "-view");
+    // the first two, "glint" and "view", are one here
+    char **passed = memory_allocate((size_t)argument_count + 2, sizeof *passed);
+    passed[0] = "glint";
+    passed[1] = "view";
+    for (int i = 1; i <= argument_count; i++)
+        passed[i + 1] = arguments[i];
+    execv(text_c(&path), passed);
+    fprintf(stderr, "glint: cannot start %s: %s\n", text_c(&path), strerror(errno));
+    return EXIT_MACHINE;
+}
