@@ -5,7 +5,7 @@
 #include "host/base/array.h"
 #include "host/import/mesh/mesh_import.h"
 
-// A corner without a normal or without texture coordinates.
+// The index of a corner that has no normal, or no texture coordinates.
 #define DRAFT_NONE UINT32_MAX
 
 typedef enum { DRAFT_POSITION, DRAFT_UV, DRAFT_NORMAL, DRAFT_PART_COUNT } DraftPart;
@@ -28,7 +28,7 @@ typedef struct {
     size_t first_corner, corner_count;
 } DraftPolygon;
 
-// An index, and where the file has it.
+// An index, and the offset at which the file has it.
 typedef struct {
     size_t index, offset;
 } DraftPlace;
@@ -64,15 +64,17 @@ typedef struct {
         DraftMaterialRun *items;
         size_t count, capacity;
     } materials;
-    // The positions that are no numbers; they may stand in a file where no face uses them.
+    // The positions that are no numbers, which is an error only where a face uses them.
     struct {
         DraftPlace *items;
         size_t count, capacity;
     } unread;
-    DraftPlace
-        needed[DRAFT_PART_COUNT]; // the number of parts that corners name, where it is beyond those so far
-    size_t first_index;           // 0 or 1: how the file counts them
-    size_t face_start, crossed_count;
+    // Of each part one more than the largest index that a corner names before the file has that position, uv
+    // or normal: draft_check compares it with how many there are in the end.
+    DraftPlace needed[DRAFT_PART_COUNT];
+    size_t first_index;   // from which the file counts them, for messages: 0 or 1
+    size_t face_start;    // the first corner of the face that is being added
+    size_t crossed_count; // polygons that cross themselves, for a warning
 } MeshDraft;
 
 extern const char *const draft_part_names[DRAFT_PART_COUNT];

@@ -10,6 +10,7 @@ typedef struct {
     const char *start; // of the text
 } Scan;
 
+// Or that of what counts of it: `#` begins a comment.
 static inline bool scan_is_line_end(char character)
 {
     return character == '\n' || character == '\r' || character == '\0' || character == '#';
