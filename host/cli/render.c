@@ -309,6 +309,7 @@ void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
         render_command_note(command, status);
         goes_on = render_status_goes_on(status);
     }
+    if (command->status == EXIT_DONE) fault_output_is_complete(EXIT_DONE);
 }
 
 void render_command_drop_devices(RenderCommand *command)
@@ -320,7 +321,6 @@ void render_command_drop_devices(RenderCommand *command)
 
 int render_command_close(RenderCommand *command)
 {
-    if (command->status == EXIT_DONE) fault_output_is_complete(EXIT_DONE);
     const int status = render_devices_close(&command->open, command->status);
     for (size_t i = 0; i < command->options.scene_count; i++)
         free(command->paths[i]);

@@ -25,7 +25,7 @@ bool render_command_is_unfit(const RenderCommand *command);
 bool render_status_goes_on(int status);
 // Adds a scene's status to the command's.
 void render_command_note(RenderCommand *command, int status);
-// Renders the scenes from `first` on, as far as the command goes on, and notes their statuses.
+// Renders the scenes from `first` on, as far as the command goes on, and notes their statuses: its last work.
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks);
 
 // Warns of the devices that failed that others do their work: no failure of the command.
