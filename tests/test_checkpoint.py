@@ -6,9 +6,10 @@ import random
 import resource
 import subprocess
 import time
+import unittest
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, skip_all, write
 
 # one compute unit: bands are short
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
@@ -18,6 +19,18 @@ RENDER = f"render sphere.yaml --size 64x{ROWS} --samples 100 --precision strict 
 ROW_BYTES = 64 * 3 * 4
 BYTES_MAX = 120 << 10  # a file of at most that has no whole checkpoint, but the first band
 KILLS = 200 if IS_LONG else 6
+# Launches fail once a band is saved.
+FAILING = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <sys/stat.h>
+int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void *f, unsigned g, void *h, void *i)
+{
+    struct stat saved;
+    if (stat("saved", &saved) == 0 && saved.st_size > 4096) return -5;
+    return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
+}
+"""
 
 
 def size(path):
@@ -75,6 +88,21 @@ class Checkpoints(TestCase):
         for key in "repeated_samples", "undecided_samples":
             self.assertEqual(resumed[key], whole[key])
         self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['repeated_samples']} samples repeated in double, ")
+
+    @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
+    def test_failing_devices(self):
+        """With none left the checkpoint stays, and only what it lacks is rendered."""
+        subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "failing.so"], input=FAILING, text=True, check=True)
+        for devices, env in ("", POCL), ("--device all", TWO):
+            preloaded = env | {"LD_PRELOAD": os.path.abspath("failing.so")}
+            process = self.glint(f"{RENDER} {devices} -o image.npy --checkpoint saved", 2, env=preloaded)
+            self.assertRegex(process.stderr, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
+            self.assertIn("run the same command again to continue", process.stderr)
+            self.assertFalse(os.path.exists("image.npy"))
+            saved = self.share_saved()
+            self.assertTrue(0 < saved < 1)
+            self.assertAlmostEqual(self.go_on(devices, env), 1 - saved)
+            os.remove("image.npy")
 
     def test_another_device(self):
         """At strict any device may go on."""
