@@ -41,7 +41,7 @@ struct ImageOutput {
     double seconds;
 
     RepeatCounts repeats; // of all bands so far
-    // All bands, where what came of all of them is noted before their pixels.
+    // All bands, where their counts are noted before their pixels.
     struct {
         Film *items;
         size_t count, capacity;

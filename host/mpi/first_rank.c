@@ -240,7 +240,8 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
         RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
         if (command) {
             render_command_choose_device(command, 0);
-            render_command_run_from(command, frames_deal(command, other_count), &ranks);
+            render_command_run_from(command, frames_deal(command, other_count, argument_count, arguments),
+                                    &ranks);
             status = render_command_close(command);
         }
     }

@@ -4,7 +4,6 @@
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
-#include "host/base/text.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/mpi/messages.h"
@@ -29,21 +28,36 @@ static int frame_render(RenderCommand *command, size_t frame)
 
 enum { MARKER_BYTES = 4096 };
 
-// Of the scenes' names and files: the same for two ranks only if they see the same files.
-static uint64_t files_hash(const RenderCommand *command)
+// What a rank was called with. glint-mpi's own name and its command's are not among them.
+typedef struct {
+    int argument_count;
+    char **arguments;
+} Call;
+
+// Of the arguments, the scenes' files and the images' names: the same for two ranks only if both render the
+// same and see the same files.
+static uint64_t files_hash(const RenderCommand *command, Call call)
 {
     uint64_t hash = HASH_START;
+    for (int i = 2; i < call.argument_count; i++)
+        hash = hash_bytes(hash, call.arguments[i], strlen(call.arguments[i]) + 1);
     for (size_t i = 0; i < render_command_count(command); i++) {
         const char *scene = render_command_scene(command, i), *path = render_command_path(command, i);
         struct stat file = {0};
         if (stat(scene, &file) != 0) file.st_size = -1;
         const uint64_t facts[] = {file.st_ino, (uint64_t)file.st_size, (uint64_t)file.st_mtim.tv_sec,
                                   (uint64_t)file.st_mtim.tv_nsec};
-        hash = hash_bytes(hash, scene, strlen(scene) + 1);
         hash = hash_bytes(hash, path, strlen(path) + 1);
         hash = hash_bytes(hash, facts, sizeof facts);
     }
     return hash;
+}
+
+static bool reads_standard_input(const RenderCommand *command)
+{
+    for (size_t i = 0; i < render_command_count(command); i++)
+        if (strcmp(render_command_scene(command, i), "-") == 0) return true;
+    return false;
 }
 
 // A new file in the images' folder; its name is empty where there can be none.
@@ -61,16 +75,16 @@ static void marker_make(const RenderCommand *command, char *name)
 
 // All ranks call it; `command` is NULL where the arguments could not be read. True: all see the scenes and
 // the images' folder.
-static bool files_are_shared(RenderCommand *command, bool is_first)
+static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
 {
     char marker[MARKER_BYTES] = "";
-    const uint64_t own = command ? files_hash(command) : 0;
+    const uint64_t own = command ? files_hash(command, call) : 0;
     uint64_t hash = own;
     if (is_first) marker_make(command, marker);
     broadcast(marker, sizeof marker, MPI_COMM_WORLD);
     broadcast(&hash, sizeof hash, MPI_COMM_WORLD);
-    int sees = command && render_command_open_devices(command) && own == hash && marker[0] != '\0' &&
-               access(marker, F_OK) == 0,
+    int sees = command && !reads_standard_input(command) && render_command_open_devices(command) &&
+               own == hash && marker[0] != '\0' && access(marker, F_OK) == 0,
         all_see;
     MPI_Allreduce(&sees, &all_see, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     if (is_first && marker[0] != '\0') unlink(marker);
@@ -207,13 +221,13 @@ static void frames_serve(Deal *deal, size_t other_count)
     free(states);
 }
 
-size_t frames_deal(RenderCommand *command, size_t other_count)
+size_t frames_deal(RenderCommand *command, size_t other_count, int argument_count, char **arguments)
 {
     const size_t worker_count = other_count + 1, whole = render_command_count(command) / worker_count;
     if (other_count == 0 || whole == 0) return 0;
     Job job = {.kind = JOB_FRAMES};
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
-    if (!files_are_shared(command, true)) return 0;
+    if (!files_are_shared(command, (Call){argument_count, arguments}, true)) return 0;
     Deal deal = {.command = command, .end = whole * worker_count, .workers = worker_count};
     pthread_t thread;
     if (pthread_mutex_init(&deal.mutex, NULL) != 0) fault("out of memory: mutex");
@@ -262,7 +276,7 @@ void frames_work(size_t local_rank, int argument_count, char **arguments)
     int status;
     RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
     if (command) render_command_choose_device(command, local_rank);
-    if (files_are_shared(command, false)) {
+    if (files_are_shared(command, (Call){argument_count, arguments}, false)) {
         size_t frame;
         status = EXIT_DONE;
         end_received = false;

@@ -4,7 +4,7 @@
 
 #include "host/cli/render.h"
 
-// The first rank's side. Returns the first frame that is left.
-size_t frames_deal(RenderCommand *command, size_t other_count);
+// The first rank's side; the command is that of the arguments. Returns the first frame that is left.
+size_t frames_deal(RenderCommand *command, size_t other_count, int argument_count, char **arguments);
 // Another rank's.
 void frames_work(size_t local_rank, int argument_count, char **arguments);
