@@ -29,7 +29,7 @@ static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
     certain.place0 =
         ray->origin_error + (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
                                                      (real)(2) * vector_norm1(ray->origin) +
-                                                     (real)(24) * (certain.major + certain.minor));
+                                                     (real)(28) * (certain.major + certain.minor));
     certain.place1 =
         real_fma(ray->length, ray->direction_error, (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
     return certain;

@@ -57,9 +57,12 @@ static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
 
 static inline real box_slack(const Ray *ray, scalar4 bounds)
 {
-    real rounding = (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * bounds_max_norm1(ray->origin, bounds);
-    if (IS_CERTIFIED) return rounding + bounds_place_error(ray, bounds); // the exact hit lies in its box
-    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(ray->origin, bounds), rounding);
+    const real max_norm1 = bounds_max_norm1(ray->origin, bounds);
+    if (IS_CERTIFIED) // the exact hit lies in its box
+        return real_fma((real)(2 * BOX_ROUNDING_SLACK * UNIT_ROUNDOFF), max_norm1,
+                        bounds_place_error(ray, bounds));
+    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(ray->origin, bounds),
+                    (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
 }
 
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
