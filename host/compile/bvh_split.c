@@ -190,7 +190,7 @@ static void range_bin(void *context, size_t begin, size_t end)
 static void axis_sweep(const Bins *bins, int axis, int bin_count, Split *best)
 {
     float right_areas[BIN_COUNT];
-    uint32_t right_counts[BIN_COUNT];
+    uint32_t right_counts[BIN_COUNT] = {0};
     BuildBox box = empty_box;
     uint32_t count = 0;
     for (int bin = bin_count - 1; bin > 0; bin--) {

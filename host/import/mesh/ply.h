@@ -3,7 +3,8 @@
 
 #include "host/import/mesh/draft.h"
 
-// Text of the file, without a terminating NUL.
+// Text of the file, without a terminating NUL: words of a header's or body's line, or binary numbers. Unlike
+// in scan.h's lines, `#` and `\` stand for themselves, and any byte may follow.
 typedef struct {
     const char *at, *end;
 } PlySpan;
