@@ -226,6 +226,13 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
+#if defined(MASK_BITS) && LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
+#define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)
+#elif defined(MASK_BITS) && LANES == 8 && !IS_DOUBLE && defined(__AVX512VL__) &&                             \
+    __has_builtin(__builtin_ia32_rcp14ps256_mask)
+#define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps256_mask(a, a, 0xff)
+#endif
+
 // The mask as bits, lane 0 lowest.
 static inline uint lanes_bits(mask condition)
 {

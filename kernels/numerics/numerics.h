@@ -84,6 +84,19 @@ static inline real real_divide(real a, real b)
     return lanes_select(ordinary, repaired_quotient(a, b), quotient);
 }
 
+// 1 / a within 2.5 ulp, as devices may divide, for tests with slack; a and the result are normal. On AVX-512
+// an estimate of 14 bits and a Newton step, a third of the time of a division.
+static inline real reciprocal_estimate(real a)
+{
+#if defined(RECIPROCAL_14_BITS)
+    if (!PERTURB) {
+        real estimate = RECIPROCAL_14_BITS(a);
+        return real_fma(real_fma(-a, estimate, (real)(1)), estimate, estimate);
+    }
+#endif
+    return device_divide((real)(1), a);
+}
+
 // Whether |a / b| < 1 / SMALLEST_RATIO, without dividing. Scales b: of the height of a shadow ray's start
 // above its own plane the product with SMALLEST_RATIO is subnormal, which costs x86 processors more than a
 // hundred cycles.

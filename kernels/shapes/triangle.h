@@ -154,9 +154,10 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
     Vector max_abs = corners_max_abs((Corners){a, b, c});
     real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(max_abs);
     real t = accurate_t;
-    t = interval_clamp(triangle_slab(a.x, b.x, c.x, slack, ray->inverse.x), t);
-    t = interval_clamp(triangle_slab(a.y, b.y, c.y, slack, ray->inverse.y), t);
-    t = interval_clamp(triangle_slab(a.z, b.z, c.z, slack, ray->inverse.z), t);
+    Vector inverse = HAS_BOXES ? ray->inverse : ray_inverse(ray);
+    t = interval_clamp(triangle_slab(a.x, b.x, c.x, slack, inverse.x), t);
+    t = interval_clamp(triangle_slab(a.y, b.y, c.y, slack, inverse.y), t);
+    t = interval_clamp(triangle_slab(a.z, b.z, c.z, slack, inverse.z), t);
     // the vertices' t are off by a few roundings of the largest product in them
     Vector along = ray->along;
     real t_error = (real)(4 * UNIT_ROUNDOFF) *

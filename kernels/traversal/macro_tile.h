@@ -92,7 +92,7 @@ static inline void macro_tile_set_reach(MacroTile *tile, uint packet, const Trav
 static inline real slope_inverse(real slope)
 {
     const real least = (real)(SLOPE_MIN);
-    return device_divide((real)(1), lanes_select(fabs(slope) >= least, slope, least));
+    return reciprocal_estimate(lanes_select(fabs(slope) >= least, slope, least));
 }
 
 // Adds a packet with active rays, unless one of its slopes is too large.
@@ -107,7 +107,7 @@ static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint pack
     real v = vector_along(ray->direction, frame->v_axis) * away;
     mask steep = (w <= zero) | (fabs(u) > SLOPE_MAX * w) | (fabs(v) > SLOPE_MAX * w);
     if (lanes_any(active & steep)) return;
-    real inverse = device_divide((real)(1), lanes_select(active, w, (real)(1)));
+    real inverse = reciprocal_estimate(lanes_select(active, w, (real)(1)));
     u = u * inverse;
     v = v * inverse;
     tile->w_per_u[packet] = slope_inverse(u);
@@ -181,8 +181,8 @@ static inline ProjectedBoxes project_boxes(const MacroTile *tile, global const s
     real v_high = real_load(high + frame->v_axis * BVH_WIDTH) - (real)(frame->v) + slack;
     // a box that reaches back to the origin may be seen anywhere
     mask around = w_min <= slack;
-    real near_inverse = device_divide((real)(1), lanes_select(around, slack, w_min));
-    real far_inverse = device_divide((real)(1), lanes_select(w_max > slack, w_max, slack));
+    real near_inverse = reciprocal_estimate(lanes_select(around, slack, w_min));
+    real far_inverse = reciprocal_estimate(lanes_select(w_max > slack, w_max, slack));
     const real anywhere = (real)(LARGEST);
     ProjectedBoxes projected;
     projected.u_min.all =

@@ -29,8 +29,7 @@ typedef struct {
     // by ray_prepare: a bound on the length of across_u and across_v, and on the error of a triangle's corner
     // in the frame if it is no farther from the origin than `size`: across_error0 + across_error1 size
     real across_length, across_error0, across_error1;
-    // by ray_prepare: 1 / direction, huge where the component is 0
-    Vector inverse;
+    Vector inverse; // by ray_prepare, for boxes: 1 / direction
     // for triangles: two vectors across the direction, of length O(1) since they are computed from a
     // direction scaled by a power of two, and one along it, whose product with a point seen from the origin
     // is the point's t
@@ -126,16 +125,23 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     return ray;
 }
 
+// 1 / direction, huge where a component is 0.
+static inline Vector ray_inverse(const Ray *ray)
+{
+    Vector d = ray->direction;
+    return (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
+}
+
 // Of a triangle's corner, in u of its distance: its own rounding, that of the difference from the ray's
 // start, and those of two products.
 enum { TRIANGLE_ERROR = 5 };
 
-// Computes what boxes, triangles and the BVH need. Lazy and idempotent: called before the BVH is traversed
-// and before boxes and triangles outside it are tested.
+// Computes what boxes and triangles need. Lazy and idempotent: called before leaves of the BVH, and boxes and
+// triangles outside it, are tested.
 static inline void ray_prepare(Ray *ray)
 {
     Vector d = ray->direction;
-    ray->inverse = (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
+    if (HAS_BOXES) ray->inverse = ray_inverse(ray);
     if (!HAS_TRIANGLES) return;
     real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
     real scale = real_inverse_power_of_two(largest);
