@@ -12,6 +12,7 @@ typedef struct {
     uint32_t maximum;
     unsigned shift;    // bits of a float below the bucket index
     uint32_t first;    // bucket of thresholds[1]
+    float least;       // in that bucket
     float *thresholds; // [k]: the least float that gives k
     uint16_t *starts;  // [bucket - first]: the display value of the bucket's least float
 } Curve;
@@ -44,6 +45,8 @@ static void curve_prepare(Curve *curve, uint32_t maximum, unsigned bucket_bits)
     // A positive float's upper bits, which order floats, are its bucket: several per power of two.
     curve->shift = 23 - bucket_bits;
     curve->first = float_bits(curve->thresholds[1]) >> curve->shift;
+    const uint32_t least_bits = curve->first << curve->shift;
+    memcpy(&curve->least, &least_bits, sizeof curve->least);
     uint32_t end = float_bits(1.0F) >> curve->shift;
     curve->starts = memory_allocate(end - curve->first, sizeof *curve->starts);
     uint32_t display = 0;
@@ -99,8 +102,25 @@ uint32_t image_quantize(float value, Transfer transfer, unsigned bits)
                                      : linear_quantize(value, bits == 8 ? 255 : 65535);
 }
 
+// Display values of 8 bits have at most one threshold in a bucket, so that no branch depends on the value.
+static void srgb_quantize_8(uint8_t *bytes, const float *values, size_t count)
+{
+    const Curve *curve = curve_of(8);
+    const float largest = 0x1.fffffep-1F;
+    for (size_t i = 0; i < count; i++) {
+        float value = values[i] > curve->least ? values[i] : curve->least; // NaN too
+        value = value < largest ? value : largest;
+        const uint32_t display = curve->starts[(float_bits(value) >> curve->shift) - curve->first];
+        bytes[i] = (uint8_t)(display + (value >= curve->thresholds[display + 1]));
+    }
+}
+
 void transfer_quantize(uint8_t *bytes, const float *values, size_t count, Transfer transfer, unsigned bits)
 {
+    if (transfer == TRANSFER_SRGB && bits == 8) {
+        srgb_quantize_8(bytes, values, count);
+        return;
+    }
     const Curve *curve = curve_of(bits);
     for (size_t i = 0; i < count; i++) {
         uint32_t display = transfer == TRANSFER_SRGB ? curve_quantize(curve, values[i])
