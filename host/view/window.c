@@ -230,6 +230,9 @@ static bool window_open(Window *window)
     const ImageSize usual = {1280, 720};
     ImageSize size = size_fit(options->size.width > 0 ? options->size : usual);
     SDL_SetHint(SDL_HINT_RENDER_SCALE_QUALITY, "linear");
+    // where SDL draws in software, OpenGL is software too, and slower; SDL would open the window a second
+    // time for it
+    SDL_SetHintWithPriority(SDL_HINT_FRAMEBUFFER_ACCELERATION, "0", SDL_HINT_DEFAULT);
     window->window =
         SDL_CreateWindow(scene_name(window), SDL_WINDOWPOS_UNDEFINED, SDL_WINDOWPOS_UNDEFINED,
                          (int)size.width, (int)size.height, SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
