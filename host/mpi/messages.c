@@ -1,7 +1,6 @@
 #include "host/mpi/messages.h"
 
-#include "host/base/fault.h"
-#include <stdlib.h>
+#include "host/base/memory.h"
 #include <time.h>
 
 void rest(void)
@@ -40,8 +39,7 @@ static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         FlatArray *array = &compiled->arrays[kind];
         const size_t size = array->count * array->layout.size;
-        if (!is_sender) array->items = aligned_alloc(64, (size + 127) / 64 * 64);
-        if (!array->items) fault("out of memory for %zu bytes of the scene", size);
+        if (!is_sender) array->items = memory_allocate_large(size);
         broadcast(array->items, size, ranks);
     }
 }
