@@ -73,8 +73,8 @@ static inline Tile band_tile(const Band *band, uint which)
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
     tile.index = y * (integer)((scalar_integer)band->width) + x;
     tile.width = band->width;
-    const uint item_width = MACRO_TILE_COLUMNS * TILE_WIDTH,
-               of_row = (band->width + item_width - 1) / item_width;
+    const uint item_width = MACRO_TILE_COLUMNS * TILE_WIDTH;
+    const uint of_row = (band->width + item_width - 1) / item_width;
     tile.number = ((uint)get_global_id(1) * of_row + (uint)get_global_id(0)) * TILES + which;
     integer cell = (integer)((scalar_integer)band->cell);
     tile.pixels.x = x * cell + (integer)((scalar_integer)band->first_x);

@@ -71,6 +71,21 @@ static inline real device_sqrt(real a)
     return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
 }
 
+// Of one number for all lanes.
+static inline scalar uniform_divide(scalar a, scalar b)
+{
+    if (!PERTURB) return a / b;
+    RealLanes quotient = {device_divide((real)(a), (real)(b))};
+    return quotient.each[0];
+}
+
+static inline scalar uniform_sqrt(scalar a)
+{
+    if (!PERTURB) return sqrt(a);
+    RealLanes root = {device_sqrt((real)(a))};
+    return root.each[0];
+}
+
 // Gives (1 - complement)^exponent, which kernels compute themselves except at `fast`, the error of a device's
 // own power function. Not at `strict`, whose bits are the same on every device.
 static inline real perturbed_power(real power, real complement, real exponent)

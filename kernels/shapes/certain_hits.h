@@ -49,7 +49,7 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
 {
     Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
-    real size = (real)((1 + 16 * UNIT_ROUNDOFF) / normal_and_inverse.w);
+    real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal_and_inverse.w));
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
     real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
                                                  (real)(2) * vector_norm1_along(unsigned_normal, point)) +
@@ -167,7 +167,7 @@ static inline scalar triangle_size(const Triangle *triangle)
 {
     scalar4 largest = fmax(fmax(fabs(triangle->a), fabs(triangle->b)), fabs(triangle->c));
     scalar squared = largest.x * largest.x + largest.y * largest.y + largest.z * largest.z;
-    return sqrt(squared) * (1 + 16 * UNIT_ROUNDOFF);
+    return uniform_sqrt(squared) * (1 + 16 * UNIT_ROUNDOFF);
 }
 
 // In the ray's frame a vertex is off by `error` along each axis, and so an edge function by twice that times
