@@ -1,10 +1,10 @@
 // What a command prints, writes and exits with where an OpenCL call fails or its driver crashes.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "tests/child.h"
 #include "tests/failing/calls.h"
-#include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>

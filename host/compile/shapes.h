@@ -1,4 +1,4 @@
-// What the host knows of each shape: one row a shape, in one file of shapes/.
+// What the host knows of each shape: one row per shape, in one file of shapes/.
 #pragma once
 
 #include "host/compile/compiled_scene.h"

@@ -1,5 +1,5 @@
-// What the reference knows of each shape: one row a shape, in one file of shapes/. Not for others than these
-// and reference.c.
+// What the reference knows of each shape: one row per shape, in one file of shapes/. Not for others than
+// these and reference.c.
 #pragma once
 
 #include "host/verify/reference.h"
@@ -22,7 +22,7 @@ void hit_reduce_margin(ReferenceHit *hit, Quad margin);
 // Offers the crossing of a disc, such as a cap; margins are those of its rim.
 void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ray, ReferenceHit *hit);
 
-// The members of that name.
+// Sets the surface's members of these names; the center is that of its bounds.
 void surface_measure(ReferenceSurface *surface, Vector3 center, double bounding_radius,
                      double feature_radius);
 void surface_add(ReferenceSurface *surface, Quad distance, Quad3 normal, Quad curvature_radius);
