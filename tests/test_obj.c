@@ -223,6 +223,11 @@ static void missing_materials_are_reported(void **state)
     assert_vector(material_of(&scene, 0)->color, 1, 0, 0);
     assert_vector(material_of(&scene, 1)->color, 0, 0, 1);
     scene_free(&scene);
+    // read once, however often it is named
+    file_write("a.mtl", "newmtl red\nKd 1 0 0\nKe 1 0 0\n");
+    scene = scene_of_obj("mtllib a.mtl\nmtllib ./a.mtl\nmtllib missing.mtl\nusemtl red\n" FACE,
+                         "a.mtl:3:1: warning: 'Ke' is not used\n");
+    scene_free(&scene);
     // what might wait or never end is not read
     unlink("a.mtl");
     assert_int_equal(symlink("/dev/null", "a.mtl"), 0);

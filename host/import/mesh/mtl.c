@@ -8,6 +8,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 typedef struct {
     char *name;
@@ -22,6 +23,10 @@ typedef struct {
         MtlMaterial *items;
         size_t count, capacity;
     } materials;
+    struct {
+        struct stat *items;
+        size_t count, capacity;
+    } files; // that were read
     // of the current file
     const char *path;
     Report report;
@@ -213,14 +218,27 @@ static void line_read(MtlReader *reader)
         unused_note(&reader->unused, &reader->report, word, "is not used");
 }
 
+// By whatever name.
+static bool file_was_read(const MtlReader *reader, const struct stat *file)
+{
+    for (size_t i = 0; i < reader->files.count; i++)
+        if (reader->files.items[i].st_dev == file->st_dev && reader->files.items[i].st_ino == file->st_ino)
+            return true;
+    return false;
+}
+
+// Once for each file, however often it is named.
 static bool library_read(MtlReader *reader, const char *path)
 {
+    struct stat file = {0};
+    if (stat(path, &file) == 0 && file_was_read(reader, &file)) return true;
     const SceneOptions *options = reader->draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);
     Text text = {0};
     MessageList ignored = {0}, messages = {0};
     const bool is_there = !file_obstacle(path) && text_read_file(&text, path, &ignored);
     if (is_there) {
+        array_push(reader->files, file);
         const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         reader->path = path;
         reader->report = report_open(&source, &messages);
@@ -351,4 +369,5 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
         free(reader.materials.items[i].image);
     }
     free(reader.materials.items);
+    free(reader.files.items);
 }
