@@ -30,7 +30,7 @@ OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconve
 LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
             $(shell pkg-config --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) \
-            -lm -lpthread -Wl,--export-dynamic-symbol=abort
+            -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
@@ -124,7 +124,7 @@ fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
 
 fuzz:
 	+$(MAKE) BUILD=$(BUILD)-fuzz CC='$(CLANG)' CFLAGS='-O1 -g -Wno-error' \
-	    sanitize='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all' $(BUILD)-fuzz/fuzz
+	    sanitize='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all -D__SANITIZE_ADDRESS__' $(BUILD)-fuzz/fuzz
 
 $(BUILD)/fuzz: $(fuzz_objects)
 	$(CC) $(OURS) $(CFLAGS) -fsanitize=fuzzer $(LDFLAGS) $^ $(LIBS) -o $@

@@ -164,19 +164,19 @@ static void test_crashes(void **state)
 #else
     static const char *const calls[] = {"clGetPlatformIDs", "clBuildProgram", "clWaitForEvents",
                                         "clGetProgramInfo"};
-    static const int signals[] = {SIGSEGV, SIGABRT};
+    static const int crashes[] = {SIGSEGV, SIGABRT, FAILED_ASSERTION};
     char folder[] = "/tmp/glint-test-XXXXXX";
     assert_non_null(mkdtemp(folder));
     crash_folder = folder; // an empty cache: no program comes from it
     for (size_t i = 0; i < sizeof calls / sizeof *calls; i++)
-        for (size_t k = 0; k < 2; k++) {
+        for (size_t k = 0; k < sizeof crashes / sizeof *crashes; k++) {
             bool is_complete = i == 3;
             char path[] = "/tmp/glint-test-XXXXXX.png", expected[80];
             assert_true(close(mkstemps(path, 4)) == 0);
             Command command = {command_render,
                                {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", path}};
             failing_call = calls[i];
-            crash = signals[k];
+            crash = crashes[k];
             ChildEnd end = child_run(command_fail, &command, sizeof command);
             snprintf(expected, sizeof expected, "glint: %s%s: the OpenCL driver %s",
                      is_complete ? "warning: " : "", calls[i], k ? "aborted" : "crashed");

@@ -1,5 +1,6 @@
 #include "host/base/fault.h"
 
+#include <assert.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -102,6 +103,14 @@ _Noreturn void abort(void)
     signal(SIGABRT, SIG_DFL);
     raise(SIGABRT);
     _exit(EXIT_MACHINE);
+}
+
+// Libc's calls another abort than the one above.
+// NOLINTNEXTLINE(bugprone-reserved-identifier): libc's name
+_Noreturn void __assert_fail(const char *assertion, const char *file, unsigned line, const char *function)
+{
+    fprintf(stderr, "%s:%u: %s: Assertion `%s' failed.\n", file, line, function, assertion);
+    abort();
 }
 
 void fault_catch_crashes(void)

@@ -10,11 +10,13 @@
 
 #define EVERY_CALL SIZE_MAX
 
+enum { FAILED_ASSERTION = -1 }; // of the driver, in place of a signal
+
 typedef struct {
     const char *call;  // the function that fails; NULL: none
     size_t index;      // at which of its calls, from 0, or EVERY_CALL
     bool returns_null; // with CL_SUCCESS
-    int crash;         // or the signal that ends the driver; 0: none
+    int crash;         // or the signal that ends the driver, or FAILED_ASSERTION; 0: none
     bool in_threads;   // only calls of other threads than the first are counted and fail
 } InjectedFailure;
 
