@@ -414,10 +414,13 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
 static void file_remove(const Checkpoint *checkpoint, MessageList *messages)
 {
     char *name = realpath(checkpoint->path, NULL);
-    int error = name || errno == ENOENT ? 0 : errno;
-    if (name && file_has_name(checkpoint->descriptor, AT_FDCWD, name) && unlink(name) != 0) error = errno;
+    int error = name ? 0 : errno;
+    if (name) {
+        errno = 0; // and stays so where another file has the name
+        if (!file_has_name(checkpoint->descriptor, AT_FDCWD, name) || unlink(name) != 0) error = errno;
+    }
     free(name);
-    if (error != 0)
+    if (error != 0 && error != ENOENT)
         message_add(messages, MESSAGE_WARNING, "cannot remove the checkpoint '%s': %s", checkpoint->path,
                     strerror(error));
 }
