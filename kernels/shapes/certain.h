@@ -108,10 +108,10 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
     // not where all of it is behind the start, or beyond the end
     real reach = ray->inverse_length * (radius + (real)(2) * (place + along));
-    mask behind = crossed.middle_t + reach<ray->tmin, beyond = crossed.middle_t - reach> ray->tmax *
-                                         (real)(1 + 64 * UNIT_ROUNDOFF);
+    real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
+    mask apart = (crossed.middle_t + reach < ray->tmin) | (crossed.middle_t - reach > end);
     crossed.certain = lanes & (squared > band);
-    crossed.perhaps = lanes & !((squared < -band) | behind | beyond);
+    crossed.perhaps = lanes & !((squared < -band) | apart);
     crossed.near_t = crossed.far_t = crossed.middle_error = crossed.t_error = (real)(0);
     if (!lanes_any(crossed.perhaps)) return crossed;
     // in t; where it is in doubt, of half the band: between 0 and that of twice the band

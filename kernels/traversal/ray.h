@@ -163,7 +163,7 @@ static inline void ray_prepare(Ray *ray)
 static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 {
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
-    if (IS_CERTIFIED) ray.length = ray.inverse_length = (real)(1 + 8 * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) ray.length = ray.inverse_length = (real)(1 + 16 * UNIT_ROUNDOFF);
     if (IS_COMPENSATED) return ray;
     ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
     return ray;
