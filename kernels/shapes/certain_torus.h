@@ -82,7 +82,7 @@ static inline Interval torus_bracket(const CertainTorus *torus, const Ray *ray, 
         point = torus_point(torus, ray, t);
         mask before = (point.distance > (real)(0)) == entering, certain = fabs(point.distance) > point.place;
         bracket.near = lanes_select(before & certain, real_max(bracket.near, t), bracket.near);
-        bracket.far = lanes_select(!before & certain, real_min(bracket.far, t), bracket.far);
+        bracket.far = lanes_select(certain & !before, real_min(bracket.far, t), bracket.far);
         low = lanes_select(before, t, low);
         high = lanes_select(before, high, t);
         real next = bracket_next(low, high, t, point.distance, point.slope);
