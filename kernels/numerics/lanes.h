@@ -226,11 +226,13 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-#if defined(MASK_BITS) && LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
+// Within 2^-14. MASK_BITS says that the compiler knows __has_builtin.
+#ifdef MASK_BITS
+#if LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
 #define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)
-#elif defined(MASK_BITS) && LANES == 8 && !IS_DOUBLE && defined(__AVX512VL__) &&                             \
-    __has_builtin(__builtin_ia32_rcp14ps256_mask)
+#elif LANES == 8 && !IS_DOUBLE && defined(__AVX512VL__) && __has_builtin(__builtin_ia32_rcp14ps256_mask)
 #define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps256_mask(a, a, 0xff)
+#endif
 #endif
 
 // The mask as bits, lane 0 lowest.
