@@ -102,7 +102,7 @@ typedef struct {
         size_t count, capacity;
     } again;
     size_t workers, dealt; // workers whose devices work, frames that are being rendered
-    bool has_ended, is_unfit;
+    bool has_ended;
 } Deal;
 
 // NO_FRAME: there is none now; later there may be where a rank fails that has one.
@@ -119,12 +119,13 @@ static size_t frame_take(Deal *deal)
     return frame;
 }
 
-// False: the worker's device failed; others render its frame, and then all that are left.
+// False: the worker's device failed, or does not fit the frame; others render it, and then all that are left.
+// A frame that does not fit the last worker's either is left out.
 static bool frame_note(Deal *deal, size_t frame, int status)
 {
     pthread_mutex_lock(&deal->mutex);
+    if (status == FRAME_UNFIT && deal->workers == 1) status = EXIT_USER;
     const bool works = status != EXIT_MACHINE && status != FRAME_UNFIT;
-    deal->is_unfit = deal->is_unfit || status == FRAME_UNFIT;
     deal->dealt--;
     if (works) {
         render_command_note(deal->command, status);
@@ -238,7 +239,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     free(deal.again.items);
     if (deal.workers == 0) {
         fprintf(stderr, "glint: no rank is left that can render\n");
-        render_command_note(command, deal.is_unfit ? EXIT_USER : EXIT_MACHINE);
+        render_command_note(command, EXIT_MACHINE);
     } else if (progress_interrupted()) {
         render_command_note(command, EXIT_INTERRUPTED);
     }
