@@ -53,33 +53,16 @@ static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, ui
 }
 
 #if IS_CERTIFIED
-// Sets a point's errors, of shapes that do not do it themselves; lanes that may be at an edge.
-static inline mask shape_set_errors(const Scene *scene, uint4 entry, const Ray *ray, real t, real place_error,
-                                    SurfacePoint *point)
+// Sets the errors of a point that a shape gives; returns the lanes that may be at an edge.
+static inline mask shape_set_errors(const Scene *scene, uint kind, uint index, const Ray *ray, real t,
+                                    real place_error, SurfacePoint *point)
 {
-    if (HAS_BOXES && entry.x == KIND_BOXES) {
-        Box box = scene->boxes[entry.y];
-        return box_edge_is_near(&box, point->position, point->normal, place_error + place_error);
+#define SHAPE_SET_ERRORS(feature, Type, name, names)                                                         \
+    if (HAS_##feature && kind == KIND_##feature) {                                                           \
+        Type shape = scene->names[index];                                                                    \
+        return name##_set_errors(&shape, ray, t, place_error, point);                                        \
     }
-    if (HAS_CYLINDERS && entry.x == KIND_CYLINDERS) {
-        Cylinder cylinder = scene->cylinders[entry.y];
-        const RoundSolid solid = round_of_revolution(&cylinder, false, ray);
-        return round_set_errors(&solid, cylinder.id.y, ray, t, place_error, point);
-    }
-    if (HAS_CONES && entry.x == KIND_CONES) {
-        Cone cone = scene->cones[entry.y];
-        const RoundSolid solid = round_of_revolution(&cone, true, ray);
-        return round_set_errors(&solid, cone.id.y, ray, t, place_error, point);
-    }
-    if (HAS_PARABOLOIDS && entry.x == KIND_PARABOLOIDS) {
-        Paraboloid paraboloid = scene->paraboloids[entry.y];
-        const RoundSolid solid = round_of_paraboloid(&paraboloid, ray);
-        return round_set_errors(&solid, paraboloid.id.y, ray, t, place_error, point);
-    }
-    if (HAS_TORI && entry.x == KIND_TORI) {
-        Torus torus = scene->tori[entry.y];
-        torus_set_errors(&torus, ray, t, point);
-    }
+    SHAPE_LIST(SHAPE_SET_ERRORS)
     return mask_none();
 }
 #endif
@@ -302,7 +285,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
         mask at_edge = mask_none();
 #if IS_CERTIFIED
-        at_edge = shape_set_errors(scene, entry, ray, hit->t, surface.place_error, &found.point);
+        at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
 #endif
         surface_point_replace(&point, found.lanes, &found.point);
         Material material = scene->materials[entry.z];

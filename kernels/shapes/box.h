@@ -2,6 +2,7 @@
 #ifndef BOX_H
 #define BOX_H
 
+#include "shapes/certain.h"
 #include "shapes/interval.h"
 #include "shapes/surface_point.h"
 
@@ -79,6 +80,68 @@ static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, rea
                      lanes_select(on_y, lanes_select(low_y, -one, one), zero),
                      lanes_select(on_z, lanes_select(low_z, -one, one), zero)};
     return surface_point_make(position, normal, zero);
+}
+
+// Where the ray is between two planes across an axis, of a box larger by `more`. ray_prepare sets `inverse`,
+// which is exact within 2 u.
+static inline Interval certain_slab(real low, real high, real more, real origin, real direction, real inverse)
+{
+    mask parallel = fabs(direction) <= (real)(SMALLEST_RATIO);
+    real from = low - origin, to = high - origin;
+    real a = from * inverse, b = to * inverse, more_t = more * fabs(inverse);
+    mask between = (from <= more) & (to >= -more);
+    real always = lanes_select(between, (real)(LARGEST / 4), (real)(-LARGEST / 4));
+    return (Interval){lanes_select(parallel, -always, real_min(a, b) - more_t),
+                      lanes_select(parallel, always, real_max(a, b) + more_t)};
+}
+
+static inline Interval certain_box(const Box *box, const Ray *ray, real more)
+{
+    Vector low = vector_of(box->low), high = vector_of(box->high), o = ray->origin, d = ray->direction;
+    Interval x = certain_slab(low.x, high.x, more, o.x, d.x, ray->inverse.x);
+    Interval y = certain_slab(low.y, high.y, more, o.y, d.y, ray->inverse.y);
+    Interval z = certain_slab(low.z, high.z, more, o.z, d.z, ray->inverse.z);
+    return (Interval){real_max(real_max(x.near, y.near), z.near), real_min(real_min(x.far, y.far), z.far)};
+}
+
+// The box enlarged contains the exact crossings' interval, the box shrunk lies within it.
+static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
+{
+    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, box->id.x, false);
+    Vector to_low = vector_subtract(vector_of(box->low), ray->origin),
+           to_high = vector_subtract(vector_of(box->high), ray->origin);
+    real distance = vector_norm1((Vector){real_max(fabs(to_low.x), fabs(to_high.x)),
+                                          real_max(fabs(to_low.y), fabs(to_high.y)),
+                                          real_max(fabs(to_low.z), fabs(to_high.z))});
+    real place = ray_place_error(ray, distance) +
+                 (real)(UNIT_ROUNDOFF)*real_fma((real)(8), distance, (real)(2) * vector_norm1(ray->origin));
+    Interval outer = certain_box(box, ray, place);
+    mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
+    if (!lanes_any(perhaps)) return certain_miss();
+    Interval inner = certain_box(box, ray, -place);
+    mask certain = perhaps & (inner.near < inner.far);
+    real never = (real)(LARGEST / 8);
+    real near_high = lanes_select(certain, inner.near, never);
+    CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
+    CertainHit far =
+        certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
+    // where it starts on a face, the other crossing counts
+    mask left = ray->left == (integer)((scalar_integer)box->id.x);
+    return certain_select(left & certain, far, certain_first(ray, near, near_high, far));
+}
+
+// Faces that meet at an edge have normals of their own: whether another one is as near as the error.
+static inline mask box_set_errors(const Box *box, const Ray *ray, real t, real place_error,
+                                  SurfacePoint *point)
+{
+    Vector position = point->position, normal = point->normal;
+    const real zero = (real)(0), error = place_error + place_error;
+    Vector low = vector_of(box->low), high = vector_of(box->high);
+    real x = real_min(fabs(position.x - low.x), fabs(position.x - high.x));
+    real y = real_min(fabs(position.y - low.y), fabs(position.y - high.y));
+    real z = real_min(fabs(position.z - low.z), fabs(position.z - high.z));
+    return ((normal.x == zero) & (x <= error)) | ((normal.y == zero) & (y <= error)) |
+           ((normal.z == zero) & (z <= error));
 }
 
 #endif

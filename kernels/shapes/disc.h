@@ -87,4 +87,39 @@ static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, 
     return plane_crossing_point(disc_foot(disc), disc->normal, ray, t);
 }
 
+// Its bounding sphere is missed by most; else the crossing with its plane lies within the rim, or not.
+static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
+{
+    Vector center = vector_of(disc->center_radius);
+    real radius = (real)(disc->center_radius.w);
+    CertainSphere bounding = certain_sphere(center, radius, ray, RAY_ACTIVE(ray));
+    mask lanes = bounding.perhaps & !ray_left_for_good(ray, disc->id.x, true);
+    if (!lanes_any(lanes)) return certain_miss();
+    real low, high;
+    mask crosses = certain_plane(disc_foot(disc), disc->normal, ray, &low, &high);
+    // nearly parallel to it: no nearer than the sphere
+    low = lanes_select(crosses, low, real_max(low, bounding.near_t - bounding.t_error));
+    high = lanes_select(crosses, high, bounding.far_t + bounding.t_error);
+    CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, low, high);
+    Vector f = vector_subtract(ray->origin, center);
+    Vector across = vector_fma(ray->direction, hit.t, f);
+    real moved = ray->length, path = moved * fabs(hit.t);
+    real place = ray_place_error(ray, path) + moved * ((real)(0.5f) * (hit.high - hit.low)) +
+                 (real)(UNIT_ROUNDOFF) *
+                     ((real)(4) * (vector_norm1(f) + path) + (real)(8) * radius + vector_norm1(ray->origin));
+    real squared = real_fma(radius, radius, -vector_dot(across, across));
+    real band = place * (radius + radius + place);
+    mask within = squared > band, beyond = crosses & (squared < -band);
+    hit = certain_restrict(hit, !beyond);
+    hit.doubt = hit.doubt | (hit.found & !within);
+    hit.found = hit.found & within;
+    return hit;
+}
+
+static inline mask disc_set_errors(const Disc *disc, const Ray *ray, real t, real place_error,
+                                   SurfacePoint *point)
+{
+    return mask_none();
+}
+
 #endif

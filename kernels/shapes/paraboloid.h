@@ -12,6 +12,7 @@
 #ifndef PARABOLOID_H
 #define PARABOLOID_H
 
+#include "shapes/certain_solid.h"
 #include "shapes/ends.h"
 #include "shapes/eye_power.h"
 #include "shapes/surface_point.h"
@@ -123,6 +124,48 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;
+}
+
+static inline RoundSolid round_of_paraboloid(const Paraboloid *shape, const Ray *ray)
+{
+    RoundSolid solid;
+    Round *round = &solid.round;
+    Vector axis = vector_of(shape->axis_end), apex = vector_of(shape->apex_k);
+    real inverse = real_divide((real)(1), vector_norm(axis));
+    solid.is_finite = shape->id.y & REVOLUTION_FINITE;
+    round->has_power = has_eye_power(shape->id);
+    round->curves = true;
+    round->foot = round->has_power ? vector_of(shape->foot_lift) : apex;
+    round->axis = vector_scale(axis, inverse);
+    round->radius = round->slope = (real)(0);
+    round->k = (real)(shape->apex_k.w) * inverse;
+    round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
+    round->power_scale = vector_norm1(round->foot);
+    round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, apex);
+    round->place0 = round_place0(ray, round->start, SLOPED_ROUND_ERROR);
+    round->place1 = round_place1(ray, SLOPED_ROUND_ERROR);
+    real lift = round->has_power ? (real)(shape->foot_lift.w) * inverse : (real)(0);
+    solid.high = (real)(shape->axis_end.w) * inverse;
+    solid.half_height = (real)(0.5f) * (solid.high + lift);
+    solid.low = solid.high - (real)(4) * solid.half_height; // well below the apex
+    solid.widest = solid.is_finite ? real_sqrt((real)(2) * solid.half_height * round->k) : round->k;
+    solid.middle = vector_fma(round->axis, solid.high - solid.half_height, round->foot);
+    if (!round->has_power)
+        round->place0 = round->place0 + (real)(16 * UNIT_ROUNDOFF) * (solid.widest + solid.half_height);
+    return solid;
+}
+
+static inline CertainHit paraboloid_certain_hit(const Paraboloid *shape, const Ray *ray)
+{
+    const RoundSolid solid = round_of_paraboloid(shape, ray);
+    return round_solid_hit(&solid, shape->id, false, ray);
+}
+
+static inline mask paraboloid_set_errors(const Paraboloid *shape, const Ray *ray, real t, real place_error,
+                                         SurfacePoint *point)
+{
+    const RoundSolid solid = round_of_paraboloid(shape, ray);
+    return round_set_errors(&solid, shape->id.y, ray, t, place_error, point);
 }
 
 #endif

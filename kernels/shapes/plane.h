@@ -2,6 +2,7 @@
 #ifndef PLANE_H
 #define PLANE_H
 
+#include "shapes/certain.h"
 #include "shapes/surface_point.h"
 
 // t = height / along where that is finite, tested without dividing; equal signs mean ahead of the ray.
@@ -48,6 +49,55 @@ static inline SurfacePoint plane_crossing_point(Vector point, scalar4 normal, co
 static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ray, real t)
 {
     return plane_crossing_point(vector_of(plane->point), plane->normal, ray, t);
+}
+
+// Where the line meets a plane, n . (p - o) / n . d; *low <= t <= *high where the result is set. Elsewhere it
+// may meet it at or beyond *low.
+static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const Ray *ray, real *low,
+                                 real *high)
+{
+    Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
+    real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
+    real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal_and_inverse.w));
+    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
+    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
+                                                 (real)(2) * vector_norm1_along(unsigned_normal, point)) +
+                        size * ray->origin_error;
+    real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
+                       size * (ray->length * ray->direction_error);
+    mask crosses = fabs(along) > (real)(8) * along_error;
+    real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
+    real t = height * inverse;
+    real t_error = (real)(1.2f) * real_fma(fabs(t), along_error, height_error) * fabs(inverse) +
+                   (real)(8 * UNIT_ROUNDOFF) * fabs(t);
+    *low = t - t_error;
+    *high = t + t_error;
+    if (lanes_all(crosses)) return crosses;
+    // nearly parallel: beyond the least distance over the greatest approach
+    real least = real_max(fabs(height) - height_error, (real)(0));
+    real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    mask moves = quotient_is_bounded(least, greatest);
+    real parallel_low =
+        lanes_select(moves, real_divide(least, lanes_select(moves, greatest, (real)(1))), (real)(LARGEST)) *
+        (real)(1 - 16 * UNIT_ROUNDOFF);
+    *low = lanes_select(crosses, *low, parallel_low);
+    *high = lanes_select(crosses, *high, (real)(LARGEST));
+    return crosses;
+}
+
+static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
+{
+    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, plane->id.x, true);
+    if (!lanes_any(lanes)) return certain_miss();
+    real low, high;
+    mask crosses = certain_plane(vector_of(plane->point), plane->normal, ray, &low, &high);
+    return certain_crossing(ray, lanes & crosses, lanes, low, high);
+}
+
+static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real place_error,
+                                    SurfacePoint *point)
+{
+    return mask_none();
 }
 
 #endif

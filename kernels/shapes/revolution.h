@@ -14,6 +14,7 @@
 #define REVOLUTION_H
 
 #include "shapes/box.h"
+#include "shapes/certain_solid.h"
 #include "shapes/ends.h"
 #include "shapes/eye_power.h"
 
@@ -412,6 +413,71 @@ static inline mask cone_hit(const Cone *cone, const Ray *ray, real *t)
 static inline SurfacePoint cone_surface_point(const Cone *cone, const Ray *ray, real t)
 {
     return revolution_surface_point(cone, true, ray, t);
+}
+
+static inline RoundSolid round_of_revolution(const Revolution *shape, bool sloped, const Ray *ray)
+{
+    RoundSolid solid;
+    Round *round = &solid.round;
+    Vector base = vector_of(shape->base_radius);
+    real inverse = real_divide((real)(1), (real)(shape->range.y));
+    solid.is_finite = shape->id.y & REVOLUTION_FINITE;
+    round->has_power = has_eye_power(shape->id);
+    round->curves = false;
+    round->foot = base;
+    round->axis = vector_scale(vector_of(shape->axis_slope), inverse);
+    round->radius = (real)(shape->base_radius.w) * inverse;
+    round->slope = sloped ? (real)(shape->axis_slope.w) : (real)(0);
+    round->k = (real)(0);
+    round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
+    round->power_scale = vector_norm1(base);
+    round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, base);
+    const uint units = sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR;
+    round->place0 = round_place0(ray, round->start, units);
+    round->place1 = round_place1(ray, units);
+    solid.low = (real)(shape->range.w) * inverse;
+    solid.high = (real)(shape->range.x) * inverse;
+    solid.half_height = (real)(0.5f) * (solid.high - solid.low);
+    solid.middle = vector_fma(round->axis, solid.low + solid.half_height, base);
+    solid.widest = round->radius;
+    if (solid.is_finite)
+        solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
+                                real_fma(round->slope, solid.high, round->radius));
+    if (round->has_power) return solid;
+    round->place0 = round->place0 + (real)(16 * UNIT_ROUNDOFF) * solid.widest;
+    if (!solid.is_finite) return solid;
+    // both ends are rounded as points, which turns the axis
+    Vector end = vector_fma(round->axis, solid.high, base);
+    real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
+    real turned = (real)(2) + divide_or(solid.widest, solid.half_height, (real)(0));
+    round->place0 = round->place0 + real_fma(moved, turned, (real)(16 * UNIT_ROUNDOFF) * solid.half_height);
+    return solid;
+}
+
+static inline CertainHit cylinder_certain_hit(const Cylinder *cylinder, const Ray *ray)
+{
+    const RoundSolid solid = round_of_revolution(cylinder, false, ray);
+    return round_solid_hit(&solid, cylinder->id, false, ray);
+}
+
+static inline mask cylinder_set_errors(const Cylinder *cylinder, const Ray *ray, real t, real place_error,
+                                       SurfacePoint *point)
+{
+    const RoundSolid solid = round_of_revolution(cylinder, false, ray);
+    return round_set_errors(&solid, cylinder->id.y, ray, t, place_error, point);
+}
+
+static inline CertainHit cone_certain_hit(const Cone *cone, const Ray *ray)
+{
+    const RoundSolid solid = round_of_revolution(cone, true, ray);
+    return round_solid_hit(&solid, cone->id, true, ray);
+}
+
+static inline mask cone_set_errors(const Cone *cone, const Ray *ray, real t, real place_error,
+                                   SurfacePoint *point)
+{
+    const RoundSolid solid = round_of_revolution(cone, true, ray);
+    return round_set_errors(&solid, cone->id.y, ray, t, place_error, point);
 }
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef SPHERE_H
 #define SPHERE_H
 
+#include "shapes/certain_solid.h"
 #include "shapes/eye_power.h"
 #include "shapes/quadratic.h"
 
@@ -138,8 +139,64 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
     SurfacePoint point =
         surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_norm1(center));
     if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
-    if (IS_CERTIFIED) point.curvature = real_divide((real)(1), radius);
     return point;
+}
+
+static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray)
+{
+    const real zero = (real)(0);
+    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
+    mask lanes = RAY_ACTIVE(ray) & !(left & ray->leaves_outward);
+    Round round;
+    round.start = ray->origin;
+    round.foot = vector_of(sphere->center_radius);
+    round.axis = (Vector){zero, zero, zero};
+    round.radius = (real)(sphere->center_radius.w);
+    round.slope = round.k = zero;
+    round.power = eye_power_of(sphere->id);
+    round.power_scale = vector_norm1(round.foot);
+    round.place0 = round_place0(ray, ray->origin, ROUND_ERROR);
+    round.place1 = round_place1(ray, ROUND_ERROR);
+    round.has_power = true;
+    round.curves = false;
+    real range = round_range(ray, round.power_scale + round.radius + vector_norm1(ray->origin));
+    CertainInterval side = round_interval(&round, ray, lanes, -range, range, false), slab = round_unbounded();
+    return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, left);
+}
+
+static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
+{
+    if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray);
+    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
+    mask lanes = RAY_ACTIVE(ray) & !(left & ray->leaves_outward);
+    if (!lanes_any(lanes)) return certain_miss();
+    CertainSphere crossed =
+        certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);
+    if (!lanes_any(crossed.perhaps)) return certain_miss();
+    real near_high = crossed.near_t + crossed.t_error, far_high = crossed.far_t + crossed.t_error;
+    CertainHit far =
+        certain_crossing(ray, crossed.certain, crossed.perhaps, crossed.far_t - crossed.t_error, far_high);
+    CertainHit hit = far;
+    if (!(sphere->id.y & IGNORES_FRONT_FACES)) {
+        CertainHit near = certain_crossing(ray, crossed.certain, crossed.perhaps,
+                                           crossed.near_t - crossed.t_error, near_high);
+        hit = certain_first(ray, near, near_high, far);
+    }
+    left = left & lanes;
+    if (lanes_any(left)) {
+        // one crossing is the start; the other lies twice as far as the closest point
+        real t = (real)(2) * crossed.middle_t, t_error = (real)(2.5f) * crossed.middle_error;
+        CertainHit other = certain_crossing(ray, left, left, t - t_error, t + t_error);
+        hit = certain_select(left, other, hit);
+    }
+    return hit;
+}
+
+static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real t, real place_error,
+                                     SurfacePoint *point)
+{
+    point->curvature = real_divide((real)(1), (real)(sphere->center_radius.w));
+    return mask_none();
 }
 
 #endif

@@ -1,14 +1,4 @@
-// Torus: the points at distance `minor` from a circle of radius `major`.
-//
-// Everything happens around the ray's closest approach to the center, where the quartic has no cubic term and
-// no large numbers: in s, the length along the ray from there, it is
-//     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
-// for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
-// The quartic's derivative only separates the intervals where the quartic is monotonic: in each the distance
-// to the surface, whose sign is the quartic's, has at most one zero. There the distance itself,
-//     sqrt((rho - R)^2 + z^2) - r,
-// which is exact to a few u where the quartic cancels, is solved for its one zero. All by + - * / sqrt and
-// bracketing, so that axis-parallel and equatorial rays need no case of their own.
+// Torus, from the ray's closest approach to the center (shapes/torus_line.h) or seen from the eye.
 //
 // With the eye's power the zeros are those of F / (2 r), F = (rho - R)^2 + z^2 - r^2, from the eye on: for a
 // point x from there, with the parts x_u along `radial`, x_v across it and x_w along the axis,
@@ -17,125 +7,10 @@
 #ifndef TORUS_H
 #define TORUS_H
 
+#include "shapes/certain.h"
 #include "shapes/eye_power.h"
 #include "shapes/surface_point.h"
-
-// The line s -> closest + s direction, |direction| = 1, in the torus' frame.
-typedef struct {
-    Vector closest_cross_axis, direction_cross_axis; // the first plus s times the second has the length rho
-    real height, rise;                               // z = height + s rise
-    real major, minor;
-} TorusLine;
-
-// The signed distance to the tube's surface, negative inside, and its derivative along the line.
-static inline real torus_distance(const TorusLine *line, real s, real *slope)
-{
-    Vector radial = vector_fma(line->direction_cross_axis, s, line->closest_cross_axis);
-    real rho = vector_norm(radial);
-    real z = real_fma(line->rise, s, line->height);
-    real radial_offset = rho - line->major;
-    real from_circle = real_sqrt(real_fma(radial_offset, radial_offset, z * z));
-    real rho_slope = vector_dot(radial, line->direction_cross_axis) * real_inverse_or_zero(rho);
-    *slope = real_fma(radial_offset, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
-    return from_circle - line->minor;
-}
-
-// The quartic's derivative, 4 s^3 + 2 p s + q.
-static inline real torus_cubic(real p, real q, real s, real *slope)
-{
-    *slope = real_fma((real)(12) * s, s, p + p);
-    return real_fma(real_fma((real)(4) * s, s, p + p), s, q);
-}
-
-// The next iterate within a bracket: Newton's step if it lies inside, else the middle.
-static inline real bracket_next(real low, real high, real s, real value, real slope)
-{
-    mask usable = quotient_is_bounded(value, slope);
-    real newton = s - real_divide(value, lanes_select(usable, slope, (real)(1)));
-    mask inside = usable & (newton > low) & (newton < high);
-    return lanes_select(inside, newton, (real)(0.5f) * (low + high));
-}
-
-// Steps enough to find all bits where Newton's method fails and the bracket is halved. Turning points need
-// fewer: they only have to separate the distance's zeros.
-enum { TORUS_ZERO_STEPS = IS_DOUBLE ? 60 : 30, TORUS_TURNING_STEPS = IS_DOUBLE ? 40 : 20 };
-
-// The bounding sphere's squared radius is taken this much larger: the ends of the line in it lie outside the
-// torus whatever is rounded.
-#define TORUS_ENLARGEMENT 1.001f
-
-// The cubic's zero between low and high if its signs differ there; else the end where it is nearer to 0.
-static inline real torus_turning_point(real p, real q, real low, real high)
-{
-    real slope;
-    real at_low = torus_cubic(p, q, low, &slope), at_high = torus_cubic(p, q, high, &slope);
-    mask crosses = (at_low < (real)(0)) != (at_high < (real)(0));
-    mask rising = at_low < (real)(0);
-    real end = lanes_select(fabs(at_low) < fabs(at_high), low, high);
-    real s = (real)(0.5f) * (low + high);
-    for (uint i = 0; i < TORUS_TURNING_STEPS; i++) {
-        real value = torus_cubic(p, q, s, &slope);
-        mask before = (value < (real)(0)) == rising;
-        low = lanes_select(before, s, low);
-        high = lanes_select(before, high, s);
-        s = bracket_next(low, high, s, value, slope);
-    }
-    return lanes_select(crosses, s, end);
-}
-
-// The zero of the distance in a bracket where its signs differ.
-static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
-{
-    real s = (real)(0.5f) * (low + high);
-    for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
-        real slope;
-        real value = torus_distance(line, s, &slope);
-        mask before = (value > (real)(0)) == entering;
-        low = lanes_select(before, s, low);
-        high = lanes_select(before, high, s);
-        real next = bracket_next(low, high, s, value, slope);
-        if (lanes_all(next == s)) break;
-        s = next;
-    }
-    return s;
-}
-
-// The ray's closest point to the center, relative to the center, and its t.
-static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *closest_t)
-{
-    Vector center = vector_of(torus->center_major);
-    if (IS_COMPENSATED) {
-        PairVector f = pair_vector_difference(ray->origin, center);
-        Vector moment = pair_vector_high(pair_vector_cross(f, ray->direction));
-        Pair squared = pair_vector_dot(pair_vector_of(ray->direction), pair_vector_of(ray->direction));
-        *closest_t = -real_divide(pair_vector_dot_vector(f, ray->direction).high, squared.high);
-        return vector_scale(vector_cross(ray->direction, moment), ray->inverse_squared);
-    }
-    Vector f = vector_subtract(ray->origin, center);
-    *closest_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
-    return vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
-}
-
-// The ends of the line in the bounding sphere, and in between the zeros of the quartic's derivative: between
-// neighbors the distance has at most one zero. The derivative's turning points, +-sqrt(-p / 6), separate its
-// zeros.
-enum { TORUS_BREAKS = 5 };
-
-static inline void torus_breaks(const TorusLine *line, real squared_distance, real span,
-                                real breaks[TORUS_BREAKS])
-{
-    real k = real_fma(line->major, line->major, squared_distance) - line->minor * line->minor;
-    real squared_major = line->major * line->major;
-    real p = real_fma((real)(-4) * squared_major,
-                      vector_dot(line->direction_cross_axis, line->direction_cross_axis), k + k);
-    real q = (real)(8) * squared_major * line->height * line->rise;
-    real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
-    breaks[0] = -span;
-    breaks[1] = torus_turning_point(p, q, -span, -bend);
-    breaks[2] = torus_turning_point(p, q, -bend, bend);
-    breaks[3] = torus_turning_point(p, q, bend, span);
-    breaks[4] = span;
-}
+#include "shapes/torus_line.h"
 
 // The tube seen from the eye.
 typedef struct {
@@ -335,6 +210,182 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
     SurfacePoint point = surface_point_make(position, normal, size);
     if (!IS_FAST && has_eye_power(torus->id)) surface_point_move_to_ray(&point, ray, t, size);
     return point;
+}
+
+// Hits with bounds. The quartic's derivative separates intervals where the distance to the tube has at most
+// one zero; the distance at their ends and around its zero, beyond all errors, says what is certain.
+typedef struct {
+    Vector start, axis; // the ray's origin, seen from the center
+    real major, minor;
+    real place0, place1; // a point at t is off by place0 + place1 |t|
+} CertainTorus;
+
+typedef struct {
+    real distance, slope, rho, place;
+} TorusPoint;
+
+static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
+{
+    CertainTorus certain;
+    certain.start = vector_subtract(ray->origin, vector_of(torus->center_major));
+    certain.axis = vector_of(torus->axis_minor);
+    certain.major = (real)(torus->center_major.w);
+    certain.minor = (real)(torus->axis_minor.w);
+    certain.place0 =
+        ray->origin_error + (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
+                                                     (real)(2) * vector_norm1(ray->origin) +
+                                                     (real)(28) * (certain.major + certain.minor));
+    certain.place1 =
+        real_fma(ray->length, ray->direction_error, (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
+    return certain;
+}
+
+static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, real t)
+{
+    TorusPoint point;
+    Vector x = vector_fma(ray->direction, t, torus->start);
+    real z = vector_dot(torus->axis, x), rise = vector_dot(torus->axis, ray->direction);
+    Vector across = vector_fma(torus->axis, -z, x);
+    point.rho = vector_norm(across);
+    real off = point.rho - torus->major, from_circle = real_sqrt(real_fma(off, off, z * z));
+    real rho_slope = vector_dot(across, ray->direction) * real_inverse_or_zero(point.rho);
+    point.slope = real_fma(off, rho_slope, z * rise) * real_inverse_or_zero(from_circle);
+    point.distance = from_circle - torus->minor;
+    point.place = real_fma(torus->place1, fabs(t), torus->place0);
+    return point;
+}
+
+// How fast the normal turns along the surface, at most.
+static inline real torus_curvature(const CertainTorus *torus, real rho)
+{
+    real least = real_min(rho, torus->minor);
+    mask flat = least > (real)(SMALLEST_RATIO);
+    return lanes_select(flat, real_divide((real)(2), lanes_select(flat, least, (real)(1))),
+                        (real)(1 / SMALLEST_RATIO));
+}
+
+// A ray that starts on the torus: until when it cannot return, 0 if that is unknown. Within half of the
+// smaller radius the distance bends by no more than 2 over that.
+static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
+{
+    TorusPoint start = torus_point(torus, ray, (real)(0));
+    real curvature = torus_curvature(torus, start.rho), cosine = fabs(start.slope) * ray->inverse_length;
+    real error =
+        real_fma((real)(2) * start.place, curvature, ray->direction_error) + (real)(32 * UNIT_ROUNDOFF);
+    real least = real_divide((real)(2), curvature);
+    mask known = cosine > (real)(4) * error;
+    return lanes_select(known, (real)(0.5f) * cosine * least * ray->inverse_length, (real)(0));
+}
+
+// Narrows a bracket at whose ends the exact ray is certainly on different sides.
+static inline Interval torus_bracket(const CertainTorus *torus, const Ray *ray, Interval bracket,
+                                     mask entering)
+{
+    real low = bracket.near, high = bracket.far, t = (real)(0.5f) * (low + high);
+    TorusPoint point;
+    for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
+        point = torus_point(torus, ray, t);
+        mask before = (point.distance > (real)(0)) == entering, certain = fabs(point.distance) > point.place;
+        bracket.near = lanes_select(before & certain, real_max(bracket.near, t), bracket.near);
+        bracket.far = lanes_select(certain & !before, real_min(bracket.far, t), bracket.far);
+        low = lanes_select(before, t, low);
+        high = lanes_select(before, high, t);
+        real next = bracket_next(low, high, t, point.distance, point.slope);
+        mask settled = !certain | (fabs(next - t) * fabs(point.slope) <= (real)(0.25f) * point.place);
+        next = lanes_select(settled, t, next);
+        if (lanes_all(next == t)) break;
+        t = next;
+    }
+    mask steep = fabs(point.slope) * ray->inverse_length > (real)(0x1p-10f);
+    real width = real_divide((real)(2.5f) * point.place, lanes_select(steep, fabs(point.slope), (real)(1)));
+    const real sides[2] = {t - width, t + width};
+    for (uint i = 0; i < 2; i++) {
+        TorusPoint side = torus_point(torus, ray, sides[i]);
+        mask certain =
+            steep & (fabs(side.distance) > side.place) & (sides[i] > bracket.near) & (sides[i] < bracket.far);
+        mask before = (side.distance > (real)(0)) == entering;
+        bracket.near = lanes_select(certain & before, sides[i], bracket.near);
+        bracket.far = lanes_select(certain & !before, sides[i], bracket.far);
+    }
+    return bracket;
+}
+
+static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
+{
+    const CertainTorus certain = certain_torus(torus, ray);
+    const real radius = certain.major + certain.minor;
+    CertainSphere bounding = certain_sphere(vector_of(torus->center_major),
+                                            radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
+    real from = bounding.near_t - bounding.t_error, to = bounding.far_t + bounding.t_error;
+    mask lanes = bounding.perhaps & (to >= ray->tmin);
+    if (!lanes_any(lanes)) return certain_miss();
+
+    Vector closest = vector_fma(ray->direction, bounding.middle_t, certain.start);
+    Vector direction = vector_scale(ray->direction, ray->inverse_length);
+    real squared_distance = vector_dot(closest, closest);
+    real half_chord_squared = real_fma(radius * (real)(TORUS_ENLARGEMENT), radius, -squared_distance);
+    TorusLine line = {vector_cross(closest, certain.axis),
+                      vector_cross(direction, certain.axis),
+                      vector_dot(closest, certain.axis),
+                      vector_dot(direction, certain.axis),
+                      certain.major,
+                      certain.minor};
+    real breaks[TORUS_BREAKS];
+    torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
+
+    mask left = ray->left == (integer)((scalar_integer)torus->id.x);
+    real start = real_max(from, ray->tmin), departure = torus_departure(&certain, ray);
+    start = lanes_select(left, departure, start);
+    TorusPoint point = torus_point(&certain, ray, start);
+    // a break is a turning point within rounding, whose distance that moves by less than this part of it
+    const real margin = real_fma(radius, real_divide((real)(0.125f), certain.minor), (real)(2));
+    mask outside = lanes_select(left, ray->leaves_outward, point.distance > (real)(0));
+    mask known = fabs(point.distance) > point.place;
+    known = lanes_select(left, known & (departure > (real)(0)) & (outside == (point.distance > (real)(0))),
+                         known);
+    mask enters = !left & (from > ray->tmin);
+    outside = outside | enters;
+    known = known | enters;
+
+    CertainHit hit = certain_miss();
+    real before = start;
+    mask open = lanes;
+    for (uint i = 1; i < TORUS_BREAKS; i++) {
+        bool is_last = i + 1 == TORUS_BREAKS;
+        real after = is_last ? to : real_min(real_fma(breaks[i], ray->inverse_length, bounding.middle_t), to);
+        after = real_max(after, before);
+        point = torus_point(&certain, ray, after);
+        mask after_outside = point.distance > (real)(0),
+             after_known = fabs(point.distance) > margin * point.place;
+        if (is_last) after_outside = after_known = mask_all();
+        mask same_place = after == before; // before the start
+        after_outside = lanes_select(same_place, outside, after_outside);
+        after_known = lanes_select(same_place, known, after_known);
+        mask doubt = open & !(known & after_known), crosses = open & !doubt & (outside != after_outside);
+        if (lanes_any(crosses)) {
+            Interval bracket = torus_bracket(&certain, ray, (Interval){before, after}, outside);
+            CertainHit crossing = certain_crossing(ray, crosses, crosses, bracket.near, bracket.far);
+            hit = certain_select(crosses, crossing, hit);
+        }
+        CertainHit doubtful = certain_crossing(ray, mask_none(), doubt, before, to);
+        hit = certain_select(doubt, doubtful, hit);
+        open = open & !doubt & !crosses;
+        if (!lanes_any(open)) break;
+        before = after;
+        outside = after_outside;
+        known = after_known;
+    }
+    return hit;
+}
+
+static inline mask torus_set_errors(const Torus *torus, const Ray *ray, real t, real place_error,
+                                    SurfacePoint *point)
+{
+    const CertainTorus certain = certain_torus(torus, ray);
+    const TorusPoint at = torus_point(&certain, ray, t);
+    point->curvature = torus_curvature(&certain, at.rho);
+    point->normal_error = (real)(4) * at.place * point->curvature;
+    return mask_none();
 }
 
 #endif

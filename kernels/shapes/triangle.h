@@ -8,6 +8,7 @@
 #ifndef TRIANGLE_H
 #define TRIANGLE_H
 
+#include "shapes/certain.h"
 #include "shapes/interval.h"
 #include "shapes/plane.h"
 
@@ -255,6 +256,105 @@ static inline void triangle_smooth(Corners normals, TriangleWeights weights, Sur
     Vector normal = triangle_blend(weights, normals);
     mask bends = vector_dot(normal, normal) > (real)(0);
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
+}
+
+// No vertex is farther from the origin.
+static inline scalar triangle_size(const Triangle *triangle)
+{
+    scalar4 largest = fmax(fmax(fabs(triangle->a), fabs(triangle->b)), fabs(triangle->c));
+    scalar squared = largest.x * largest.x + largest.y * largest.y + largest.z * largest.z;
+    return uniform_sqrt(squared) * (1 + 16 * UNIT_ROUNDOFF);
+}
+
+// In the ray's frame a vertex is off by `error` along each axis, and so an edge function by twice that times
+// the coordinates it is made of. t is between those of the vertices, weighted by the edge functions.
+static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
+{
+    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, triangle->id.x, true);
+    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
+    TriangleEdges edges = triangle_edges(corners, ray);
+    Vector u = ray->across_u, v = ray->across_v;
+    real size = (real)(triangle_size(triangle)),
+         error = real_fma(ray->across_error1, size, ray->across_error0);
+    real ax = vector_dot(edges.a, u), ay = vector_dot(edges.a, v);
+    real bx = vector_dot(edges.b, u), by = vector_dot(edges.b, v);
+    real cx = vector_dot(edges.c, u), cy = vector_dot(edges.c, v);
+    real a_sum = fabs(ax) + fabs(ay) + error, b_sum = fabs(bx) + fabs(by) + error,
+         c_sum = fabs(cx) + fabs(cy) + error;
+    // first by what all three are off by together
+    real edge_error = (error + error) * (a_sum + b_sum + c_sum);
+    real highest = real_max(real_max(edges.u, edges.v), edges.w),
+         lowest = real_min(real_min(edges.u, edges.v), edges.w);
+    mask perhaps = lanes & !((highest > edge_error) & (lowest < -edge_error));
+    if (!lanes_any(perhaps)) return certain_miss();
+    // then by each one's own errors, by its distance from the ray's start
+    real distance = vector_norm(corners_max_abs((Corners){edges.a, edges.b, edges.c}));
+    real place = ray_place_error(ray, distance) +
+                 (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, size);
+    error = real_min(error, place * ray->across_length);
+    real u_error = error * (b_sum + c_sum), v_error = error * (c_sum + a_sum),
+         w_error = error * (a_sum + b_sum);
+    edge_error = u_error + v_error + w_error;
+    highest = real_max(real_max(edges.u - u_error, edges.v - v_error), edges.w - w_error);
+    lowest = real_min(real_min(edges.u + u_error, edges.v + v_error), edges.w + w_error);
+    mask misses = ((highest > (real)(0)) & (lowest < (real)(0))) | (real_min(real_min(ax, bx), cx) > error) |
+                  (real_max(real_max(ax, bx), cx) < -error) | (real_min(real_min(ay, by), cy) > error) |
+                  (real_max(real_max(ay, by), cy) < -error);
+    perhaps = perhaps & !misses;
+    if (!lanes_any(perhaps)) return certain_miss();
+    mask all_above = (edges.u > u_error) & (edges.v > v_error) & (edges.w > w_error);
+    mask all_below = (edges.u < -u_error) & (edges.v < -v_error) & (edges.w < -w_error);
+    mask certain = perhaps & (all_above | all_below);
+
+    real a_t = vector_dot(edges.a, ray->along), b_t = vector_dot(edges.b, ray->along),
+         c_t = vector_dot(edges.c, ray->along);
+    real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
+    real vertex_error = ray->inverse_length * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
+    // in doubt as well: if it is hit, then where the weights say
+    mask narrows = perhaps & (fabs(edges.determinant) > (real)(8) * edge_error);
+    real inverse = real_divide((real)(1), lanes_select(narrows, edges.determinant, (real)(1)));
+    real t = c_t + real_fma(a_t - c_t, edges.u * inverse, (b_t - c_t) * (edges.v * inverse));
+    real part = (real)(2.5f) * edge_error * fabs(inverse); // of all weights
+    real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
+                   real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
+    low = low - vertex_error;
+    high = high + vertex_error;
+    low = lanes_select(narrows, real_max(low, t - t_error), low);
+    high = lanes_select(narrows, real_min(high, t + t_error), high);
+    return certain_crossing(ray, certain, perhaps, low, high);
+}
+
+// How much longer than high a triangle is at least, over its length: a vertex that moves by e turns the
+// normal by e times this at most, and a point that does moves its weights by as much.
+static inline real triangle_slimness(Corners corners)
+{
+    Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
+           bc = vector_subtract(corners.c, corners.b);
+    Vector across = vector_cross(ab, ac);
+    real longest_squared = real_max(real_max(vector_dot(ab, ab), vector_dot(ac, ac)), vector_dot(bc, bc)),
+         area_squared = vector_dot(across, across);
+    return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
+}
+
+// The errors of the normals: each vertex is off by u of its length, and where normals are blended the weights
+// move with the place.
+static inline void triangle_set_normal_errors(Corners corners, Corners normals, TriangleWeights weights,
+                                              SurfacePoint *point)
+{
+    real slimness = triangle_slimness(corners);
+    real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
+    Vector ab = vector_subtract(normals.a, normals.b), bc = vector_subtract(normals.b, normals.c);
+    real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
+    Vector blend = triangle_blend(weights, normals);
+    real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
+    point->curvature = (real)(1.25f) * bend * slimness;
+    point->normal_error = vertex_error * (slimness + point->curvature);
+}
+
+static inline mask triangle_set_errors(const Triangle *triangle, const Ray *ray, real t, real place_error,
+                                       SurfacePoint *point)
+{
+    return mask_none();
 }
 
 #endif

@@ -2,7 +2,6 @@
 #ifndef PRIMITIVES_H
 #define PRIMITIVES_H
 
-#include "shapes/certain_hits.h"
 #include "shapes/disc.h"
 #include "shapes/paraboloid.h"
 #include "shapes/plane.h"

@@ -1,0 +1,175 @@
+// Hits with bounds of what is within a round side (shapes/certain_round.h), and between ends if it has any.
+#ifndef CERTAIN_SOLID_H
+#define CERTAIN_SOLID_H
+
+#include "shapes/certain_round.h"
+
+// The first hit of a shape between side and ends: as ends_first_hit. `left`: the ray starts on it and runs
+// into it.
+static inline CertainHit round_first_hit(uint flags, const Ray *ray, const CertainInterval *side,
+                                         const CertainInterval *slab, mask left)
+{
+    const real never = (real)(LARGEST / 8);
+    if (flags & REVOLUTION_CAPPED) {
+        Interval outer = intervals_common(side->outer, slab->outer),
+                 inner = intervals_common(side->inner, slab->inner);
+        mask perhaps = side->perhaps & slab->perhaps & (outer.near <= outer.far);
+        mask certain = perhaps & side->certain & slab->certain & (inner.near < inner.far);
+        real near_high = lanes_select(certain, inner.near, never);
+        CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
+        CertainHit far =
+            certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
+        return certain_select(left, far, certain_first(ray, near, near_high, far));
+    }
+    CertainHit hits[2];
+    mask passed[2];
+    for (uint i = 0; i < 2; i++) {
+        real low = i == 0 ? side->outer.near : lanes_select(side->certain, side->inner.far, ray->tmin);
+        real high = i == 0 ? lanes_select(side->certain, side->inner.near, never) : side->outer.far;
+        mask within = (low >= slab->inner.near) & (high <= slab->inner.far) & slab->certain;
+        mask beyond = !slab->perhaps | (high <= slab->outer.near) | (low >= slab->outer.far);
+        mask perhaps = side->perhaps & !beyond;
+        hits[i] = certain_crossing(ray, side->certain & within, perhaps, low, high);
+        passed[i] = beyond | (high < ray->tmin);
+    }
+    if (flags & IGNORES_FRONT_FACES) return hits[1];
+    return certain_select(left | passed[0], hits[1], hits[0]);
+}
+
+static inline CertainInterval round_unbounded(void)
+{
+    const Interval everywhere = {(real)(-LARGEST), (real)(LARGEST)};
+    return (CertainInterval){everywhere, everywhere, mask_all(), mask_all()};
+}
+
+// A cylinder or cone with its ends' heights.
+typedef struct {
+    Round round;
+    bool is_finite;
+    real low, high;   // the ends' heights
+    real half_height; // of the distance between them
+    real widest;      // radius
+    Vector middle;
+} RoundSolid;
+
+// Where slope t >= least.
+static inline Interval interval_above(real slope, real least)
+{
+    mask rises = slope > (real)(SMALLEST_RATIO), falls = slope < (real)(-SMALLEST_RATIO);
+    real t = real_divide(least, lanes_select(rises | falls, slope, (real)(1)));
+    real empty = lanes_select(least > (real)(0), (real)(LARGEST), (real)(-LARGEST));
+    real none = lanes_select(rises, t, lanes_select(falls, (real)(-LARGEST), empty));
+    return (Interval){none, lanes_select(falls, t, (real)(LARGEST))};
+}
+
+// Between the heights low and high.
+static inline CertainInterval round_slab(const Round *round, const Ray *ray, real low, real high)
+{
+    const real few = (real)(4 * UNIT_ROUNDOFF);
+    real z = vector_dot(round->axis, round->start), rise = vector_dot(round->axis, ray->direction);
+    real low_error = real_fma(few, fabs(low), round->place0),
+         high_error = real_fma(few, fabs(high), round->place0);
+    real place1 = round->place1;
+    CertainInterval slab;
+    slab.outer = intervals_common(interval_above(rise + place1, low - z - low_error),
+                                  interval_above(place1 - rise, z - high - high_error));
+    slab.inner = intervals_common(interval_above(rise - place1, low - z + low_error),
+                                  interval_above(-rise - place1, z - high + high_error));
+    slab.certain = slab.inner.near < slab.inner.far;
+    slab.perhaps = slab.outer.near <= slab.outer.far;
+    return slab;
+}
+
+// The part of the line in a sphere that contains a finite shape.
+static inline mask round_bounds(Vector center, real radius, const Ray *ray, real *from, real *to)
+{
+    CertainSphere bounding =
+        certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
+    *from = bounding.near_t - bounding.t_error;
+    *to = bounding.far_t + bounding.t_error;
+    return bounding.perhaps & (*to >= ray->tmin);
+}
+
+// Both nappes of an unbounded cone, each a convex body of its own. A ray that starts on one leaves that.
+static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ray, mask lanes, mask left,
+                                          real from, real to)
+{
+    real radius = real_fma(round.slope, vector_dot(round.axis, round.start), round.radius);
+    real error = round.place0 * ((real)(1) + fabs(round.slope));
+    const CertainInterval slab = round_unbounded();
+    CertainHit hits[2];
+    for (uint i = 0; i < 2; i++) {
+        mask on_it = left & (radius > (real)(0));
+        CertainInterval side =
+            round_interval(&round, ray, lanes & !(on_it & ray->leaves_outward), from, to, false);
+        hits[i] = round_first_hit(flags, ray, &side, &slab, on_it);
+        round.radius = -round.radius;
+        round.slope = -round.slope;
+        radius = -radius;
+    }
+    mask one = hits[0].found | hits[0].doubt, other = hits[1].found | hits[1].doubt;
+    mask swaps = other & (!one | (hits[1].low < hits[0].low));
+    CertainHit first = certain_select(swaps, hits[1], hits[0]),
+               second = certain_select(swaps, hits[0], hits[1]);
+    mask mixes = one & other & !(second.low > first.high);
+    mask at_apex = lanes & left & (fabs(radius) <= error);
+    first.low = lanes_select(at_apex, ray->tmin, first.low);
+    first.doubt = first.doubt | (first.found & mixes) | at_apex;
+    first.found = first.found & !first.doubt;
+    return first;
+}
+
+static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool two_nappes, const Ray *ray)
+{
+    const Round *round = &solid->round;
+    mask left = ray->left == (integer)((scalar_integer)id.x), lanes = RAY_ACTIVE(ray);
+    real from, to;
+    if (solid->is_finite) {
+        lanes = lanes & round_bounds(solid->middle, solid->widest + solid->half_height + round->place0, ray,
+                                     &from, &to);
+        if (!lanes_any(lanes)) return certain_miss();
+    } else {
+        to = round_range(ray, vector_norm1(round->start) + vector_norm1(ray->origin) + solid->widest +
+                                  round->power_scale);
+        from = -to;
+        if (two_nappes) return nappes_first_hit(*round, id.y, ray, lanes, left, from, to);
+    }
+    lanes = lanes & !(left & ray->leaves_outward);
+    CertainInterval slab = round_unbounded();
+    if (solid->is_finite) {
+        slab = round_slab(round, ray, solid->low, solid->high);
+        slab.outer = intervals_common(slab.outer, (Interval){from, to});
+        slab.perhaps = slab.outer.near <= slab.outer.far;
+        lanes = lanes & slab.perhaps;
+        if (!lanes_any(lanes)) return certain_miss();
+    }
+    CertainInterval side = round_interval(round, ray, lanes, from, to, solid->is_finite);
+    return round_first_hit(id.y, ray, &side, &slab, left);
+}
+
+// The errors of a point's normal, at t, and whether it may be at the rim, where side and cap have normals of
+// their own. The normal turns by 1 / rho, or by 2 / k of a paraboloid, along the surface.
+static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
+                                    real place_error, SurfacePoint *point)
+{
+    const Round *round = &solid->round;
+    const RoundPoint at = round_point(round, ray, t);
+    real place = real_fma(round->place1, fabs(t), round->place0), error = (real)(2) * (place_error + place);
+    real curvature = divide_or((real)(round->curves ? 2 : 1), round->curves ? round->k : at.rho,
+                               (real)(1 / SMALLEST_RATIO));
+    real turned = solid->is_finite ? divide_or(place, solid->half_height, (real)(1)) : (real)(0);
+    point->curvature = curvature;
+    point->normal_error = (real)(4) * real_fma(place, curvature, turned);
+    if (!(flags & REVOLUTION_CAPPED)) return mask_none();
+    real z = vector_dot(round->axis, vector_fma(ray->direction, t, round->start));
+    real from_end = real_min(fabs(z - solid->low), fabs(z - solid->high));
+    real side_band = error * (round->curves ? at.rho + at.rho + error + round->k
+                                            : (at.rho + fabs(at.radius)) * ((real)(1) + fabs(round->slope)));
+    mask near_end = from_end <= error, near_side = fabs(at.value) <= at.band + side_band;
+    mask on_cap = near_end & !near_side;
+    point->curvature = lanes_select(on_cap, (real)(0), point->curvature);
+    point->normal_error = lanes_select(on_cap, (real)(4) * turned, point->normal_error);
+    return near_end & near_side;
+}
+
+#endif
