@@ -4,7 +4,7 @@
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
 #include "host/cli/version.h"
-#include "host/import/mesh/foreign.h"
+#include "host/import/mesh/assimp_process.h"
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -75,7 +75,7 @@ static int command_run(int argument_count, char **arguments)
 
 int main(int argument_count, char **arguments)
 {
-    const int child_status = foreign_child_main(argument_count, arguments);
+    const int child_status = assimp_process_main(argument_count, arguments);
     if (child_status >= 0) return child_status;
     // a failed write is reported like a full disk, and no partial output is left
     signal(SIGPIPE, SIG_IGN);

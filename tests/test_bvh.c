@@ -372,8 +372,8 @@ static void no_hit_depends_on_the_tree(void **state)
 enum { PACKET = 16, PACKETS = 1000 };
 
 // In each packet nearly all rays look one way, all to the same sides, or three of four, or each its own way:
-// the walk goes by a beam, by two and what is left over, or ray by ray. Each ray begins to look where it
-// likes: behind its start, there, or ahead of it.
+// traversal takes one group, two and divergent lanes, or ray by ray. Each tmin lies behind the origin, at
+// it, or ahead of it.
 static void rays_behind_fill(TraceRay *rays, const Scene *scene)
 {
     static const double nears[] = {-30, -4, -1e-3, 0, 1};

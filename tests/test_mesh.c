@@ -403,7 +403,7 @@ static void damaged_gltf_is_survived(void **state)
     text_free(&got);
 }
 
-// What the process that runs assimp may do (tests/foreign_child.c); its limits are lower here. Who started
+// What the process that runs assimp may do (tests/assimp_process.c); its limits are lower here. Who started
 // glint may ignore the signals that end it.
 static void child_is_limited(void **state)
 {

@@ -1,4 +1,4 @@
-// The first rank: glint render, with the devices of the others.
+// MPI rank 0: glint render, with the other ranks' devices as well.
 #pragma once
 
 #include <stddef.h>

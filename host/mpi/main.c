@@ -5,14 +5,14 @@
 // All ranks must be of one architecture and run the same program.
 #include "host/base/fault.h"
 #include "host/cli/options.h"
-#include "host/import/mesh/foreign.h"
+#include "host/import/mesh/assimp_process.h"
 #include "host/mpi/first_rank.h"
 #include "host/mpi/other_rank.h"
 #include <mpi.h>
 
 int main(int argument_count, char **arguments)
 {
-    const int child_status = foreign_child_main(argument_count, arguments);
+    const int child_status = assimp_process_main(argument_count, arguments);
     if (child_status >= 0) return child_status;
     int level, rank, size, local_rank, status = EXIT_DONE;
     MPI_Comm local;

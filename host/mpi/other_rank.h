@@ -1,4 +1,4 @@
-// Another rank: renders rows of the first one's images on a device of its own.
+// The other MPI ranks: each renders rows of the first one's images on a device of its own.
 #pragma once
 
 #include <stddef.h>

@@ -14,9 +14,9 @@
 
 typedef struct Checkpoint Checkpoint;
 
-// Opens the file or creates it. `film` describes all rows of the image: no other band is believed. NULL with
-// an error message: the file is another image's, not a checkpoint, damaged, in use by another process, or
-// cannot be read or written; it is then as it was.
+// Opens the file or creates it. `film` describes all rows of the image: bands that do not fit it are
+// rejected. NULL with an error message: the file is another image's, not a checkpoint, damaged, in use by
+// another process, or cannot be read or written; it is then as it was.
 Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages);
 // The rows of each band that the file has, in no order.
 const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count);

@@ -34,7 +34,7 @@ static TraceRay ray_from(const double origin[3], const double direction[3])
 
 static void branch_write(Tree *tree, const Branch *branch);
 
-// The rays that a hit sends on (kernels/shading/bounce.h): at total internal reflection one gets it all.
+// The secondary rays of a hit (kernels/shading/bounce.h): at total internal reflection one gets it all.
 static void branches_write(Tree *tree, const Branch *branch, const Material *material, const TraceHit *hit)
 {
     const bool is_total = material->transmission > 0 && hit->transmission == 0;

@@ -90,7 +90,7 @@ static inline Interval certain_slab(real low, real high, real more, real origin,
     real from = low - origin, to = high - origin;
     real a = from * inverse, b = to * inverse, more_t = more * fabs(inverse);
     mask between = (from <= more) & (to >= -more);
-    real always = lanes_select(between, (real)(LARGEST / 4), (real)(-LARGEST / 4));
+    real always = lanes_select(between, NEVER, -NEVER);
     return (Interval){lanes_select(parallel, -always, real_min(a, b) - more_t),
                       lanes_select(parallel, always, real_max(a, b) + more_t)};
 }
@@ -120,8 +120,7 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     if (!lanes_any(perhaps)) return certain_miss();
     Interval inner = certain_box(box, ray, -place);
     mask certain = perhaps & (inner.near < inner.far);
-    real never = (real)(LARGEST / 8);
-    real near_high = lanes_select(certain, inner.near, never);
+    real near_high = lanes_select(certain, inner.near, NEVER);
     CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
     CertainHit far =
         certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);

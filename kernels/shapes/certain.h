@@ -22,6 +22,9 @@ typedef struct {
 // perpendicular, two sums to 2, an offset in the pixel to 1, the unit length's to 1.
 enum { CAMERA_DIRECTION_ERROR = 7 };
 
+// A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
+#define NEVER ((real)(LARGEST / 8))
+
 // a / b, or `otherwise` where that is out of range.
 static inline real divide_or(real a, real b, real otherwise)
 {
@@ -42,9 +45,9 @@ static inline mask ray_left_for_good(const Ray *ray, uint id, bool is_flat)
     return is_flat ? left : left & ray->leaves_outward;
 }
 
-// Sorts a crossing between low and high, which are known to contain it, by the ray's start and end; `exists`
-// for certain, or only perhaps.
-static inline CertainHit certain_crossing(const Ray *ray, mask exists, mask perhaps, real low, real high)
+// Sorts a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and in no
+// others than `perhaps`, there between low and high.
+static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask perhaps, real low, real high)
 {
     CertainHit hit;
     // beyond the end: of a ray to a light t = 1, from which tmax differs by rounding
@@ -52,7 +55,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask exists, mask perh
     mask before = high < ray->tmin;
     low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers: anywhere
     perhaps = perhaps & !(beyond | before);
-    hit.found = exists & perhaps & (low > ray->tmin) & (high < ray->tmax);
+    hit.found = certain & perhaps & (low > ray->tmin) & (high < ray->tmax);
     hit.doubt = perhaps & !hit.found;
     hit.t = (real)(0.5f) * (low + high);
     hit.low = low;

@@ -1,6 +1,7 @@
 // Hits with bounds of surfaces of revolution, and of spheres with the eye's power. The side bounds a convex
 // set, so that the exact ray is within it along one interval of t. Roots are computed as they may; points
-// next to them are then evaluated, and only what their values, beyond all errors, prove counts.
+// next to them are then evaluated, and only what their values, beyond all errors, prove counts: the constants
+// of steps and widths just choose the points.
 //
 // A sphere with the eye's power is a cylinder with the axis 0.
 #ifndef CERTAIN_ROUND_H
@@ -22,10 +23,10 @@ typedef struct {
     Vector foot;  // a point of the axis, seen from there
     Vector axis;  // unit, or 0
     real radius, slope, k;
-    real power;             // with HAS_POWER, of the unit axis
-    real power_scale;       // the 1-norm of the foot
-    real place0, place1;    // a point at t is off by place0 + place1 |t|
-    bool has_power, curves; // curves: k > 0
+    real power;                    // with HAS_POWER, of the unit axis
+    real foot_norm1;               // the 1-norm of the foot
+    real start_error, error_per_t; // a point at t is off by start_error + error_per_t |t|
+    bool has_power, curves;        // curves: k > 0
 } Round;
 
 typedef struct {
@@ -43,7 +44,7 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
 {
     RoundPoint point;
     Vector x = vector_fma(ray->direction, t, round->start);
-    real place = real_fma(round->place1, fabs(t), round->place0);
+    real place = real_fma(round->error_per_t, fabs(t), round->start_error);
     real z = vector_dot(round->axis, x);
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
     point.rho = vector_norm(point.across);
@@ -58,10 +59,10 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
         Vector beyond = vector_fma(round->foot, (real)(-2), x);
         from_eye = round->power + (vector_dot(round_across(round, x), round_across(round, beyond)) - lift);
         real size = vector_norm1(x);
-        power_band += (real)(UNIT_ROUNDOFF) *
-                      ((real)(16) * real_fma(size, size + round->power_scale + round->power_scale,
-                                             fabs(lift) + fabs(rise) * fabs(twice)) +
-                       (real)(4) * fabs(round->power));
+        power_band +=
+            (real)(UNIT_ROUNDOFF) * ((real)(16) * real_fma(size, size + round->foot_norm1 + round->foot_norm1,
+                                                           fabs(lift) + fabs(rise) * fabs(twice)) +
+                                     (real)(4) * fabs(round->power));
     }
     if (round->curves) {
         point.value = round->has_power ? from_eye : real_fma(point.rho, point.rho, -lift);
@@ -131,14 +132,14 @@ static inline mask height_is_positive(real height, real slope, real slope_error,
 
 // Whether the exact ray misses the side between `from` >= 0 and `to`, and beyond but in the lanes `ends`. At
 // t1, about its closest approach, a plane separates it from the side, or from a parallel surface. Tilted a
-// little, the plane also does where the ray goes on without end: rho is at least n . x for
+// little, it also does so for unbounded rays: rho is at least n . x for
 // n = (across / rho + s q / |q|) / (1 + |s|), and rho^2 at least 2 a . x - a . a for any a.
 static inline mask round_misses(const Round *round, const RoundQuadratic *quadratic, const Ray *ray,
                                 real from, real to, mask ends)
 {
     const real zero = (real)(0), one = (real)(1);
     real qq = vector_dot(quadratic->q, quadratic->q), q_length = real_sqrt(qq), t1;
-    real rise_error = real_fma(round->place1, fabs(round->slope), round->place1);
+    real rise_error = real_fma(round->error_per_t, fabs(round->slope), round->error_per_t);
     real h = real_fma((real)(2.5f), rise_error, quadratic->h);
     mask tilts = fabs(h) < q_length;
     if (round->curves) {
@@ -156,7 +157,7 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
     real height = point.value - point.band, slope, slope_error, tilted, tilted_slope;
     if (round->curves) {
         slope = real_fma(-round->k, quadratic->rise, along + along);
-        slope_error = round->place1 * (point.rho + point.rho + round->k);
+        slope_error = round->error_per_t * (point.rho + point.rho + round->k);
         tilted_slope = (real)(2.5f) * slope_error;
         real tilt = divide_or((real)(0.5f) * (tilted_slope - slope), q_length, zero);
         tilted = real_fma(-tilt, tilt, height);
@@ -246,7 +247,7 @@ static inline Interval intervals_common(Interval a, Interval b)
     return (Interval){real_max(a.near, b.near), real_min(a.far, b.far)};
 }
 
-// Beyond this t the ray's error is a part of its distance that leaves nothing to tell.
+// Beyond this t a rounding of the distance exceeds a 1024th of the size: nothing is certain there.
 static inline real round_range(const Ray *ray, real size)
 {
     return (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray->inverse_length;
@@ -256,13 +257,13 @@ static inline real round_range(const Ray *ray, real size)
 // height, the axis' length as well.
 enum { ROUND_ERROR = 8, SLOPED_ROUND_ERROR = 20 };
 
-static inline real round_place1(const Ray *ray, uint units)
+static inline real round_error_per_t(const Ray *ray, uint units)
 {
     return real_fma(ray->length, ray->direction_error,
                     (real)(units * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
 }
 
-static inline real round_place0(const Ray *ray, Vector start, uint units)
+static inline real round_start_error(const Ray *ray, Vector start, uint units)
 {
     return ray->origin_error + (real)(UNIT_ROUNDOFF)*real_fma((real)(units), vector_norm1(start),
                                                               (real)(2) * vector_norm1(ray->origin));

@@ -9,13 +9,12 @@
 static inline CertainHit round_first_hit(uint flags, const Ray *ray, const CertainInterval *side,
                                          const CertainInterval *slab, mask left)
 {
-    const real never = (real)(LARGEST / 8);
     if (flags & REVOLUTION_CAPPED) {
         Interval outer = intervals_common(side->outer, slab->outer),
                  inner = intervals_common(side->inner, slab->inner);
         mask perhaps = side->perhaps & slab->perhaps & (outer.near <= outer.far);
         mask certain = perhaps & side->certain & slab->certain & (inner.near < inner.far);
-        real near_high = lanes_select(certain, inner.near, never);
+        real near_high = lanes_select(certain, inner.near, NEVER);
         CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
         CertainHit far =
             certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
@@ -25,7 +24,7 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
     mask passed[2];
     for (uint i = 0; i < 2; i++) {
         real low = i == 0 ? side->outer.near : lanes_select(side->certain, side->inner.far, ray->tmin);
-        real high = i == 0 ? lanes_select(side->certain, side->inner.near, never) : side->outer.far;
+        real high = i == 0 ? lanes_select(side->certain, side->inner.near, NEVER) : side->outer.far;
         mask within = (low >= slab->inner.near) & (high <= slab->inner.far) & slab->certain;
         mask beyond = !slab->perhaps | (high <= slab->outer.near) | (low >= slab->outer.far);
         mask perhaps = side->perhaps & !beyond;
@@ -65,16 +64,16 @@ static inline Interval interval_above(real slope, real least)
 // Between the heights low and high.
 static inline CertainInterval round_slab(const Round *round, const Ray *ray, real low, real high)
 {
-    const real few = (real)(4 * UNIT_ROUNDOFF);
+    const real few = (real)(4 * UNIT_ROUNDOFF); // of the ends: their subtractions
     real z = vector_dot(round->axis, round->start), rise = vector_dot(round->axis, ray->direction);
-    real low_error = real_fma(few, fabs(low), round->place0),
-         high_error = real_fma(few, fabs(high), round->place0);
-    real place1 = round->place1;
+    real low_error = real_fma(few, fabs(low), round->start_error),
+         high_error = real_fma(few, fabs(high), round->start_error);
+    real error_per_t = round->error_per_t;
     CertainInterval slab;
-    slab.outer = intervals_common(interval_above(rise + place1, low - z - low_error),
-                                  interval_above(place1 - rise, z - high - high_error));
-    slab.inner = intervals_common(interval_above(rise - place1, low - z + low_error),
-                                  interval_above(-rise - place1, z - high + high_error));
+    slab.outer = intervals_common(interval_above(rise + error_per_t, low - z - low_error),
+                                  interval_above(error_per_t - rise, z - high - high_error));
+    slab.inner = intervals_common(interval_above(rise - error_per_t, low - z + low_error),
+                                  interval_above(-rise - error_per_t, z - high + high_error));
     slab.certain = slab.inner.near < slab.inner.far;
     slab.perhaps = slab.outer.near <= slab.outer.far;
     return slab;
@@ -95,7 +94,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
                                           real from, real to)
 {
     real radius = real_fma(round.slope, vector_dot(round.axis, round.start), round.radius);
-    real error = round.place0 * ((real)(1) + fabs(round.slope));
+    real error = round.start_error * ((real)(1) + fabs(round.slope));
     const CertainInterval slab = round_unbounded();
     CertainHit hits[2];
     for (uint i = 0; i < 2; i++) {
@@ -125,12 +124,12 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
     mask left = ray->left == (integer)((scalar_integer)id.x), lanes = RAY_ACTIVE(ray);
     real from, to;
     if (solid->is_finite) {
-        lanes = lanes & round_bounds(solid->middle, solid->widest + solid->half_height + round->place0, ray,
-                                     &from, &to);
+        lanes = lanes & round_bounds(solid->middle, solid->widest + solid->half_height + round->start_error,
+                                     ray, &from, &to);
         if (!lanes_any(lanes)) return certain_miss();
     } else {
         to = round_range(ray, vector_norm1(round->start) + vector_norm1(ray->origin) + solid->widest +
-                                  round->power_scale);
+                                  round->foot_norm1);
         from = -to;
         if (two_nappes) return nappes_first_hit(*round, id.y, ray, lanes, left, from, to);
     }
@@ -148,13 +147,15 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 }
 
 // The errors of a point's normal, at t, and whether it may be at the rim, where side and cap have normals of
-// their own. The normal turns by 1 / rho, or by 2 / k of a paraboloid, along the surface.
+// their own. The normal turns by 1 / rho, or by 2 / k of a paraboloid, along the surface. A vector off by e,
+// made unit, is off by up to 2 e over its length.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {
     const Round *round = &solid->round;
     const RoundPoint at = round_point(round, ray, t);
-    real place = real_fma(round->place1, fabs(t), round->place0), error = (real)(2) * (place_error + place);
+    real place = real_fma(round->error_per_t, fabs(t), round->start_error),
+         error = (real)(2) * (place_error + place);
     real curvature = divide_or((real)(round->curves ? 2 : 1), round->curves ? round->k : at.rho,
                                (real)(1 / SMALLEST_RATIO));
     real turned = solid->is_finite ? divide_or(place, solid->half_height, (real)(1)) : (real)(0);

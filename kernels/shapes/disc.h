@@ -104,6 +104,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     Vector f = vector_subtract(ray->origin, center);
     Vector across = vector_fma(ray->direction, hit.t, f);
     real moved = ray->length, path = moved * fabs(hit.t);
+    // 3 u of f and the path are needed, and as of a sphere 4 u of the radius
     real place = ray_place_error(ray, path) + moved * ((real)(0.5f) * (hit.high - hit.low)) +
                  (real)(UNIT_ROUNDOFF) *
                      ((real)(4) * (vector_norm1(f) + path) + (real)(8) * radius + vector_norm1(ray->origin));

@@ -430,11 +430,11 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     round->slope = sloped ? (real)(shape->axis_slope.w) : (real)(0);
     round->k = (real)(0);
     round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
-    round->power_scale = vector_norm1(base);
+    round->foot_norm1 = vector_norm1(base);
     round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, base);
     const uint units = sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR;
-    round->place0 = round_place0(ray, round->start, units);
-    round->place1 = round_place1(ray, units);
+    round->start_error = round_start_error(ray, round->start, units);
+    round->error_per_t = round_error_per_t(ray, units);
     solid.low = (real)(shape->range.w) * inverse;
     solid.high = (real)(shape->range.x) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high - solid.low);
@@ -444,13 +444,14 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
         solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
                                 real_fma(round->slope, solid.high, round->radius));
     if (round->has_power) return solid;
-    round->place0 = round->place0 + (real)(16 * UNIT_ROUNDOFF) * solid.widest;
+    round->start_error = round->start_error + (real)(16 * UNIT_ROUNDOFF) * solid.widest;
     if (!solid.is_finite) return solid;
     // both ends are rounded as points, which turns the axis
     Vector end = vector_fma(round->axis, solid.high, base);
     real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
     real turned = (real)(2) + divide_or(solid.widest, solid.half_height, (real)(0));
-    round->place0 = round->place0 + real_fma(moved, turned, (real)(16 * UNIT_ROUNDOFF) * solid.half_height);
+    round->start_error =
+        round->start_error + real_fma(moved, turned, (real)(16 * UNIT_ROUNDOFF) * solid.half_height);
     return solid;
 }
 

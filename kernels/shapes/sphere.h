@@ -154,12 +154,12 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     round.radius = (real)(sphere->center_radius.w);
     round.slope = round.k = zero;
     round.power = eye_power_of(sphere->id);
-    round.power_scale = vector_norm1(round.foot);
-    round.place0 = round_place0(ray, ray->origin, ROUND_ERROR);
-    round.place1 = round_place1(ray, ROUND_ERROR);
+    round.foot_norm1 = vector_norm1(round.foot);
+    round.start_error = round_start_error(ray, ray->origin, ROUND_ERROR);
+    round.error_per_t = round_error_per_t(ray, ROUND_ERROR);
     round.has_power = true;
     round.curves = false;
-    real range = round_range(ray, round.power_scale + round.radius + vector_norm1(ray->origin));
+    real range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));
     CertainInterval side = round_interval(&round, ray, lanes, -range, range, false), slab = round_unbounded();
     return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, left);
 }

@@ -217,7 +217,7 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
 typedef struct {
     Vector start, axis; // the ray's origin, seen from the center
     real major, minor;
-    real place0, place1; // a point at t is off by place0 + place1 |t|
+    real start_error, error_per_t; // a point at t is off by start_error + error_per_t |t|
 } CertainTorus;
 
 typedef struct {
@@ -231,11 +231,11 @@ static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
     certain.axis = vector_of(torus->axis_minor);
     certain.major = (real)(torus->center_major.w);
     certain.minor = (real)(torus->axis_minor.w);
-    certain.place0 =
+    certain.start_error =
         ray->origin_error + (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
                                                      (real)(2) * vector_norm1(ray->origin) +
                                                      (real)(28) * (certain.major + certain.minor));
-    certain.place1 =
+    certain.error_per_t =
         real_fma(ray->length, ray->direction_error, (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
     return certain;
 }
@@ -251,7 +251,7 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
     real rho_slope = vector_dot(across, ray->direction) * real_inverse_or_zero(point.rho);
     point.slope = real_fma(off, rho_slope, z * rise) * real_inverse_or_zero(from_circle);
     point.distance = from_circle - torus->minor;
-    point.place = real_fma(torus->place1, fabs(t), torus->place0);
+    point.place = real_fma(torus->error_per_t, fabs(t), torus->start_error);
     return point;
 }
 
@@ -273,11 +273,13 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
     real error =
         real_fma((real)(2) * start.place, curvature, ray->direction_error) + (real)(32 * UNIT_ROUNDOFF);
     real least = real_divide((real)(2), curvature);
-    mask known = cosine > (real)(4) * error;
+    mask known = cosine > (real)(4) * error; // the exact one is more than the half that is used
     return lanes_select(known, (real)(0.5f) * cosine * least * ray->inverse_length, (real)(0));
 }
 
-// Narrows a bracket at whose ends the exact ray is certainly on different sides.
+// Narrows a bracket at whose ends the exact ray is certainly on different sides. Only signs beyond `place`
+// count; the constants just choose the points: the zero is off by `place` over the slope, and beyond twice
+// that the sign is certain.
 static inline Interval torus_bracket(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                      mask entering)
 {

@@ -161,7 +161,7 @@ typedef struct {
     SpilledRays *spilled;
     bool coherent;
     GroupBounds bounds; // if coherent
-    uint active;        // lanes still searching, as bits
+    uint active;        // lanes that still traverse, as bits
     real tmax;          // of each lane; -LARGEST for those that are done
 } RayGroup;
 

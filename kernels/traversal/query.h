@@ -1,4 +1,4 @@
-// What a traversal searches for, and what it has found.
+// What a traversal asks for, and its hit so far.
 #ifndef QUERY_H
 #define QUERY_H
 
@@ -14,7 +14,7 @@ typedef enum {
 
 typedef struct {
     Query query;
-    mask active; // lanes still searching
+    mask active; // lanes that still traverse
     Hit hit;
     integer optical_depth; // for OCCLUSION, of the objects hit so far
     // At `certified`: the exact hit is no farther than `limit`, and none but hit.object's before `rival`;

@@ -4,7 +4,7 @@
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "host/import/load.h"
-#include "host/import/mesh/foreign.h"
+#include "host/import/mesh/assimp_process.h"
 #include "host/measure/baseline.h"
 #include "host/opencl/cache.h"
 #include "host/render/checkpoint.h"
@@ -63,7 +63,7 @@ static void reply_fuzz(const char *path, const Source *source, MessageList *mess
     bool read;
     FILE *file = fopen(path, "rb");
     if (!file) abort();
-    if (foreign_reply_read(&draft, file, &read) && draft_check(&draft)) draft_finish(&draft, &mesh);
+    if (assimp_reply_read(&draft, file, &read) && draft_check(&draft)) draft_finish(&draft, &mesh);
     fclose(file);
     mesh_free(&mesh);
     draft_free(&draft);

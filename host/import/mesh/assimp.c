@@ -4,7 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/affine.h"
-#include "host/import/mesh/foreign.h"
+#include "host/import/mesh/assimp_process.h"
 #include "host/import/number.h"
 
 #include <assimp/cimport.h>

@@ -127,4 +127,4 @@ bool obj_read(MeshDraft *draft);
 bool ply_read(MeshDraft *draft);
 bool stl_read(MeshDraft *draft);
 // By assimp.
-bool foreign_read(MeshDraft *draft);
+bool assimp_process_read(MeshDraft *draft);

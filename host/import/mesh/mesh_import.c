@@ -15,7 +15,7 @@ static bool (*reader_of(const char *path))(MeshDraft *draft)
     const char *ending = strrchr(path, '.');
     for (size_t i = 0; ending && i < sizeof readers / sizeof *readers; i++)
         if (!strcasecmp(ending, readers[i].ending)) return readers[i].read;
-    return foreign_read;
+    return assimp_process_read;
 }
 
 // The text is gone before the draft becomes a mesh, which needs memory too.
@@ -26,7 +26,7 @@ static bool file_read(MeshDraft *draft, Mesh *mesh)
     MessageList problems = {0};
     const char *obstacle = file_obstacle(draft->import->path);
     bool done = !obstacle || draft_refuse(draft, "%s", obstacle);
-    if (done && read != foreign_read) {
+    if (done && read != assimp_process_read) {
         done = text_read_file(&text, draft->import->path, &problems);
         if (!done) report_error(draft->import->report, draft->import->offset, "%s", problems.items[0].text);
         message_list_free(&problems);

@@ -1,8 +1,8 @@
 // Tests are programs, too, that are started again to read a mesh by assimp. Those whose file has one of these
 // names misbehave as assimp might.
+#include "host/import/mesh/assimp_process.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
-#include "host/import/mesh/foreign.h"
 
 #include <signal.h>
 #include <stdlib.h>
@@ -26,7 +26,7 @@ static void misbehave(const char *name)
     const struct rlimit few_bytes = {1 << 28, RLIM_INFINITY};
     if (!strcmp(name, "bloat.fbx")) setrlimit(RLIMIT_AS, &few_bytes);
 #endif
-    foreign_child_limit();
+    assimp_process_limit();
     if (!strcmp(name, "crash.fbx")) {
         signal(SIGSEGV, SIG_DFL); // a sanitizer's handler exits
         raise(SIGSEGV);
@@ -42,6 +42,6 @@ static void misbehave(const char *name)
 __attribute__((constructor)) static void child_serve(int argument_count, char **arguments)
 {
     if (argument_count == 4 && !strcmp(arguments[1], "--read-mesh")) misbehave(arguments[2]);
-    const int status = foreign_child_main(argument_count, arguments);
+    const int status = assimp_process_main(argument_count, arguments);
     if (status >= 0) _exit(status);
 }

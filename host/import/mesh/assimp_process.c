@@ -1,4 +1,4 @@
-#include "host/import/mesh/foreign.h"
+#include "host/import/mesh/assimp_process.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/import/number.h"
@@ -64,14 +64,14 @@ static void limit(__rlimit_resource_t resource, rlim_t most)
     setrlimit(resource, &now);
 }
 
-void foreign_child_limit(void)
+void assimp_process_limit(void)
 {
 #ifndef __SANITIZE_ADDRESS__ // whose shadow is larger
-    limit(RLIMIT_AS, (rlim_t)FOREIGN_MEBIBYTES_MAX << 20);
+    limit(RLIMIT_AS, (rlim_t)ASSIMP_MEBIBYTES_MAX << 20);
 #endif
-    limit(RLIMIT_CPU, FOREIGN_PROCESSOR_SECONDS_MAX);
+    limit(RLIMIT_CPU, ASSIMP_PROCESSOR_SECONDS_MAX);
     limit(RLIMIT_CORE, 0);
-    alarm(FOREIGN_SECONDS_MAX);
+    alarm(ASSIMP_SECONDS_MAX);
     // a terminal's go to the parent too, which ends this process when it ends
     signal(SIGINT, SIG_IGN);
     signal(SIGHUP, SIG_IGN);
@@ -121,10 +121,10 @@ static void reply_write(FILE *reply, MeshDraft *draft, bool is_read)
     fwrite(magic, sizeof magic, 1, reply);
 }
 
-int foreign_child_main(int argument_count, char **arguments)
+int assimp_process_main(int argument_count, char **arguments)
 {
     if (argument_count != 4 || strcmp(arguments[1], command) != 0) return -1;
-    foreign_child_limit();
+    assimp_process_limit();
     FILE *reply = fdopen(REPLY_DESCRIPTOR, "wb");
     if (!reply) return EXIT_FAILURE;
     MessageList messages = {0};
@@ -249,7 +249,7 @@ static bool draft_is_sound(MeshDraft *draft, const ReplyHeader *header)
     return polygons_are_sound(draft) && runs_are_sound(draft, header->material_count);
 }
 
-bool foreign_reply_read(MeshDraft *draft, FILE *reply, bool *read)
+bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
 {
     ReplyHeader header;
     char end[sizeof magic];
@@ -304,13 +304,13 @@ static bool child_fails(MeshDraft *draft, int status)
 {
     const int by = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
     if (by == SIGXCPU || by == SIGALRM)
-        return draft_refuse(draft, "assimp needs more than %d s to read it", FOREIGN_PROCESSOR_SECONDS_MAX);
+        return draft_refuse(draft, "assimp needs more than %d s to read it", ASSIMP_PROCESSOR_SECONDS_MAX);
     if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_MACHINE)
-        return draft_refuse(draft, "assimp needs more than %d MiB to read it", FOREIGN_MEBIBYTES_MAX);
+        return draft_refuse(draft, "assimp needs more than %d MiB to read it", ASSIMP_MEBIBYTES_MAX);
     return draft_refuse(draft, "assimp %s on it", by != 0 ? "crashes" : "fails");
 }
 
-bool foreign_read(MeshDraft *draft)
+bool assimp_process_read(MeshDraft *draft)
 {
     draft->places = DRAFT_NO_PLACES;
     pid_t process = -1;
@@ -319,7 +319,7 @@ bool foreign_read(MeshDraft *draft)
     if (error != 0) return draft_refuse(draft, "no process to read it in: %s", strerror(error));
     FILE *reply = fdopen(descriptor, "rb");
     bool read = false;
-    const bool is_whole = reply && foreign_reply_read(draft, reply, &read);
+    const bool is_whole = reply && assimp_reply_read(draft, reply, &read);
     if (reply)
         fclose(reply);
     else

@@ -8,15 +8,15 @@
 
 // The exit status if the arguments are those of such a process, which has done its work then; else -1. The
 // first thing that main does.
-int foreign_child_main(int argument_count, char **arguments);
+int assimp_process_main(int argument_count, char **arguments);
 
-enum { FOREIGN_MEBIBYTES_MAX = 4096, FOREIGN_PROCESSOR_SECONDS_MAX = 60, FOREIGN_SECONDS_MAX = 120 };
+enum { ASSIMP_MEBIBYTES_MAX = 4096, ASSIMP_PROCESSOR_SECONDS_MAX = 60, ASSIMP_SECONDS_MAX = 120 };
 
 // Limits this process as such a one; limits that are lower stay.
-void foreign_child_limit(void);
+void assimp_process_limit(void);
 
 // Of assimp alone, in such a process.
 bool assimp_read(MeshDraft *draft);
 
 // What such a process wrote; false if it is not whole or not sound. `read` is what assimp_read returned.
-bool foreign_reply_read(MeshDraft *draft, FILE *reply, bool *read);
+bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read);
