@@ -272,6 +272,12 @@ class Failures(CliTestCase):
         ):
             self.refuses(f"render globe.yaml {SMALL} {arguments}", f"would overwrite '{path}")
         self.refuses("trace globe.yaml --rays rays -o mesh.obj", "would overwrite 'mesh.obj'")
+        write("a.yaml", SPHERE)
+        write("b.yaml", SPHERE.replace("radius: 1}", "radius: 1, material: {image: a.png}}"))
+        os.link("globe.png", "a.png")
+        for scenes in "a.yaml b.yaml", "b.yaml a.yaml":
+            self.refuses(f"render {scenes} {SMALL}", "would overwrite 'a.png', which 'b.yaml' is read from")
+            self.assertFalse(os.path.exists("b.png"))
         self.assertEqual({name: read(name) for name in files}, files)
         self.glint(f"render globe.yaml {SMALL} -o globe/other.png")
         os.remove("globe.png")

@@ -8,9 +8,11 @@
 #include "host/cli/progress.h"
 #include "host/cli/render_devices.h"
 #include "host/cli/render_options.h"
+#include "host/import/load.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 typedef struct {
     ImageOutput *output;
@@ -249,6 +251,37 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
     return NULL;
 }
 
+// Mistakes in a scene are reported when it is rendered.
+static bool scene_is_overwritten(RenderOptions options, const char *path, char *const *images)
+{
+    Scene scene = {0};
+    MessageList ignored = {0};
+    bool is_overwritten = false;
+    if (scene_load(&scene, path, &(SceneOptions){.lenient = options.common.lenient}, &ignored))
+        for (size_t i = 0; i < options.scene_count && !is_overwritten; i++) {
+            options.output.path = images[i];
+            is_overwritten = image_output_overwrites_scene(&options.output, &scene, path);
+        }
+    message_list_free(&ignored);
+    scene_free(&scene);
+    return is_overwritten;
+}
+
+bool render_command_spares_scenes(RenderCommand *command)
+{
+    const RenderOptions *options = &command->options;
+    bool image_exists = false;
+    for (size_t i = 0; i < options->scene_count && options->scene_count > 1; i++)
+        image_exists = image_exists || access(command->paths[i], F_OK) == 0;
+    for (size_t i = 0; i < options->scene_count && image_exists; i++) {
+        const bool can_read_twice = strcmp(options->scenes[i], "-") != 0;
+        if (!can_read_twice || !scene_is_overwritten(*options, options->scenes[i], command->paths)) continue;
+        render_command_note(command, EXIT_USER);
+        return false;
+    }
+    return true;
+}
+
 void render_command_choose_device(RenderCommand *command, size_t number)
 {
     command->open.is_single = true;
@@ -280,7 +313,7 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     RenderDevices *open = &command->open;
     command->options.scene = command->options.scenes[index];
     render_devices_rest(open);
-    progress_release_signals(); // while a scene is read none asks for them
+    progress_end_at_once(); // while a scene is read none asks for them
     if (progress_interrupted()) return EXIT_INTERRUPTED;
     const int status = file_render(command->options, command->paths[index], open, ranks);
     return render_devices_work(open) ? status : EXIT_MACHINE;
@@ -334,6 +367,6 @@ int command_render(int argument_count, char **arguments)
     int status;
     RenderCommand *command = render_command_open(argument_count, arguments, &status);
     if (!command) return status;
-    render_command_run_from(command, 0, NULL);
+    if (render_command_spares_scenes(command)) render_command_run_from(command, 0, NULL);
     return render_command_close(command);
 }

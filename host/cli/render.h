@@ -10,6 +10,9 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
 // Of the devices only one is used: the number modulo their count, see devices_open_one.
 void render_command_choose_device(RenderCommand *command, size_t number);
 
+// False with a message, before anything is rendered: an image would overwrite a file that one of several
+// scenes is read from. Reads them where an image exists already.
+bool render_command_spares_scenes(RenderCommand *command);
 // Opens the devices before the first scene is read. False with a message.
 bool render_command_open_devices(RenderCommand *command);
 

@@ -240,8 +240,10 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
         RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
         if (command) {
             render_command_choose_device(command, 0);
-            render_command_run_from(command, frames_deal(command, other_count, argument_count, arguments),
-                                    &ranks);
+            if (render_command_spares_scenes(command)) {
+                const size_t dealt = frames_deal(command, other_count, argument_count, arguments);
+                render_command_run_from(command, dealt, &ranks);
+            }
             status = render_command_close(command);
         }
     }
