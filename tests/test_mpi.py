@@ -23,7 +23,7 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# What a rank does wrong: its device fails, or is slow for a number of microseconds, or what it sends with the tag FAULT_TAG has a wrong word,
+# What a rank does wrong: its device fails, or is slow for a number of microseconds, or has so few bytes of memory, or what it sends with the tag FAULT_TAG has a wrong word,
 # is sent FAULT_TIMES, or is replaced by an end without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
@@ -37,6 +37,13 @@ int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void 
     if (!getenv("FAULT_USEC")) return -5;
     usleep(atoi(getenv("FAULT_USEC")));
     return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
+}
+int clGetDeviceInfo(void *device, unsigned name, size_t size, void *value, size_t *value_size)
+{
+    const int status = ((int (*)())dlsym(RTLD_NEXT, "clGetDeviceInfo"))(device, name, size, value, value_size);
+    const int is_memory = name == 0x101F || name == 0x1010; // CL_DEVICE_GLOBAL_MEM_SIZE, CL_DEVICE_MAX_MEM_ALLOC_SIZE
+    if (getenv("FAULT_MEMORY") && value && is_memory) *(unsigned long *)value = atoi(getenv("FAULT_MEMORY"));
+    return status;
 }
 int MPI_Send(const void *bytes, int size, MPI_Datatype type, int rank, int tag, MPI_Comm ranks)
 {
@@ -135,14 +142,14 @@ class Mpi(TestCase):
         subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "faults.so", *flags], input=FAULTS, text=True, check=True)
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
-    def write_frames(self, more=()):
+    def write_frames(self, more=(), status=0):
         """More scenes and six others, and what renders them, also into expected/."""
         scenes = dict(more) | {f"sphere{i}": SPHERE.replace("radius: 1", f"radius: 1.{i}") for i in range(6)}
         for name, text in scenes.items():
             write(f"{name}.yaml", text)
         os.mkdir("expected")
         command = f"render {' '.join(f'{name}.yaml' for name in scenes)} --size 160x120 --precision strict --quiet"
-        self.glint(f"{command} -o expected", 1 if more else 0, env=POCL)
+        self.glint(f"{command} -o expected", status, env=POCL)
         return command
 
     def check_frames(self, together=()):
@@ -157,7 +164,7 @@ class Mpi(TestCase):
 
     def test_frames(self):
         """Each rank renders whole ones, and all together what is left, or all where one sees other files or has other options. A mistake ends one frame."""
-        command = self.write_frames({"bad": "camera: 5", "boxes": (ROOT / "scenes/boxes.yaml").read_text()}.items())
+        command = self.write_frames({"bad": "camera: 5", "boxes": (ROOT / "scenes/boxes.yaml").read_text()}.items(), 1)
         os.mkdir("frames")
         self.assertRegex(self.mpirun(f"-n 3 {RANKS} {command} -o frames", 1).stderr, "(?m)^bad.yaml:1")
         self.check_frames(["sphere4.png", "sphere5.png"])
@@ -184,6 +191,17 @@ class Mpi(TestCase):
         process = self.mpirun(f"{ranks[1]} : {ranks[1]}", 2)
         self.assertRegex(process.stderr, "no rank is left that can render")
         self.assertEqual(os.listdir("frames"), [])
+
+    def test_a_frame_that_fits_no_device(self):
+        """It alone is left out, with a message, whichever rank has it last."""
+        self.faults_build()
+        command = self.write_frames({"large": SPHERE + 4000 * SPHERE.splitlines(keepends=True)[-1]}.items())
+        os.remove("expected/large.png")
+        os.mkdir("frames")
+        small = f"-x LD_PRELOAD=./faults.so -x FAULT_USEC=0 -x FAULT_MEMORY=131072 {RANKS} {command} -o frames"
+        process = self.mpirun(f"-n 2 {small}", 1)
+        self.assertRegex(process.stderr, "the scene needs .* on the device")
+        self.check_frames()
 
     def mpirun_faulty(self, *faults, status=0):
         """Each rank is faulty as its variables say."""

@@ -7,12 +7,12 @@
 #include <stdio.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t interrupted, is_flag_read;
+static volatile sig_atomic_t interrupted, is_flag_read, is_held;
 
 // Two often arrive together, for the process and its group; a third means the user insists.
 static void interrupt_note(int signal_number)
 {
-    if (!is_flag_read) {
+    if (!is_flag_read && !is_held) {
         static const char text[] = "glint: interrupted\n";
         ssize_t ignored = write(STDERR_FILENO, text, sizeof text - 1);
         (void)ignored;
@@ -41,7 +41,17 @@ void progress_open(Progress *progress, bool quiet)
     is_flag_read = 1;
 }
 
+void progress_hold_signals(void)
+{
+    is_held = 1;
+}
+
 void progress_release_signals(void)
+{
+    is_held = 0;
+}
+
+void progress_end_at_once(void)
 {
     is_flag_read = 0;
 }

@@ -18,8 +18,11 @@ void progress_open(Progress *progress, bool quiet);
 // yet. What is done in the first second does not count: a kernel's build, or a checkpoint's bands.
 double progress_seconds_left(Progress *progress, double fraction_done);
 void progress_show(Progress *progress, double fraction_done);
-// Signals end the process at once again, until progress_open.
+// From here on the signals set a flag, even where progress_end_at_once is called, until they are released.
+void progress_hold_signals(void);
 void progress_release_signals(void);
+// Signals end the process at once again, until progress_open.
+void progress_end_at_once(void);
 void progress_close(Progress *progress); // erases the line; signals still only set the flag
 bool progress_interrupted(void);
 // From now on progress_interrupted is also true where `ask` is, which it calls.

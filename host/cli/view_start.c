@@ -13,14 +13,19 @@
 
 int command_view(int argument_count, char **arguments)
 {
+    static const char deleted[] = " (deleted)"; // which Linux appends once the file was replaced
     char self[PATH_MAX];
-    const ssize_t length = readlink("/proc/self/exe", self, sizeof self);
-    if (length < 0 || length == sizeof self) {
-        fprintf(stderr, "glint: cannot find where it lies itself: %s\n", strerror(errno));
+    const ssize_t read = readlink("/proc/self/exe", self, sizeof self);
+    if (read < 0 || read == sizeof self) {
+        fprintf(stderr, "glint: cannot find its own program: %s\n",
+                strerror(read < 0 ? errno : ENAMETOOLONG));
         return EXIT_MACHINE;
     }
+    size_t length = (size_t)read;
+    const size_t rest = sizeof deleted - 1;
+    if (length > rest && memcmp(self + length - rest, deleted, rest) == 0) length -= rest;
     Text path = {0};
-    text_append(&path, self, (size_t)length);
+    text_append(&path, self, length);
     text_appendf(&path, "-view");
     // the first two, "glint" and "view", are one here
     char **passed = memory_allocate((size_t)argument_count + 2, sizeof *passed);

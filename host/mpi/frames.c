@@ -1,7 +1,6 @@
 #include "host/mpi/frames.h"
 
 #include "host/base/array.h"
-#include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/cli/options.h"
@@ -80,14 +79,17 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     char marker[MARKER_BYTES] = "";
     const uint64_t own = command ? files_hash(command, call) : 0;
     uint64_t hash = own;
-    if (is_first) marker_make(command, marker);
+    const bool can_render = command && !reads_standard_input(command) && render_command_open_devices(command);
+    if (is_first) {
+        progress_hold_signals(); // the marker is removed whatever comes
+        marker_make(command, marker);
+    }
     broadcast(marker, sizeof marker, MPI_COMM_WORLD);
     broadcast(&hash, sizeof hash, MPI_COMM_WORLD);
-    int sees = command && !reads_standard_input(command) && render_command_open_devices(command) &&
-               own == hash && marker[0] != '\0' && access(marker, F_OK) == 0,
-        all_see;
+    int sees = can_render && own == hash && marker[0] != '\0' && access(marker, F_OK) == 0, all_see;
     MPI_Allreduce(&sees, &all_see, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     if (is_first && marker[0] != '\0') unlink(marker);
+    if (is_first) progress_release_signals();
     return all_see;
 }
 
@@ -186,8 +188,8 @@ static void frame_done_receive(Deal *deal, RankFrames *state, int rank)
     state->wants = true;
 }
 
-// Answers a rank that wants a frame, and reports the end to each once. False: there is nothing to do.
-static bool rank_answer(Deal *deal, RankFrames *state, int rank)
+// Sends a frame to a rank that wants one, and the end to each once. False: there is nothing to do.
+static bool frame_send(Deal *deal, RankFrames *state, int rank)
 {
     if (!state->end_sent && (state->has_failed || deal_is_over(deal))) {
         send_bytes(NULL, 0, rank, TAG_END);
@@ -214,7 +216,7 @@ static void frames_serve(Deal *deal, size_t other_count)
         if (progress_interrupted()) deal_end(deal);
         over_count = 0;
         for (size_t i = 0; i < other_count; i++) {
-            is_busy |= rank_answer(deal, &states[i], (int)i + 1);
+            is_busy |= frame_send(deal, &states[i], (int)i + 1);
             over_count += states[i].is_over;
         }
         if (!is_busy) rest();
@@ -229,18 +231,25 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     Job job = {.kind = JOB_FRAMES};
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     if (!files_are_shared(command, (Call){argument_count, arguments}, true)) return 0;
-    Deal deal = {.command = command, .end = whole * worker_count, .workers = worker_count};
+    Deal deal = {.mutex = PTHREAD_MUTEX_INITIALIZER,
+                 .command = command,
+                 .end = whole * worker_count,
+                 .workers = worker_count};
     pthread_t thread;
-    if (pthread_mutex_init(&deal.mutex, NULL) != 0) fault("out of memory: mutex");
-    if (pthread_create(&thread, NULL, own_frames_render, &deal) != 0) fault("cannot start a thread");
+    progress_hold_signals(); // also while the thread reads a scene
+    const bool has_thread = pthread_create(&thread, NULL, own_frames_render, &deal) == 0;
+    if (!has_thread) {
+        fprintf(stderr, "glint: warning: cannot start a thread: the other ranks render the frames\n");
+        deal.workers--;
+    }
     frames_serve(&deal, other_count);
-    pthread_join(thread, NULL);
-    pthread_mutex_destroy(&deal.mutex);
+    if (has_thread) pthread_join(thread, NULL);
+    progress_release_signals();
     free(deal.again.items);
     if (deal.workers == 0) {
         fprintf(stderr, "glint: no rank is left that can render\n");
         render_command_note(command, EXIT_MACHINE);
-    } else if (progress_interrupted()) {
+    } else if (progress_interrupted() && (deal.next < deal.end || deal.again.count > 0)) {
         render_command_note(command, EXIT_INTERRUPTED);
     }
     return deal.end;
@@ -250,7 +259,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
 
 static bool end_received;
 
-static bool has_ended(void)
+static bool frames_have_ended(void)
 {
     MPI_Status status;
     if (!end_received && has_message(0, TAG_END, &status)) {
@@ -264,7 +273,7 @@ static size_t frame_await(void)
 {
     MPI_Status status;
     while (!has_message(0, TAG_FRAME, &status)) {
-        has_ended();
+        frames_have_ended();
         rest();
     }
     size_t frame;
@@ -281,7 +290,7 @@ void frames_work(size_t local_rank, int argument_count, char **arguments)
         size_t frame;
         status = EXIT_DONE;
         end_received = false;
-        progress_ask(has_ended);
+        progress_ask(frames_have_ended);
         for (;;) {
             send_bytes(&status, sizeof status, 0, TAG_FRAME_DONE);
             frame = frame_await();

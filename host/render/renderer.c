@@ -200,10 +200,9 @@ static Renderer *of_pass(Renderer *renderer, PixelPass pass)
     return renderer;
 }
 
-uint32_t renderer_lanes(const Renderer *renderer, PixelPass pass)
+uint32_t renderer_lanes(Renderer *renderer, PixelPass pass)
 {
-    while (renderer && renderer->pass != pass)
-        renderer = renderer->repeat;
+    renderer = of_pass(renderer, pass);
     return renderer ? renderer->report.lanes : 0;
 }
 
@@ -222,8 +221,8 @@ static void scene_changed(Renderer *renderer)
     renderer_kernels_choose(renderer);
 }
 
-// Uploads the scene to renderers of the same variant, whose devices have room for it. Takes it; the first
-// renderer keeps what moves.
+// Uploads the scene to renderers of the same variant, whose devices have room for it. Takes it; what moves
+// has one renderer, which keeps the arrays.
 static void scene_give(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
     arrays_upload(renderers, count, compiled);
@@ -297,9 +296,11 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
                     const RenderSettings *settings, const SceneReceivers *others, MessageList *messages,
                     MessageList *of_each)
 {
+    RenderSettings shared = *settings;
+    shared.moves = settings->moves && count == 1; // several share the arrays, and none keeps them
     for (size_t i = 0; i < count; i++)
-        renderers[i] = renderer_open_empty(computes[i], settings, renderers[i], &of_each[i]);
-    const bool compiles = variants_compile(renderers, count, scene, settings, others, messages, of_each);
+        renderers[i] = renderer_open_empty(computes[i], &shared, renderers[i], &of_each[i]);
+    const bool compiles = variants_compile(renderers, count, scene, &shared, others, messages, of_each);
     for (size_t i = 0; i < count; i++) {
         if (compiles && compute_ok(computes[i])) continue;
         renderer_close(renderers[i]);

@@ -70,7 +70,7 @@ typedef struct {
 // NULL: a number of the scene does not fit the precision. A single renderer is NULL with a message in its own
 // list if the settings do not fit its device (double or certified without fp64, lanes not 1, 4, 8 or 16), or
 // the scene its memory; without one if the device failed, see Compute. Computes outlive their renderers.
-// Where the settings have `moves` there is one device. renderers[i] is NULL before, or an earlier renderer of
+// `moves` is ignored where there are several devices. renderers[i] is NULL before, or an earlier renderer of
 // the device, which is closed: its kernels are used again where they suit.
 bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count, const Scene *scene,
                     const RenderSettings *settings, const SceneReceivers *others, MessageList *messages,
@@ -83,7 +83,7 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
 Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, Renderer *earlier,
                               MessageList *messages);
 // The lanes of a pass; 0: there is no such pass.
-uint32_t renderer_lanes(const Renderer *renderer, PixelPass pass);
+uint32_t renderer_lanes(Renderer *renderer, PixelPass pass);
 // Takes the compiled scene of the pass and its lanes, even on failure. False with a message: it exceeds the
 // device's memory; without: the device failed.
 bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, MessageList *messages);

@@ -4,12 +4,12 @@
 #include "host/base/memory.h"
 #include <stdlib.h>
 
-// A list's pixels in a band, and what a renderer at double made of them.
 typedef struct {
     uint32_t *items;
     size_t count, capacity;
 } Numbers;
 
+// Pixels of a band.
 typedef struct {
     Numbers pixels; // x and y in the image
     Numbers index;  // in the band
@@ -56,8 +56,8 @@ static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem 
     void *values = renderer_map(renderer, of_band, film_layer_size(band, layer), CL_MAP_READ | CL_MAP_WRITE);
     if (!values) return;
     void *repeated = memory_allocate(film_layer_size(&film, layer), 1);
-    buffer_read(renderer->compute, of_list, film_layer_size(&film, layer), repeated);
-    for (size_t i = 0; i < list->index.count; i++)
+    const bool is_read = buffer_read(renderer->compute, of_list, film_layer_size(&film, layer), repeated);
+    for (size_t i = 0; i < list->index.count && is_read; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->index.items[i] * components + k;
             if (layer_types[layer] == LAYER_TYPE_INTEGER)

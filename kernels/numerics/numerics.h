@@ -84,8 +84,8 @@ static inline real real_divide(real a, real b)
     return lanes_select(ordinary, repaired_quotient(a, b), quotient);
 }
 
-// 1 / a within 2.5 ulp, as devices may divide, for tests with slack; a and the result are normal. On AVX-512
-// an estimate of 14 bits and a Newton step, a third of the time of a division.
+// 1 / a within 2.5 ulp, as devices may divide, for tests with slack; a is finite, a and the result are
+// normal. On AVX-512 an estimate of 14 bits and a Newton step, a third of the time of a division.
 static inline real reciprocal_estimate(real a)
 {
 #if defined(RECIPROCAL_14_BITS)
