@@ -69,7 +69,7 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
     struct stat status;
     bool is_regular = fstat(fileno(file), &status) == 0 && S_ISREG(status.st_mode);
     const size_t largest = is_regular ? SIZE_MAX : (size_t)2 << 30;
-    const size_t chunk = 65536;
+    const size_t chunk = 65535;
     size_t start = text->count, got;
     do {
         array_reserve(*text, chunk + 1);
@@ -77,6 +77,9 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
         text->count += got;
         text->items[text->count] = '\0';
     } while (got == chunk && text->count - start <= largest);
+    // no larger than it is: sanitizers then find what reads beyond its end
+    text->capacity = text->count + 1;
+    text->items = memory_resize(text->items, text->capacity, 1);
 
     bool whole = true;
     if (ferror(file)) {
