@@ -550,6 +550,29 @@ static void too_many_triangles_are_refused(void **state)
     assert_refused(&probe_compute, &scene, "268435457 objects and triangles, more than 268435456");
 }
 
+// The first mesh of a file is no copy; the third, of two triangles, is one too many, by whatever name.
+static void copies_are_limited(void **state)
+{
+    (void)state;
+    file_write("a.obj", square);
+    MessageList messages = {0};
+    const Source source = {.file = "scene.yaml", .bytes = "", .length = 0};
+    Report report = report_open(&source, &messages);
+    Scene scene = {.copied_triangle_count = (1 << 24) - 2};
+    static const char *const paths[] = {"a.obj", "./a.obj", "a.obj"};
+    for (size_t i = 0; i < 3; i++) {
+        const MeshImport import = {.path = paths[i], .transform.scale = {1, 1, 1}, .report = &report};
+        uint32_t index;
+        assert_int_equal(mesh_import(&scene, &import, &index), i < 2);
+        assert_int_equal(messages.count, i < 2 ? 0 : 1);
+    }
+    assert_non_null(strstr(messages.items[0].text, "a.obj: named so often that its copies and others have "
+                                                   "16777218 triangles, more than 16777216"));
+    report_close(&report);
+    message_list_free(&messages);
+    scene_free(&scene);
+}
+
 static void device_without_room_is_reported(void **state)
 {
     (void)state;
@@ -589,6 +612,7 @@ int main(void)
         cmocka_unit_test(ids_count_the_triangles),
         cmocka_unit_test(triangles_without_area_are_never_hit),
         cmocka_unit_test(too_many_triangles_are_refused),
+        cmocka_unit_test(copies_are_limited),
         cmocka_unit_test(device_without_room_is_reported),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);

@@ -141,7 +141,8 @@ typedef struct {
     uint32_t (*triangles)[3];
     uint32_t *materials; // one for each triangle, or NULL: the object's
     size_t triangle_count;
-    char *path; // that it was read from, or NULL
+    char *path;                       // that it was read from, or NULL
+    uint64_t file_device, file_index; // of that file, by whatever name
 } Mesh;
 
 // How a format means its colors: linear light, or values a display takes as they are.
@@ -170,6 +171,7 @@ typedef struct {
         Mesh *items;
         size_t count, capacity;
     } meshes;
+    size_t copied_triangle_count; // of meshes whose file another one is of, too
     struct {
         SceneTexture *items;
         size_t count, capacity;

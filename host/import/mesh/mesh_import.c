@@ -5,6 +5,7 @@
 
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 static bool (*reader_of(const char *path))(MeshDraft *draft)
 {
@@ -52,6 +53,31 @@ static void warn_of_triangles(MeshDraft *draft, const Mesh *mesh)
                    draft->crossed_count);
 }
 
+// Of the triangles of files that a scene names again, each of which has a copy: bounds the cost of a hostile
+// file, as SCENE_TEXTURES_MAX does.
+enum { COPIED_TRIANGLES_MAX = 1 << 24 };
+
+static bool copies_fit(MeshDraft *draft, Mesh *mesh)
+{
+    Scene *scene = draft->scene;
+    struct stat status;
+    if (stat(draft->import->path, &status) != 0) return true;
+    mesh->file_device = status.st_dev;
+    mesh->file_index = status.st_ino;
+    size_t i = scene->meshes.count;
+    while (i > 0 && (scene->meshes.items[i - 1].file_index != status.st_ino ||
+                     scene->meshes.items[i - 1].file_device != status.st_dev))
+        i--;
+    if (i == 0) return true;
+    const size_t count = scene->copied_triangle_count + mesh->triangle_count;
+    if (count > COPIED_TRIANGLES_MAX)
+        return draft_refuse(draft,
+                            "named so often that its copies and others have %zu triangles, more than %d",
+                            count, COPIED_TRIANGLES_MAX);
+    scene->copied_triangle_count = count;
+    return true;
+}
+
 bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index)
 {
     MessageList messages = {0};
@@ -62,7 +88,7 @@ bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index)
     stage_begin(draft.stage, "reading", import->path, 0);
     draft.report = report_open(&draft.source, &messages);
     Mesh mesh = {0};
-    const bool read = file_read(&draft, &mesh);
+    const bool read = file_read(&draft, &mesh) && copies_fit(&draft, &mesh);
     if (read) {
         mesh_join_vertices(&mesh);
         if (import->smoothing == SMOOTH_ALWAYS && !mesh.normals) mesh_make_normals(&mesh);
@@ -70,6 +96,7 @@ bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index)
         *index = (uint32_t)scene->meshes.count;
         array_push(scene->meshes, mesh);
     }
+    if (!read) mesh_free(&mesh);
     draft_free(&draft);
     report_include(import->report, &draft.report);
     return read;
