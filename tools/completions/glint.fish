@@ -1,67 +1,26 @@
-# Completion of glint for fish; the options of each subcommand are checked against its --help by tests/man_options.sh.
+# Completion of glint for fish. The commands and options, with what they do, are those that --help lists.
+
+function __glint_options
+    glint (commandline -opc)[2] --help | string replace -rf '^ +(?:-\w, )?(--[a-z-]+)\S*(?: \S+)?(?:  +(.*))?$' '$1\t$2'
+end
 
 function __glint_aovs
     glint render --help | string replace -rf '^ {26}(\w+): .*' '$1'
 end
 
-complete -c glint -f
-complete -c glint -n __fish_use_subcommand -a render -d 'Render an image'
-complete -c glint -n __fish_use_subcommand -a view -d 'Show a scene in a window'
-complete -c glint -n __fish_use_subcommand -a trace -d 'Shoot explicit rays'
-complete -c glint -n __fish_use_subcommand -a check -d 'Read a scene without rendering it'
-complete -c glint -n __fish_use_subcommand -a devices -d 'List the OpenCL devices'
-complete -c glint -n __fish_use_subcommand -a diff -d 'Compare two images'
-complete -c glint -n __fish_use_subcommand -a bench -d 'Benchmark scenes on this device'
-complete -c glint -n __fish_use_subcommand -a accuracy -d 'Report time and error of every configuration'
-complete -c glint -n __fish_use_subcommand -a certify -d 'Compare an image with a reference of quadruple precision'
-complete -c glint -n __fish_use_subcommand -a verify -d 'Run the hard cases on a device'
-complete -c glint -n __fish_use_subcommand -a cache -d 'List, check or empty the kernel cache'
-complete -c glint -n __fish_use_subcommand -l version -d 'Print the version'
-complete -c glint -n __fish_use_subcommand -l help -d 'List the subcommands'
+# Whether the word before is one of these options.
+function __glint_after
+    contains -- (commandline -opc)[-1] $argv
+end
 
-complete -c glint -n '__fish_seen_subcommand_from render view trace check diff bench accuracy' -F -k
-complete -c glint -n '__fish_seen_subcommand_from render view trace check devices diff bench accuracy certify verify cache' -s h -l help -d 'List the options'
-complete -c glint -n '__fish_seen_subcommand_from render trace' -s o -l output -r -F -d 'Where the result goes'
-complete -c glint -n '__fish_seen_subcommand_from render' -l device -x -a 'cpu gpu all' -d 'Device, or several with commas'
-complete -c glint -n '__fish_seen_subcommand_from view trace bench accuracy certify verify' -l device -x -a 'cpu gpu' -d 'Device'
-complete -c glint -n '__fish_seen_subcommand_from render view' -l precision -x -a 'fast single strict double certified' -d 'Arithmetic'
-complete -c glint -n '__fish_seen_subcommand_from trace verify' -l precision -x -a 'fast single strict double' -d 'Arithmetic'
-complete -c glint -n '__fish_seen_subcommand_from render view trace certify verify' -l lanes -x -a '1 4 8 16' -d 'Pixels or rays per work-item'
-complete -c glint -n '__fish_seen_subcommand_from render view trace certify' -l bvh -x -a 'auto on off' -d 'Use a BVH'
-complete -c glint -n '__fish_seen_subcommand_from render view trace certify verify' -l no-cache -d 'Build the kernel anew'
-complete -c glint -n '__fish_seen_subcommand_from render trace accuracy certify verify' -l perturb -x -d 'Inject the rounding error that OpenCL permits, SEED[:SCALE]'
-complete -c glint -n '__fish_seen_subcommand_from render view trace check bench accuracy certify' -l lenient -d 'Skip unknown elements of a .rt scene'
-complete -c glint -n '__fish_seen_subcommand_from render view trace diff bench accuracy certify' -l max-pixels -x -d 'Largest image that is read'
-complete -c glint -n '__fish_seen_subcommand_from cache' -l clear -d 'Remove all programs'
-complete -c glint -n '__fish_seen_subcommand_from verify' -l lean -d 'Build small kernels, for a slow compiler'
-complete -c glint -n '__fish_seen_subcommand_from check devices diff bench accuracy certify verify' -l json -d 'Machine-readable output'
-complete -c glint -n '__fish_seen_subcommand_from check' -l object -x -d 'What object an ID is of'
-complete -c glint -n '__fish_seen_subcommand_from trace' -l rays -r -F -d 'File of rays'
-complete -c glint -n '__fish_seen_subcommand_from render view bench accuracy certify' -l size -x -d 'Width and height, as WxH'
-complete -c glint -n '__fish_seen_subcommand_from render view' -l samples -x -d 'Rays for each pixel'
-complete -c glint -n '__fish_seen_subcommand_from render' -l region -x -d 'Pixels to render, as X,Y,W,H'
-complete -c glint -n '__fish_seen_subcommand_from view' -l write-camera -d 'C writes the camera into the scene file'
-complete -c glint -n '__fish_seen_subcommand_from render view bench accuracy certify' -l bounces -x -d 'Reflections and refractions at most'
-complete -c glint -n '__fish_seen_subcommand_from render' -l aov -x -a '(__glint_aovs)' -d 'More files beside the image'
-complete -c glint -n '__fish_seen_subcommand_from render' -l max-error -x -d 'Error that the precision must keep, as E or E:METRIC'
-complete -c glint -n '__fish_seen_subcommand_from render' -l timing -d 'Report the time of every stage'
-complete -c glint -n '__fish_seen_subcommand_from render' -l transfer -x -a 'srgb none' -d 'Curve to display values'
-complete -c glint -n '__fish_seen_subcommand_from render' -l bits -x -a '8 16' -d 'Bits per channel'
-complete -c glint -n '__fish_seen_subcommand_from render' -l checkpoint -r -F -d 'Go on from this file, and keep what is rendered'
-complete -c glint -n '__fish_seen_subcommand_from render' -l quiet -d 'No progress'
-complete -c glint -n '__fish_seen_subcommand_from diff' -l heatmap -r -F -d 'Image of the differences'
-complete -c glint -n '__fish_seen_subcommand_from bench accuracy certify' -l precision -x -a 'fast single strict double certified' -d 'Precisions, separated by commas'
-complete -c glint -n '__fish_seen_subcommand_from bench accuracy' -l lanes -x -a '1 4 8 16' -d 'Lanes, separated by commas'
-complete -c glint -n '__fish_seen_subcommand_from bench accuracy' -l bvh -x -a 'auto on off' -d 'With and without a BVH, separated by commas'
-complete -c glint -n '__fish_seen_subcommand_from bench accuracy' -l seconds -x -d 'Stop the runs after this many seconds'
-complete -c glint -n '__fish_seen_subcommand_from bench' -l launches -d 'List the launches of the last runs'
-complete -c glint -n '__fish_seen_subcommand_from bench' -l compare -r -F -d 'Compare with an earlier report'
-complete -c glint -n '__fish_seen_subcommand_from bench' -l tolerance -x -d 'Ratio of times that are the same'
-complete -c glint -n '__fish_seen_subcommand_from bench' -l against -r -F -d 'Compare with another build'
-complete -c glint -n '__fish_seen_subcommand_from bench' -l worker -d 'Answer the option --against of another glint'
-complete -c glint -n '__fish_seen_subcommand_from accuracy' -l reference -r -F -d 'Linear colors to compare with'
-complete -c glint -n '__fish_seen_subcommand_from accuracy' -l budget -x -d 'Errors to allow, separated by commas'
-complete -c glint -n '__fish_seen_subcommand_from bench accuracy' -l samples -x -d 'Numbers of samples, separated by commas'
-complete -c glint -n '__fish_seen_subcommand_from accuracy' -l save -r -F -d 'Folder for all that is compared'
-complete -c glint -n '__fish_seen_subcommand_from accuracy' -l html -r -F -d 'Self-contained HTML report'
-complete -c glint -n '__fish_seen_subcommand_from certify' -l pixels -x -d 'Pixels of the sample, about'
+complete -c glint -f
+complete -c glint -n __fish_use_subcommand -a '(glint --help | string replace -rf "^  (\w+)  +(.*)" "\$1\t\$2")'
+complete -c glint -n 'not __fish_use_subcommand; and string match -q -- "-*" (commandline -ct)' -a '(__glint_options)'
+complete -c glint -n 'not __fish_use_subcommand; and not __glint_after --precision --lanes --bvh --bits --transfer --aov' -F
+complete -c glint -n '__glint_after --precision' -a 'fast single strict double certified'
+complete -c glint -n '__glint_after --lanes' -a '1 4 8 16'
+complete -c glint -n '__glint_after --bvh' -a 'auto on off'
+complete -c glint -n '__glint_after --bits' -a '8 16'
+complete -c glint -n '__glint_after --transfer' -a 'srgb none'
+complete -c glint -n '__glint_after --device' -a 'cpu gpu all'
+complete -c glint -n '__glint_after --aov' -a '(__fish_append , (__glint_aovs))'
