@@ -68,6 +68,26 @@ Scene scene_of_text(const char *name, const char *text)
     return scene;
 }
 
+Scene complete;
+
+int complete_open(const char *path)
+{
+    complete = scene_of_file(path);
+    return 0;
+}
+
+int complete_close(void **state)
+{
+    (void)state;
+    scene_free(&complete);
+    return 0;
+}
+
+const Material *material_of(const Object *object)
+{
+    return &complete.materials.items[object->material];
+}
+
 void check_number(double value, double expected, const char *file, int line)
 {
     if (fabs(value - expected) <= 1e-14 * fmax(1, fabs(expected))) return;

@@ -18,6 +18,13 @@ Scene scene_of_file(const char *path);
 // The same from a text.
 Scene scene_of_text(const char *name, const char *text);
 
+// The scene of a file that has all of its format, for the tests of a group.
+extern Scene complete;
+int complete_open(const char *path);
+int complete_close(void **state);
+// Of one of its objects.
+const Material *material_of(const Object *object);
+
 void check_number(double value, double expected, const char *file, int line);
 void check_vector(Vector3 vector, Vector3 expected, const char *file, int line);
 

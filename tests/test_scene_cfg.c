@@ -12,25 +12,10 @@
 #define LIGHT  "=>light :\n{\n\tposition 0 9 0\n\tintensity 1 1 1\n}\n"
 #define SPHERE "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 0\n\tcolor 0 0 0\n\tdiffuse 1 1 1\n\tspecular 0\n}\n"
 
-static Scene complete;
-
-static int complete_open(void **state)
+static int set_up(void **state)
 {
     (void)state;
-    complete = scene_of_file("tests/scenes/complete.cfg");
-    return 0;
-}
-
-static int complete_close(void **state)
-{
-    (void)state;
-    scene_free(&complete);
-    return 0;
-}
-
-static const Material *material_of(const Object *object)
-{
-    return &complete.materials.items[object->material];
+    return complete_open("tests/scenes/complete.cfg");
 }
 
 static void test_scene(void **state)
@@ -136,5 +121,5 @@ int main(void)
         cmocka_unit_test(test_text_between_blocks_is_skipped),
         cmocka_unit_test(test_no_lights_no_objects),
     };
-    return cmocka_run_group_tests(tests, complete_open, complete_close);
+    return cmocka_run_group_tests(tests, set_up, complete_close);
 }

@@ -14,18 +14,14 @@
 #define MATERIAL "f 1 1 1 1 0 1 0 0\n"
 #define SPHERE   "s 0 0 0 1\n"
 
-static Scene complete;
-
-static int complete_open(void **state)
+static int set_up(void **state)
 {
-    complete = scene_of_file("tests/scenes/complete.nff");
-    return probe_open(state);
+    return complete_open("tests/scenes/complete.nff") + probe_open(state);
 }
 
-static int complete_close(void **state)
+static int tear_down(void **state)
 {
-    scene_free(&complete);
-    return probe_close(state);
+    return complete_close(state) + probe_close(state);
 }
 
 static void test_view(void **state)
@@ -203,5 +199,5 @@ int main(void)
         cmocka_unit_test(test_polygons),    cmocka_unit_test(test_tolerated),
         cmocka_unit_test(test_only_inside),
     };
-    return cmocka_run_group_tests(tests, complete_open, complete_close);
+    return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -13,25 +13,10 @@
 #define LIT    CAMERA "L 0,9,0 1\n"
 #define SPHERE "sp 0,0,0 2 255,0,0\n"
 
-static Scene complete;
-
-static int complete_open(void **state)
+static int set_up(void **state)
 {
     (void)state;
-    complete = scene_of_file("tests/scenes/complete.rt");
-    return 0;
-}
-
-static int complete_close(void **state)
-{
-    (void)state;
-    scene_free(&complete);
-    return 0;
-}
-
-static const Material *material_of(const Object *object)
-{
-    return &complete.materials.items[object->material];
+    return complete_open("tests/scenes/complete.rt");
 }
 
 static void test_scene(void **state)
@@ -251,5 +236,5 @@ int main(void)
         cmocka_unit_test(test_lenient_keeps_other_errors),
         cmocka_unit_test(test_many_warnings_are_counted),
     };
-    return cmocka_run_group_tests(tests, complete_open, complete_close);
+    return cmocka_run_group_tests(tests, set_up, complete_close);
 }

@@ -13,20 +13,10 @@
 #define LIT    CAMERA "lights:\n  - point: {position: [0, 9, 0]}\n"
 #define SPHERE "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n"
 
-static Scene complete;
-
-static int complete_open(void **state)
+static int set_up(void **state)
 {
     (void)state;
-    complete = scene_of_file("tests/scenes/complete.yaml");
-    return 0;
-}
-
-static int complete_close(void **state)
-{
-    (void)state;
-    scene_free(&complete);
-    return 0;
+    return complete_open("tests/scenes/complete.yaml");
 }
 
 static void test_scene_keys(void **state)
@@ -315,5 +305,5 @@ int main(void)
         cmocka_unit_test(test_a_failed_scene_is_empty),
         cmocka_unit_test(test_more_than_2_gibibytes_are_refused),
     };
-    return cmocka_run_group_tests(tests, complete_open, complete_close);
+    return cmocka_run_group_tests(tests, set_up, complete_close);
 }

@@ -329,18 +329,19 @@ void render_command_note(RenderCommand *command, int status)
     if (status != EXIT_DONE) command->status = status;
 }
 
-bool render_status_goes_on(int status)
+// Whether another scene can be rendered: a mistake in one does not concern others.
+static bool goes_on_after(int status)
 {
     return status == EXIT_DONE || status == EXIT_USER;
 }
 
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
 {
-    bool goes_on = render_status_goes_on(command->status);
+    bool goes_on = goes_on_after(command->status);
     for (size_t i = first; i < command->options.scene_count && goes_on; i++) {
         const int status = render_command_run(command, i, ranks);
         render_command_note(command, status);
-        goes_on = render_status_goes_on(status);
+        goes_on = goes_on_after(status);
     }
     if (command->status == EXIT_DONE) fault_output_is_complete(EXIT_DONE);
 }

@@ -24,8 +24,6 @@ const char *render_command_path(const RenderCommand *command, size_t index); // 
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);
 // Whether the last scene or the settings did not fit a device, which is a mistake where all are alike.
 bool render_command_is_unfit(const RenderCommand *command);
-// Whether another scene can be rendered after one of that status: a mistake in one does not concern others.
-bool render_status_goes_on(int status);
 // Adds a scene's status to the command's.
 void render_command_note(RenderCommand *command, int status);
 // Renders the scenes from `first` on, as far as the command goes on, and notes their statuses: its last work.

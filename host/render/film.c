@@ -19,14 +19,10 @@ uint32_t film_components(const Film *film, Layer layer)
     return layer_components[layer] == PER_LIGHT ? film->light_count : layer_components[layer];
 }
 
-size_t film_value_size(const Film *film, Layer layer)
-{
-    return layer_types[layer] == LAYER_TYPE_INTEGER ? sizeof(uint32_t) : film->real_size;
-}
-
 size_t film_layer_size(const Film *film, Layer layer)
 {
-    return film_pixel_count(film) * film_components(film, layer) * film_value_size(film, layer);
+    const size_t value_size = layer_types[layer] == LAYER_TYPE_INTEGER ? sizeof(uint32_t) : film->real_size;
+    return film_pixel_count(film) * film_components(film, layer) * value_size;
 }
 
 size_t film_size(const Film *film)

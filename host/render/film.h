@@ -81,8 +81,6 @@ static inline size_t film_pixel_count(const Film *film)
 
 // Values per pixel.
 uint32_t film_components(const Film *film, Layer layer);
-// Of one value, in bytes.
-size_t film_value_size(const Film *film, Layer layer);
 // Of the whole layer, in bytes, whether it is there or not.
 size_t film_layer_size(const Film *film, Layer layer);
 
