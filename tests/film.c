@@ -25,15 +25,11 @@ const uint32_t *tested_lanes(const Device *device)
 
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision)
 {
-    return (RenderSettings){.width = width,
-                            .height = height,
-                            .region_width = width,
-                            .region_height = height,
-                            .sample_count = 1,
-                            .bounce_count = 5,
-                            .precision = precision,
-                            .extra_features = tests_are_long() ? 0 : FEATURE_ALL,
-                            .shift_to_eye = true};
+    RenderSettings settings = settings_of_image(width, height, precision);
+    settings.bounce_count = 5;
+    settings.extra_features = tests_are_long() ? 0 : FEATURE_ALL;
+    settings.shift_to_eye = true;
+    return settings;
 }
 
 Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs)

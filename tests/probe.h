@@ -79,14 +79,9 @@ static inline cl_program probe_program(const char *text, const char *prelude, co
 static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const TraceRay *rays,
                                size_t count, TraceHit *hits)
 {
-    const RenderSettings settings = {.width = 1,
-                                     .height = 1,
-                                     .region_width = 1,
-                                     .region_height = 1,
-                                     .sample_count = 1,
-                                     .precision = precision,
-                                     .lanes = lanes,
-                                     .extra_features = FEATURE_ALL};
+    RenderSettings settings = settings_of_image(1, 1, precision);
+    settings.lanes = lanes;
+    settings.extra_features = FEATURE_ALL;
     Renderer *renderer = probe_renderer(scene, &settings);
     if (renderer == NULL) return false;
     bool traced = renderer_trace(renderer, rays, count, hits);
@@ -108,13 +103,8 @@ static inline bool probe_keep_band(void *context, const Film *band, double fract
 static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t height, Precision precision,
                                 float *colors)
 {
-    const RenderSettings settings = {.width = width,
-                                     .height = height,
-                                     .region_width = width,
-                                     .region_height = height,
-                                     .sample_count = 1,
-                                     .precision = precision,
-                                     .shift_to_eye = true};
+    RenderSettings settings = settings_of_image(width, height, precision);
+    settings.shift_to_eye = true;
     Renderer *renderer = probe_renderer(scene, &settings);
     if (renderer == NULL) return false;
     bool whole = renderer_render(renderer, 0, probe_keep_band, colors);

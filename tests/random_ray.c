@@ -1,5 +1,16 @@
 #include "tests/random_ray.h"
 
+Scene scene_of_shapes(Object *objects, size_t count, Material *material)
+{
+    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
+    *material = (Material){.color = {1, 1, 1}, .diffuse = {1, 1, 1}};
+    scene.objects.items = objects;
+    scene.objects.count = count;
+    scene.materials.items = material;
+    scene.materials.count = 1;
+    return scene;
+}
+
 static RandomRay ray_between(Vector3 eye, Vector3 target, Random *random)
 {
     Vector3 direction = vector_normalize(vector_subtract(target, eye));

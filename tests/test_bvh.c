@@ -215,15 +215,10 @@ static void few_boxes_make_a_tree(void **state)
 static void trace_lanes(const Scene *scene, Precision precision, BvhChoice bvh, uint32_t lanes,
                         const TraceRay *rays, size_t count, TraceHit *hits)
 {
-    const RenderSettings settings = {.width = 1,
-                                     .height = 1,
-                                     .region_width = 1,
-                                     .region_height = 1,
-                                     .sample_count = 1,
-                                     .precision = precision,
-                                     .lanes = lanes,
-                                     .bvh = bvh,
-                                     .extra_features = FEATURE_ALL};
+    RenderSettings settings = settings_of_image(1, 1, precision);
+    settings.lanes = lanes;
+    settings.bvh = bvh;
+    settings.extra_features = FEATURE_ALL;
     Renderer *renderer = probe_renderer(scene, &settings);
     assert_non_null(renderer);
     assert_true(renderer_trace(renderer, rays, count, hits));

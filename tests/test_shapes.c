@@ -51,17 +51,6 @@ typedef struct {
     double t, normal, length; // the largest errors as parts of their bounds
 } Tally;
 
-static Scene scene_of(Object *objects, size_t count, Material *material)
-{
-    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
-    *material = (Material){.color = {1, 1, 1}, .diffuse = {1, 1, 1}};
-    scene.objects.items = objects;
-    scene.objects.count = count;
-    scene.materials.items = material;
-    scene.materials.count = 1;
-    return scene;
-}
-
 static int bits_of(Precision precision)
 {
     return precision == PRECISION_DOUBLE ? 53 : 24;
@@ -217,7 +206,7 @@ static void check(const RandomShape *shapes, size_t count, Vector3 center, doubl
     static Trial trial;
     Object objects[SHAPES_IN_SCENE];
     Material material;
-    Scene scene = scene_of(objects, count, &material);
+    Scene scene = scene_of_shapes(objects, count, &material);
     trial.center = center;
     trial.radius = radius;
     for (int is_double = 0; is_double < 2; is_double++) {
@@ -312,7 +301,7 @@ static void gives_the_same_bits_at_every_width(void **state)
         objects[i] = shapes[i].object;
     }
     Material material;
-    Scene scene = scene_of(objects, form_count, &material);
+    Scene scene = scene_of_shapes(objects, form_count, &material);
     prepare(&trial, &scene, shapes, form_count, false, false, &random);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {

@@ -57,16 +57,10 @@ static double frame_seconds(Renderer *renderer)
 
 static void variant_build(Variant *variant, Compute *compute, const Scene *scene)
 {
-    const RenderSettings settings = {.width = 1920,
-                                     .height = 1080,
-                                     .region_width = 1920,
-                                     .region_height = 1080,
-                                     .sample_count = 1,
-                                     .bounce_count = 5,
-                                     .precision = PRECISION_SINGLE,
-                                     .extra_features = variant->extra,
-                                     .shift_to_eye = true,
-                                     .no_cache = true};
+    RenderSettings settings = settings_of_image(1920, 1080, PRECISION_SINGLE);
+    settings.bounce_count = 5;
+    settings.extra_features = variant->extra;
+    settings.shift_to_eye = settings.no_cache = true;
     MessageList messages = {0};
     renderer_close(variant->renderer);
     variant->renderer = renderer_open(compute, scene, &settings, &messages);

@@ -255,19 +255,13 @@ bool output_overwrites_scene(const char *path, const Scene *scene, const char *s
 
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height)
 {
-    return (RenderSettings){
-        .width = width,
-        .height = height,
-        .region_width = width,
-        .region_height = height,
-        .sample_count = 1,
-        .precision = common->precision,
-        .lanes = common->lanes,
-        .bvh = common->bvh,
-        .no_cache = common->no_cache,
-        .perturb_seed = common->perturb_seed,
-        .perturb_scale = common->perturb_scale,
-    };
+    RenderSettings settings = settings_of_image(width, height, common->precision);
+    settings.lanes = common->lanes;
+    settings.bvh = common->bvh;
+    settings.no_cache = common->no_cache;
+    settings.perturb_seed = common->perturb_seed;
+    settings.perturb_scale = common->perturb_scale;
+    return settings;
 }
 
 void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)

@@ -40,6 +40,17 @@ typedef struct {
     Stage *stage;        // shows what is done before the first launch; NULL: not wanted
 } RenderSettings;
 
+// A whole image, with one sample per pixel.
+static inline RenderSettings settings_of_image(uint32_t width, uint32_t height, Precision precision)
+{
+    return (RenderSettings){.width = width,
+                            .height = height,
+                            .region_width = width,
+                            .region_height = height,
+                            .sample_count = 1,
+                            .precision = precision};
+}
+
 // 8192 ulp, the largest error (kernels/numerics/perturb.h), times this is below 2^23 ulp: an injected error
 // stays below one binade.
 enum { PERTURB_SCALE_MAX = 1000 };

@@ -110,29 +110,13 @@ static Rays rays_make(const Object *object, const RandomShape *shape, double run
     return rays;
 }
 
-static Scene scene_of(Object *objects, size_t count, Material *material)
-{
-    *material = (Material){.color = {1, 1, 1}, .diffuse = {1, 1, 1}};
-    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
-    scene.objects.items = objects;
-    scene.objects.count = count;
-    scene.materials.items = material;
-    scene.materials.count = 1;
-    return scene;
-}
-
 // For times the kernels of the shape alone; for errors those with every feature, which answer the same bits
 // and serve all shapes.
 static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision precision, FeatureSet features)
 {
-    const RenderSettings settings = {.width = 1,
-                                     .height = 1,
-                                     .region_width = 1,
-                                     .region_height = 1,
-                                     .sample_count = 1,
-                                     .bvh = BVH_OFF,
-                                     .precision = precision,
-                                     .extra_features = features};
+    RenderSettings settings = settings_of_image(1, 1, precision);
+    settings.bvh = BVH_OFF;
+    settings.extra_features = features;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     message_list_print(&messages, stderr);
@@ -238,7 +222,7 @@ static double test_seconds(Compute *compute, const RandomShape *shape, Precision
         for (int i = 0; i <= COPIES; i++)
             copies[i] = object;
         Material material;
-        Scene scene = scene_of(copies, many ? 1 + COPIES : 1, &material);
+        Scene scene = scene_of_shapes(copies, many ? 1 + COPIES : 1, &material);
         Renderer *renderer = renderer_of(compute, &scene, precision, 0);
         seconds[many] = trace_seconds(renderer, &all);
         renderer_close(renderer);
@@ -278,7 +262,7 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
     Renderer **renderer = &shape->renderers[which][precision];
     if (!*renderer) {
         Material material;
-        Scene scene = scene_of(object, 1, &material);
+        Scene scene = scene_of_shapes(object, 1, &material);
         *renderer = renderer_of(compute, &scene, precision, FEATURE_ALL);
     }
     rays_trace(*renderer, rays);
