@@ -23,12 +23,15 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# What a rank does wrong: its device fails, or is slow for a number of microseconds, or has so few bytes of memory, or what it sends with the tag FAULT_TAG has a wrong word,
-# is sent FAULT_TIMES, or is replaced by an end without a reason (FAULT_ENDS).
+# What a rank does wrong: its device fails, or is slow for a number of microseconds, or has so few bytes of memory; or it is interrupted as it
+# reads a scene; or what it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end without a reason
+# (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <mpi.h>
+#include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -44,6 +47,11 @@ int clGetDeviceInfo(void *device, unsigned name, size_t size, void *value, size_
     const int is_memory = name == 0x101F || name == 0x1010; // CL_DEVICE_GLOBAL_MEM_SIZE, CL_DEVICE_MAX_MEM_ALLOC_SIZE
     if (getenv("FAULT_MEMORY") && value && is_memory) *(unsigned long *)value = atoi(getenv("FAULT_MEMORY"));
     return status;
+}
+FILE *fopen(const char *path, const char *mode)
+{
+    if (getenv("FAULT_INTERRUPTS") && strstr(path, ".yaml")) raise(SIGTERM);
+    return ((FILE * (*)()) dlsym(RTLD_NEXT, "fopen"))(path, mode);
 }
 int MPI_Send(const void *bytes, int size, MPI_Datatype type, int rank, int tag, MPI_Comm ranks)
 {
@@ -202,6 +210,16 @@ class Mpi(TestCase):
         process = self.mpirun(f"-n 2 {small}", 1)
         self.assertRegex(process.stderr, "the scene needs .* on the device")
         self.check_frames()
+
+    def test_an_interrupt_while_a_frame_is_read(self):
+        """The first rank's own; the other rank's frame ends, too, and nothing is left behind."""
+        self.faults_build()
+        command = self.write_frames()
+        os.mkdir("frames")
+        interrupted = f"-x LD_PRELOAD=./faults.so -x FAULT_USEC=0 -x FAULT_INTERRUPTS=1 {RANKS} {command} -o frames"
+        process = self.mpirun(f"-n 1 {interrupted} : -n 1 {RANKS} {command} -o frames", 130)
+        self.assertRegex(process.stderr, "glint: interrupted: no image was written; an earlier frames/")
+        self.assertEqual([name for name in os.listdir("frames") if not name.endswith(".png")], [])
 
     def mpirun_faulty(self, *faults, status=0):
         """Each rank is faulty as its variables say."""
