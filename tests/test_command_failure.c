@@ -101,19 +101,19 @@ static void test_several_devices(void **state)
     const struct {
         const char *call;
         size_t index;
-        bool first_is_tiny;
         const char *devices, *file, *expected, *reason;
         int status;
+        bool first_is_tiny;
     } runs[] = {
-        {NULL, 0, false, "all", one, "", "", EXIT_DONE},
-        {"clEnqueueNDRangeKernel", 0, false, "all", other, dropped,
-         "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_DONE},
-        {"clCreateContext", 0, false, "all", other, dropped, "clCreateContext: CL_OUT_OF_RESOURCES (-5) on ",
-         EXIT_DONE},
-        {NULL, 0, true, "all", other, dropped, "the scene needs ", EXIT_DONE},
-        {"clEnqueueNDRangeKernel", EVERY_CALL, false, "all", "/dev/null/none.npy",
-         "\nglint: ", "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE},
-        {NULL, 0, true, "0,1", "/dev/null/none.npy", "glint: error: ", "the scene needs ", EXIT_USER}};
+        {NULL, 0, "all", one, "", "", EXIT_DONE, false},
+        {"clEnqueueNDRangeKernel", 0, "all", other, dropped,
+         "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_DONE, false},
+        {"clCreateContext", 0, "all", other, dropped, "clCreateContext: CL_OUT_OF_RESOURCES (-5) on ",
+         EXIT_DONE, false},
+        {NULL, 0, "all", other, dropped, "the scene needs ", EXIT_DONE, true},
+        {"clEnqueueNDRangeKernel", EVERY_CALL, "all", "/dev/null/none.npy",
+         "\nglint: ", "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE, false},
+        {NULL, 0, "0,1", "/dev/null/none.npy", "glint: error: ", "the scene needs ", EXIT_USER, true}};
     driver_folder = pocl;
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         Command command = {command_render,
