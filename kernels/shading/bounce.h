@@ -81,25 +81,25 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
 }
 
 // The largest error of a bounced ray's direction that is still traced.
-#define BOUNCE_ERROR_MAX ((real)(0x1p-8f))
+#define BOUNCE_ERROR_MAX ((real)(0x1p-6f))
 
 // The bounds of a surface's reflected and refracted ray. d - 2 (d . N) N is off by the error of d and twice
-// that of N; the refracted ray by Snell's law, whose root divides by the refracted cosine. Lanes in doubt are
-// not traced further.
+// that of N; the refracted ray's, n d + N (s - sqrt(s^2 - k)), by those of d and N and by what the difference
+// changes with s. Lanes in doubt are not traced further.
 static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
                                       Bounce *refracted, mask *doubt)
 {
     const real zero = (real)(0), one = (real)(1), rounding = (real)(32 * UNIT_ROUNDOFF);
     real normal_error = surface->normal_error, turn = ray->direction_error + rounding;
     mask found = surface->found & ray->active, open = mask_none();
-    real reflected_error = real_fma((real)(2.25f), normal_error, turn);
+    real reflected_error = real_fma((real)(2), normal_error, turn);
     reflected->origin_error = refracted->origin_error = surface->place_error;
     reflected->left = refracted->left = surface->object;
     reflected->direction_error = reflected_error;
     reflected->leaves_outward = surface->entering;
     refracted->leaves_outward = !surface->entering;
     mask reflects = found & bounce_is_active(reflected);
-    open = reflects & (reflected_error > BOUNCE_ERROR_MAX);
+    open = reflects & !(reflected_error <= BOUNCE_ERROR_MAX);
     if (HAS_TRIANGLES) {
         // the shading normal's reflection may run through the surface
         Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
@@ -110,22 +110,24 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
         mask transparent = found & (surface->transmission > zero);
         real scale = lanes_select(surface->entering, one, surface->ior);
         real cosine = fabs(vector_dot(ray->direction, surface->shading_normal)), scaled = scale * cosine;
-        real scaled_error = scale * (turn + normal_error + rounding);
+        real scaled_error = scale * (real_fma(turn, normal_error, turn + normal_error) + rounding);
         real k =
             lanes_select(surface->entering, one - surface->ior, surface->ior - one) * (surface->ior + one);
-        real squared = real_fma(scaled, scaled, -k);
-        real squared_error = scaled_error * (scaled + scaled + scaled_error) +
-                             rounding * (scaled * scaled + surface->ior * surface->ior);
-        open = open | (transparent & (fabs(squared) <= squared_error));
-        real root = real_sqrt(real_max(squared, squared_error));
-        real root_error = real_divide(squared_error, lanes_select(root > zero, root, one));
+        real squares = real_fma(scaled, scaled, surface->ior * surface->ior);
+        real squared_error = scaled_error * (scaled + scaled + scaled_error) + rounding * squares;
+        real squared = real_fma(scaled, scaled, -k), least_squared = squared - squared_error;
+        open = open | (transparent & !(fabs(squared) > squared_error));
+        // s - sqrt(s^2 - k) changes most where s is least
+        real least = real_max(scaled - scaled_error, zero), root = real_sqrt(real_max(squared, zero)),
+             least_root = real_sqrt(lanes_select(least_squared > zero, least_squared, one));
+        real change = real_divide(real_max(fabs(least - least_root), root - least), least_root);
+        real error = scale * turn + fabs(scaled - root) * normal_error + change * scaled_error +
+                     rounding * (scale + scaled + root + real_divide(squares, least_root));
         // over the length before it is made unit: the index on entering, 1 on leaving
-        real error = scale * turn + (fabs(scaled - root) + root_error) * normal_error + scaled_error +
-                     root_error + rounding * (scale + scaled + root);
         real length = lanes_select(surface->entering, surface->ior, one);
-        refracted->direction_error = real_divide(error + error, length) + rounding;
+        refracted->direction_error = real_divide((real)(1.02f) * error, length) + rounding;
         mask refracts = transparent & !total;
-        open = open | (refracts & (refracted->direction_error > BOUNCE_ERROR_MAX));
+        open = open | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
         if (HAS_TRIANGLES)
             open = open | (refracts & (fabs(vector_dot(refracted->direction, surface->normal)) <=
                                        refracted->direction_error + normal_error));

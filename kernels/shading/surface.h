@@ -126,21 +126,25 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     return hit;
 }
 
-// How far a hit's position may be from the exact one: its ray's and its t's errors, and the roundings of
-// ray_point, with the shapes' own.
+// How far a hit's position may be from the exact one: across the ray by the ray's error, along it by t's, and
+// by the roundings of ray_point, with the shapes' own.
 static inline real hit_place_error(const Ray *ray, const Hit *hit)
 {
     real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
     real rounding =
         (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
-    return ray_place_error(ray, length * t) +
-           real_fma(length, real_max(hit->high - hit->t, hit->t - hit->low), rounding);
+    real across = ray_place_error(ray, length * t),
+         along = length * real_max(hit->high - hit->t, hit->t - hit->low);
+    // not less than the root of the sum of squares
+    real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
+    return real_fma((real)(1.04f), both, rounding);
 }
 
 // Of the shading normal.
 static inline real point_normal_error(const SurfacePoint *point, real place_error)
 {
-    return real_fma((real)(2) * point->curvature, place_error, point->normal_error) +
+    real turned = point->curvature * place_error; // to first order
+    return real_fma(turned, real_fma((real)(4), turned, (real)(1)), point->normal_error) +
            (real)(16 * UNIT_ROUNDOFF);
 }
 

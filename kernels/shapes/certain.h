@@ -95,6 +95,14 @@ typedef struct {
     real middle_t, middle_error; // the closest point
 } CertainSphere;
 
+// A crossing of the sphere after one step of Newton's method; the slope is half of that of |x|^2 there, x
+// being seen from the center.
+static inline real sphere_crossing_refine(Vector f, real radius, const Ray *ray, real t, real inverse_slope)
+{
+    Vector x = vector_fma(ray->direction, t, f);
+    return real_fma(real_fma(radius, radius, -vector_dot(x, x)), (real)(0.5f) * inverse_slope, t);
+}
+
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
 {
     Vector f = vector_subtract(ray->origin, center);
@@ -106,7 +114,10 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real distance = real_fma(fabs(crossed.middle_t), ray->length, radius + radius);
     real rounding = (real)(UNIT_ROUNDOFF)*real_fma((real)(3), distance,
                                                    real_fma((real)(6), radius, vector_norm1(ray->origin)));
-    real place = ray_place_error(ray, distance) + rounding;
+    // crossings are no farther than this and the place; so is the closest point
+    real farthest = distance - radius;
+    real place = ray_place_error(ray, farthest) * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
+    place = real_fma(ray->direction_error, place, place);
     real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
     real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
     // not where all of it is behind the start, or beyond the end
@@ -117,14 +128,28 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     crossed.perhaps = lanes & !((squared < -band) | apart);
     crossed.near_t = crossed.far_t = crossed.middle_error = crossed.t_error = (real)(0);
     if (!lanes_any(crossed.perhaps)) return crossed;
-    // in t; where it is in doubt, of half the band: between 0 and that of twice the band
+    // in t; where it is in doubt, of the band: between 0 and that of twice the band
     real half_chord = real_sqrt(real_max(squared, band) * ray->inverse_squared);
-    real chord_error = real_divide((real)(1.5f) * band * ray->inverse_squared,
-                                   lanes_select(half_chord > (real)(0), half_chord, (real)(1)));
+    // a place that moves by p moves the crossing by p over the cosine there, the least half chord over r
+    real least = squared - band, quarter = (real)(0.25f) * band;
+    mask grazes = least < quarter;
+    real cosine_radius = real_sqrt(lanes_select(grazes, quarter, least));
+    real few_squares = (real)(4 * UNIT_ROUNDOFF) * (radius * radius);
+    real moved = real_divide(real_fma((real)(0.51f), band, real_fma(place, place, few_squares)),
+                             lanes_select(cosine_radius > (real)(0), cosine_radius, (real)(1)));
+    moved = moved + lanes_select(grazes, place, (real)(0));
     crossed.middle_error = ray->inverse_length * (place + along);
-    crossed.t_error = chord_error + real_fma((real)(16 * UNIT_ROUNDOFF), half_chord, crossed.middle_error);
     crossed.near_t = crossed.middle_t - half_chord;
     crossed.far_t = crossed.middle_t + half_chord;
+    // both are off by no more than twice `along`, which the step squares
+    mask refines = (real)(64) * along < cosine_radius;
+    real inverse_slope = real_divide(ray->inverse_squared, lanes_select(refines, half_chord, (real)(1)));
+    crossed.near_t = lanes_select(
+        refines, sphere_crossing_refine(f, radius, ray, crossed.near_t, -inverse_slope), crossed.near_t);
+    crossed.far_t = lanes_select(
+        refines, sphere_crossing_refine(f, radius, ray, crossed.far_t, inverse_slope), crossed.far_t);
+    real computed = lanes_select(refines, (real)(2.5f * UNIT_ROUNDOFF) * distance, along + along);
+    crossed.t_error = ray->inverse_length * (moved + computed);
     return crossed;
 }
 

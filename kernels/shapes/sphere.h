@@ -185,8 +185,10 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
     left = left & lanes;
     if (lanes_any(left)) {
         // one crossing is the start; the other lies twice as far as the closest point
-        real t = (real)(2) * crossed.middle_t, t_error = (real)(2.5f) * crossed.middle_error;
-        CertainHit other = certain_crossing(ray, left, left, t - t_error, t + t_error);
+        real t = (real)(2) * crossed.middle_t, t_error = (real)(2.1f) * crossed.middle_error;
+        CertainHit other =
+            certain_crossing(ray, left, left, real_max(t - t_error, crossed.far_t - crossed.t_error),
+                             real_min(t + t_error, far_high));
         hit = certain_select(left, other, hit);
     }
     return hit;
@@ -196,6 +198,10 @@ static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real 
                                      SurfacePoint *point)
 {
     point->curvature = real_divide((real)(1), (real)(sphere->center_radius.w));
+    // of the point seen from the center: their roundings
+    real sizes =
+        (real)(4) * vector_norm1(vector_of(sphere->center_radius)) + (real)(2) * vector_norm1(ray->origin);
+    point->normal_error = (real)(UNIT_ROUNDOFF)*point->curvature * sizes;
     return mask_none();
 }
 

@@ -348,7 +348,7 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
     real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
     Vector blend = triangle_blend(weights, normals);
     real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
-    point->curvature = (real)(1.25f) * bend * slimness;
+    point->curvature = (real)(2.5f) * bend * slimness;
     point->normal_error = vertex_error * (slimness + point->curvature);
 }
 
