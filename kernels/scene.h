@@ -12,6 +12,7 @@ typedef struct {
     SHAPE_LIST(SCENE_SHAPE_MEMBER)
     global const TriangleNormals *triangle_normals;
     global const TriangleUvs *triangle_uvs;
+    global const TriangleNeighbors *triangle_neighbors;
     global const BvhNode *nodes;
     global const CullSphere *cull_spheres;
     global const ObjectEntry *objects;
@@ -27,15 +28,15 @@ typedef struct {
 #define SCENE_ARGUMENTS                                                                                      \
     global const SceneHeader *header,                                                                        \
         SHAPE_LIST(SCENE_SHAPE_ARGUMENT) global const TriangleNormals *triangle_normals,                     \
-        global const TriangleUvs *triangle_uvs, global const BvhNode *nodes,                                 \
-        global const CullSphere *cull_spheres, global const ObjectEntry *objects,                            \
-        global const Material *materials, global const Light *lights,                                        \
+        global const TriangleUvs *triangle_uvs, global const TriangleNeighbors *triangle_neighbors,          \
+        global const BvhNode *nodes, global const CullSphere *cull_spheres,                                  \
+        global const ObjectEntry *objects, global const Material *materials, global const Light *lights,     \
         global const TextureLevel *texture_levels, global const Texel *texels
 #define SCENE_SHAPE_VALUE(feature, Type, name, names) names,
 #define SCENE_FROM_ARGUMENTS                                                                                 \
     {                                                                                                        \
-        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, nodes, cull_spheres, objects,  \
-            materials, lights, texture_levels, texels, 0                                                     \
+        header, SHAPE_LIST(SCENE_SHAPE_VALUE) triangle_normals, triangle_uvs, triangle_neighbors, nodes,     \
+            cull_spheres, objects, materials, lights, texture_levels, texels, 0                              \
     }
 
 // Adds the lanes in `rays` to a counter, in a counting build of the image's kernel only.

@@ -97,6 +97,16 @@ typedef struct {
     scalar4 a, b, c; // unit
 } TriangleNormals;
 
+// At `certified`, of a triangle, or of any object, whose id is the index: the ids of the triangles across the
+// edges opposite a, b and c, and 3 bits for each, from the lowest on. They are set where signs of exact
+// arithmetic on the scene's vertices say so.
+typedef struct {
+    uint4 ids_sides;
+} TriangleNeighbors;
+
+enum { NEIGHBOR_HAS_THIS_BEHIND = 1, NEIGHBOR_IN_FRONT = 2, NEIGHBOR_BEHIND = 4, NEIGHBOR_SIDES_BITS = 3 };
+#define NO_NEIGHBOR 0xfffffffeu
+
 // Texture coordinates.
 typedef struct {
     scalar4 a_b;       // u and v of a, u and v of b

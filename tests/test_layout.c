@@ -45,6 +45,7 @@ typedef struct {
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
     REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, a_b)                      \
     REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, c_density)                \
+    INTEGERS(FLAT_TRIANGLE_NEIGHBORS, TriangleNeighbors, TriangleNeighbors, ids_sides) \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[0])                           \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[1])                           \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[2])                           \
@@ -112,6 +113,7 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
                                       .height = 1,
                                       .sample_count = 1,
                                       .precision = is_double ? PRECISION_DOUBLE : PRECISION_SINGLE,
+                                      .certifies = true,
                                       .lanes = 1,
                                       .bvh = BVH_ON,
                                       .shift_to_eye = true};

@@ -29,6 +29,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     materials_flatten(compiled, scene, &rounding);
     lights_flatten(compiled, scene, &rounding);
     if (!numbers_fit(compiled, scene, settings, messages)) return false;
+    neighbors_find(compiled, scene, settings);
     compiled->features |= features_of(scene) | settings->extra_features;
     double start = clock_seconds();
     bvh_flatten(compiled, settings);

@@ -18,6 +18,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     SHAPE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
+    [FLAT_TRIANGLE_NEIGHBORS] = LAYOUT(TriangleNeighbors, ids_sides, ids_sides),
     // the widest; flat_nodes_renew makes them as wide as the kernel's
     [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},

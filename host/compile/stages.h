@@ -29,6 +29,9 @@ void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *r
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 
+// neighbors.c: FLAT_TRIANGLE_NEIGHBORS, where it is compiled for `certified`; else none.
+void neighbors_find(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);
+
 // limits.c: false with a message where a number of the camera, or of an array that has changed, overflows the
 // precision.
 bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,

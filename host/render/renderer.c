@@ -74,8 +74,8 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
 // Whether scene_move leaves an array as it is, and does not read it.
 static bool is_without_eye(size_t kind)
 {
-    return kind == FLAT_TRIANGLE_NORMALS || kind == FLAT_TRIANGLE_UVS || kind == FLAT_TEXTURE_LEVELS ||
-           kind == FLAT_TEXELS;
+    return kind == FLAT_TRIANGLE_NORMALS || kind == FLAT_TRIANGLE_UVS || kind == FLAT_TRIANGLE_NEIGHBORS ||
+           kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS;
 }
 
 // `takes`: the host array is not needed any more.

@@ -352,6 +352,38 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
     point->normal_error = vertex_error * (slimness + point->curvature);
 }
 
+// The lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor. So they
+// cannot meet this one if it lies behind the neighbor's plane and they leave to its front; nor if they run to
+// the side of this one's plane that the neighbor is on.
+static inline mask triangle_left_behind(const Triangle *triangle, const TriangleNeighbors *neighbors,
+                                        const Ray *ray, mask lanes)
+{
+    uint4 ids_sides = neighbors->ids_sides;
+    integer by_a = (integer)((scalar_integer)ids_sides.x), by_b = (integer)((scalar_integer)ids_sides.y),
+            by_c = (integer)((scalar_integer)ids_sides.z);
+    mask over_a = lanes & (ray->left == by_a), over_b = lanes & (ray->left == by_b),
+         over_c = lanes & (ray->left == by_c);
+    if (!lanes_any(over_a | over_b | over_c)) return mask_none();
+    const integer none = (integer)(0);
+    integer sides = lanes_select(over_a, (integer)((scalar_integer)(ids_sides.w & 7)), none);
+    sides = lanes_select(over_b, (integer)((scalar_integer)(ids_sides.w >> NEIGHBOR_SIDES_BITS & 7)), sides);
+    sides = lanes_select(over_c, (integer)((scalar_integer)(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 7)),
+                         sides);
+    mask is_behind = (sides & (integer)(NEIGHBOR_HAS_THIS_BEHIND)) != none,
+         in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
+         behind = (sides & (integer)(NEIGHBOR_BEHIND)) != none;
+    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
+    Vector normal = triangle_normal(triangle);
+    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
+    real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
+    real turned = ray->direction_error + vertex_error * triangle_slimness(corners);
+    real moved = real_fma(ray->length, turned, ray->ends_at_light ? ray->origin_error : (real)(0));
+    real along = vector_dot(normal, ray->direction);
+    real error = (real)(8 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
+                 vector_norm1(normal) * moved;
+    return (is_behind & ray->leaves_outward) | (in_front & (along > error)) | (behind & (along < -error));
+}
+
 static inline mask triangle_set_errors(const Triangle *triangle, const Ray *ray, real t, real place_error,
                                        SurfacePoint *point)
 {

@@ -20,6 +20,17 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
         memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
+#if IS_CERTIFIED
+// Takes back the doubts of rays that leave a neighbor of a triangle, and the triangle with it.
+static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ray *ray, CertainHit *hit)
+{
+    if (!lanes_any(hit->doubt & (ray->left >= (integer)(0)))) return;
+    Triangle triangle = scene->triangles[scene->objects[id].kind_index_material.y];
+    TriangleNeighbors neighbors = scene->triangle_neighbors[id];
+    hit->doubt = hit->doubt & !triangle_left_behind(&triangle, &neighbors, ray, hit->doubt);
+}
+#endif
+
 // Tests one primitive and records its hit. Returns whether any lane hits it, or may.
 #if IS_CERTIFIED
 #define INTERSECT_SHAPE(feature, Type, name, names)                                                          \
@@ -27,6 +38,8 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
                                         Type shape)                                                          \
     {                                                                                                        \
         CertainHit hit = name##_certain_hit(&shape, ray);                                                    \
+        if (KIND_##feature == KIND_TRIANGLES && lanes_any(hit.doubt))                                        \
+            triangle_skip_neighbors(scene, shape.id.x, ray, &hit);                                           \
         if (!lanes_any(hit.found | hit.doubt)) return false;                                                 \
         traversal_record_certain(traversal, scene, &hit, shape.id.x);                                        \
         return true;                                                                                         \
