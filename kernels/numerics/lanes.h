@@ -94,8 +94,13 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define MACRO_TILE_COLUMNS_LOG2 MACRO_TILE_COLUMNS_LOG2_OF(LANES)
 #define MACRO_TILE_ROWS         MACRO_TILE_ROWS_OF(LANES)
 #define TILES                   LANES // of a macro-tile
-// Packets traced together: a macro-tile's, where they search a BVH. Else one, whose data stays near.
-#define PACKETS (HAS_BVH ? TILES : 1)
+// Packets traced together: a macro-tile's, where they traverse a BVH. Else four: each one's work fills the
+// latencies of the others' roots and quotients, and their data stays near. With bounces, which go packet by
+// packet, one.
+#define PACKETS (HAS_BVH ? TILES : HAS_REFLECTION || HAS_TRANSMISSION || TILES < 4 ? 1 : 4)
+// Packets whose shadow rays are made before any is traced: those of a macro-tile would push each other out of
+// the nearest cache.
+#define NEAR_PACKETS (HAS_BVH ? 1u : PACKETS)
 #if LANES == 1
 #define LANE_X ((integer)(0))
 #define LANE_Y ((integer)(0))

@@ -146,8 +146,9 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
 static inline mask surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
                                   Bounce *reflected, Bounce *refracted)
 {
-    real reflection = surface->reflection;
-    mask total = mask_none(), transparent = surface->transmission > (real)(0);
+    real reflection = HAS_REFLECTION ? surface->reflection : (real)(0);
+    mask total = mask_none();
+    mask transparent = HAS_TRANSMISSION ? surface->transmission > (real)(0) : mask_none();
     if (HAS_TRANSMISSION && (all || lanes_any(transparent))) {
         total = surface_refract(surface, direction, &refracted->direction);
         real transmission = lanes_select(total, (real)(0), surface->transmission);
@@ -161,7 +162,7 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
         reflected->origin = secondary_ray_origin(surface, false);
         reflected->weight = vector_scale(weight, reflection);
     }
-    reflected->travelled = refracted->travelled = surface->travelled;
+    if (HAS_IMAGES) reflected->travelled = refracted->travelled = surface->travelled;
     return total;
 }
 

@@ -14,60 +14,75 @@ typedef struct {
     mask doubt;      // at `certified`: lanes in doubt about any of this
 } ShadedHit;
 
-// Adds each light that reaches the surfaces of `count` packets.
-static inline void surfaces_light(const Scene *scene, uint count, ShadedHit *hits)
+// The surface that a packet's rays hit, in ambient light.
+static inline void hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
-    Ray shadow_rays[PACKETS];
-    LightVisibility lights[PACKETS];
-    Traversal traversals[PACKETS];
-    for (uint index = 0; index < scene->header->image.w; index++) {
-        for (uint i = 0; i < count; i++) {
-            shadow_rays[i].active = lights[i].lit = mask_none();
-            shadow_rays[i].tmax = (real)(0);
-            if (lanes_any(hit_found(&hits[i].hit)))
-                lights[i] = light_reach(scene, &hits[i].surface, index, &shadow_rays[i]);
-        }
-        scene_traverse(scene, shadow_rays, count, OCCLUSION, traversals);
-        for (uint i = 0; i < count; i++) {
-            if (IS_CERTIFIED && lanes_any(hit_found(&hits[i].hit))) {
-                const Surface *surface = &hits[i].surface;
-                mask glossy = surface->specular > (real)(0);
-                light_add_doubt(&lights[i], &traversals[i].hit);
-                mask matters = glossy | !lights[i].facing_doubt;
-                hits[i].doubt =
-                    hits[i].doubt | (lights[i].doubt & matters) | (lights[i].facing_doubt & glossy);
-            }
-            if (!lanes_any(lights[i].lit)) continue;
-            light_occlude(&lights[i], traversal_transmittance(&traversals[i]));
-            if (!lanes_any(lights[i].lit)) continue;
-            Color3 reflected = phong_shade(scene, &hits[i].surface, &lights[i], index);
-            hits[i].color = vector_add(hits[i].color, reflected);
-        }
+    if (IS_CERTIFIED) traversal_judge(traversal);
+    hit->hit = traversal->hit;
+    hit->color = vector_of(scene->header->background);
+    if (IS_CERTIFIED) hit->doubt = hit->hit.doubt;
+    mask found = hit_found(&hit->hit);
+    if (!lanes_any(found)) return;
+    hit->surface = visible_surface(scene, ray, &hit->hit);
+    const Surface *surface = &hit->surface;
+    if (IS_CERTIFIED) hit->doubt = hit->doubt | (found & surface->doubt);
+    Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
+    hit->color = vector_select(found, color_multiply(ambient, surface->color), hit->color);
+}
+
+// A packet's shadow rays to a light.
+static inline void shadow_rays_make(const Scene *scene, const ShadedHit *hit, uint index,
+                                    LightVisibility *light, Ray *shadow_ray)
+{
+    shadow_ray->active = light->lit = mask_none();
+    shadow_ray->tmax = (real)(0);
+    if (lanes_any(hit_found(&hit->hit))) *light = light_reach(scene, &hit->surface, index, shadow_ray);
+}
+
+// Adds a light that a packet's shadow rays have been traced to.
+static inline void hit_light(const Scene *scene, uint index, LightVisibility *light, Traversal *traversal,
+                             ShadedHit *hit)
+{
+    if (IS_CERTIFIED) traversal_judge(traversal);
+    if (IS_CERTIFIED && lanes_any(hit_found(&hit->hit))) {
+        mask glossy = hit->surface.specular > (real)(0);
+        light_add_doubt(light, &traversal->hit);
+        mask matters = glossy | !light->facing_doubt;
+        hit->doubt = hit->doubt | (light->doubt & matters) | (light->facing_doubt & glossy);
     }
+    if (!lanes_any(light->lit)) return;
+    light_occlude(light, traversal_transmittance(traversal));
+    if (!lanes_any(light->lit)) return;
+    Color3 reflected = phong_shade(scene, &hit->surface, light, index);
+    hit->color = vector_add(hit->color, reflected);
 }
 
 // Traces `count` packets of rays and shades their hits; no colors if COMPUTE_SIGNATURE.
 static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, ShadedHit *hits)
 {
     Traversal traversals[PACKETS];
-    scene_traverse(scene, rays, count, CLOSEST_HIT, traversals);
-    Color3 background = vector_of(scene->header->background);
-    for (uint i = 0; i < count; i++) {
-        hits[i].hit = traversals[i].hit;
-        mask found = hit_found(&hits[i].hit);
-        hits[i].color = background;
-        if (IS_CERTIFIED) hits[i].doubt = hits[i].hit.doubt;
-        if (!lanes_any(found)) continue;
-        hits[i].surface = visible_surface(scene, &rays[i], &hits[i].hit);
-        const Surface *surface = &hits[i].surface;
-        if (IS_CERTIFIED) hits[i].doubt = hits[i].doubt | (found & surface->doubt);
-        Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
-        hits[i].color = color_multiply(ambient, surface->color);
-    }
-    if (COMPUTE_SIGNATURE) return;
-    surfaces_light(scene, count, hits);
+    Ray shadow_rays[PACKETS];
+    LightVisibility lights[PACKETS];
+    const uint light_count = COMPUTE_SIGNATURE ? 0 : scene->header->image.w;
+    uint packets = 0; // that traverse the BVH
     for (uint i = 0; i < count; i++)
-        hits[i].color = vector_select(hit_found(&hits[i].hit), hits[i].color, background);
+        if (traversal_begin(&traversals[i], scene, &rays[i], CLOSEST_HIT)) packets |= 1u << i;
+    if (HAS_BVH) traversals_end(traversals, scene, rays, packets);
+    for (uint i = 0; i < count; i++)
+        hit_shade(scene, &rays[i], &traversals[i], &hits[i]);
+    for (uint light = 0; light < light_count; light++) {
+        packets = 0;
+        for (uint first = 0; first < count; first += NEAR_PACKETS) {
+            const uint end = min(first + NEAR_PACKETS, count);
+            for (uint i = first; i < end; i++)
+                shadow_rays_make(scene, &hits[i], light, &lights[i], &shadow_rays[i]);
+            for (uint i = first; i < end; i++)
+                if (traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION)) packets |= 1u << i;
+        }
+        if (HAS_BVH) traversals_end(traversals, scene, shadow_rays, packets);
+        for (uint i = 0; i < count; i++)
+            hit_light(scene, light, &lights[i], &traversals[i], &hits[i]);
+    }
 }
 
 // Adds a ray's hit and its bounces to the signature.

@@ -165,7 +165,7 @@ static inline LightVisibility light_visibility(const Scene *scene, const Surface
     LightVisibility visibility = light_reach(scene, surface, index, &shadow_ray);
     if (IS_CERTIFIED) {
         Traversal traversal;
-        scene_traverse(scene, &shadow_ray, 1, OCCLUSION, &traversal);
+        ray_traverse(&traversal, scene, &shadow_ray, OCCLUSION);
         light_add_doubt(&visibility, &traversal.hit);
         light_occlude(&visibility, traversal_transmittance(&traversal));
         return visibility;

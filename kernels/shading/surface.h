@@ -18,6 +18,8 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
                     real_fma(weight.z, color.z, sum.z)};
 }
 
+// Members that only reflection, transmission or images need are not set without them.
+//
 // Color and `travelled` presume that the ray's direction is unit; of an explicit ray, which may have any
 // length, neither is used.
 typedef struct {
@@ -215,7 +217,8 @@ static inline void surface_set_material(Surface *surface, mask lanes, const Mate
     surface->ambient = lanes_select(lanes, (real)(material->color.w), surface->ambient);
     surface->specular = lanes_select(lanes, (real)(material->diffuse.w), surface->specular);
     surface->shininess = lanes_select(lanes, (real)(material->other_color.w), surface->shininess);
-    surface->reflection = lanes_select(lanes, (real)(bounces.x), surface->reflection);
+    if (HAS_REFLECTION) surface->reflection = lanes_select(lanes, (real)(bounces.x), surface->reflection);
+    if (!HAS_TRANSMISSION) return;
     surface->transmission = lanes_select(lanes, (real)(bounces.y), surface->transmission);
     surface->ior = lanes_select(lanes, (real)(bounces.z), surface->ior);
 }
@@ -242,7 +245,7 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     if (IS_CERTIFIED) surface_set_errors(surface, point, ray);
     surface->position = point->position;
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
-    surface->entering = !along;
+    if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
     surface->normal = vector_select(along, vector_negate(point->normal), point->normal);
     mask opposite = vector_dot(point->shading_normal, surface->normal) < (real)(0);
     surface->shading_normal =
@@ -250,7 +253,7 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     surface->error =
         (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
                                        (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
-    surface->refracted_offset = surface->error + surface->error;
+    if (HAS_TRANSMISSION) surface->refracted_offset = surface->error + surface->error;
 }
 
 // The surface at the closest hit. Rays of a packet mostly hit one or two objects: each is looked up once, for
@@ -261,9 +264,12 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     surface.found = hit_found(hit);
     surface.color = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
     surface.ambient = surface.specular = surface.shininess = (real)(0);
-    surface.reflection = surface.transmission = (real)(0);
-    surface.ior = (real)(1);
-    surface.travelled = ray->travelled + hit->t;
+    if (HAS_REFLECTION) surface.reflection = (real)(0);
+    if (HAS_TRANSMISSION) {
+        surface.transmission = (real)(0);
+        surface.ior = (real)(1);
+    }
+    if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
     if (IS_CERTIFIED) {
@@ -371,8 +377,10 @@ static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *h
     real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);
     for (bool replaced = false;; replaced = true) {
         Surface surface = surface_interaction(scene, ray, hit);
-        surface.error = real_max(surface.error, transparent_error);
-        surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
+        if (HAS_TRANSMISSION) {
+            surface.error = real_max(surface.error, transparent_error);
+            surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
+        }
         if (IS_CERTIFIED) {
             if (HAS_TRANSMISSION) surface.doubt = surface.doubt | surface_may_touch_opaque(scene, &surface);
             return surface;

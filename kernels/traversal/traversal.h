@@ -8,7 +8,7 @@
 #include "traversal/single.h"
 
 // Starts a packet's traversal with what is outside the BVH. Whether the BVH is left to traverse.
-static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
+static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
 {
     traversal->query = query;
     traversal->active = ray->active;
@@ -28,18 +28,13 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     return !cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0;
 }
 
-// Traces the rays of `count` packets, up to PACKETS, which are independent of each other; if they have a
-// common origin, all have the same.
-static OUT_OF_LINE void scene_traverse(const Scene *scene, Ray *rays, uint count, Query query,
-                                       Traversal *traversals)
+// Traverses the BVH with those of the packets, given as bits, for which traversal_begin left it. They are
+// independent of each other; if they have a common origin, all have the same.
+static OUT_OF_LINE void traversals_end(Traversal *traversals, const Scene *scene, Ray *rays, uint packets)
 {
 #if LANES == 1
-    (void)count; // 1: Mesa 22.3 crashes in compiling a loop for it
-    if (traversal_begin(traversals, scene, rays, query)) traverse_bvh(traversals, scene, rays);
+    if (packets) traverse_bvh(traversals, scene, rays); // Mesa 22.3 crashes in compiling a loop for it
 #else
-    uint packets = 0; // that traverse the BVH
-    for (uint i = 0; i < count; i++)
-        if (traversal_begin(&traversals[i], scene, &rays[i], query)) packets |= 1u << i;
     if (HAS_BVH && (packets & (packets - 1)) != 0 &&
         rays[lowest_bit(packets)].common_origin != COMMON_ORIGIN_NONE)
         packets = traverse_bvh_by_tile(traversals, scene, rays, packets);
@@ -48,21 +43,26 @@ static OUT_OF_LINE void scene_traverse(const Scene *scene, Ray *rays, uint count
         traverse_bvh(&traversals[i], scene, &rays[i]);
     }
 #endif
-    for (uint i = 0; IS_CERTIFIED && i < count; i++)
-        traversal_judge(&traversals[i]);
+}
+
+// Traces one packet.
+static OUT_OF_LINE void ray_traverse(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
+{
+    if (traversal_begin(traversal, scene, ray, query)) traversals_end(traversal, scene, ray, 1);
+    if (IS_CERTIFIED) traversal_judge(traversal);
 }
 
 static inline Hit closest_hit(const Scene *scene, Ray *ray)
 {
     Traversal traversal;
-    scene_traverse(scene, ray, 1, CLOSEST_HIT, &traversal);
+    ray_traverse(&traversal, scene, ray, CLOSEST_HIT);
     return traversal.hit;
 }
 
 static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
 {
     Traversal traversal;
-    scene_traverse(scene, ray, 1, CLOSEST_OPAQUE_HIT, &traversal);
+    ray_traverse(&traversal, scene, ray, CLOSEST_OPAQUE_HIT);
     return traversal.hit;
 }
 
@@ -81,7 +81,7 @@ static inline real traversal_transmittance(const Traversal *traversal)
 static inline real transmittance(const Scene *scene, Ray *ray)
 {
     Traversal traversal;
-    scene_traverse(scene, ray, 1, OCCLUSION, &traversal);
+    ray_traverse(&traversal, scene, ray, OCCLUSION);
     return traversal_transmittance(&traversal);
 }
 
