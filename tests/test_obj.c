@@ -163,7 +163,7 @@ static void one_position_may_have_many_normals(void **state)
     text_free(&text);
 }
 
-static const Material *material_of(const Scene *scene, size_t triangle)
+static const Material *triangle_material(const Scene *scene, size_t triangle)
 {
     const Mesh *mesh = &scene->meshes.items[0];
     return &scene->materials
@@ -186,10 +186,10 @@ static void materials_are_those_of_their_faces(void **state)
                         greens[] = {1, 1, 0, 0, 0, 2, 0.5, 0.5, 0.5};
     assert_int_equal(scene.meshes.items[0].triangle_count, sizeof reds / sizeof *reds);
     for (size_t i = 0; i < sizeof reds / sizeof *reds; i++) {
-        assert_number(material_of(&scene, i)->color.x, reds[i]);
-        assert_number(material_of(&scene, i)->color.y, greens[i]);
+        assert_number(triangle_material(&scene, i)->color.x, reds[i]);
+        assert_number(triangle_material(&scene, i)->color.y, greens[i]);
     }
-    const Material *gray = material_of(&scene, 8), *clear = material_of(&scene, 5);
+    const Material *gray = triangle_material(&scene, 8), *clear = triangle_material(&scene, 5);
     assert_number(gray->specular, 0.4);
     assert_number(gray->shininess, 40);
     assert_number(gray->transmission, 0.75);
@@ -202,11 +202,11 @@ static void materials_are_those_of_their_faces(void **state)
     // a material of the scene's own wins
     assert_true(scene_read(&scene, SCENE_OF(", material: {color: [0, 0, 1]}"), ""));
     assert_null(scene.meshes.items[0].materials);
-    assert_vector(material_of(&scene, 0)->color, 0, 0, 1);
+    assert_vector(triangle_material(&scene, 0)->color, 0, 0, 1);
     scene_free(&scene);
 
     scene = scene_of_obj(FACE, "");
-    assert_vector(material_of(&scene, 0)->color, 1, 1, 1);
+    assert_vector(triangle_material(&scene, 0)->color, 1, 1, 1);
     scene_free(&scene);
 }
 
@@ -216,12 +216,12 @@ static void missing_materials_are_reported(void **state)
     file_write("a.mtl", "newmtl red\nKd 1 0 0\n");
     // the file of the mesh's own name stands in
     Scene scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE, "");
-    assert_vector(material_of(&scene, 0)->color, 1, 0, 0);
+    assert_vector(triangle_material(&scene, 0)->color, 1, 0, 0);
     scene_free(&scene);
     file_write("d.mtl", "newmtl blue\nKd 0 0 1\n");
     scene = scene_of_obj("mtllib d.mtl a.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\n", "");
-    assert_vector(material_of(&scene, 0)->color, 1, 0, 0);
-    assert_vector(material_of(&scene, 1)->color, 0, 0, 1);
+    assert_vector(triangle_material(&scene, 0)->color, 1, 0, 0);
+    assert_vector(triangle_material(&scene, 1)->color, 0, 0, 1);
     scene_free(&scene);
     // read once, however often it is named
     file_write("a.mtl", "newmtl red\nKd 1 0 0\nKe 1 0 0\n");
@@ -239,12 +239,12 @@ static void missing_materials_are_reported(void **state)
     scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE,
                          "a.obj:1:8: warning: the material file 'missing.mtl' cannot be read: the default "
                          "material is used\n");
-    assert_vector(material_of(&scene, 0)->color, 1, 1, 1);
+    assert_vector(triangle_material(&scene, 0)->color, 1, 1, 1);
     scene_free(&scene);
     scene = scene_of_obj("mtllib d.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\nusemtl red\nf 1 2 3\n",
                          "a.obj:2:8: warning: 'red' is in no material file: the default is used\n");
-    assert_vector(material_of(&scene, 1)->color, 0, 0, 1);
-    assert_vector(material_of(&scene, 2)->color, 1, 1, 1);
+    assert_vector(triangle_material(&scene, 1)->color, 0, 0, 1);
+    assert_vector(triangle_material(&scene, 2)->color, 1, 1, 1);
     scene_free(&scene);
 }
 
@@ -256,7 +256,7 @@ static void images_of_materials_are_used(void **state)
     file_write("a.mtl", "newmtl red\nKd 0.75 0.5 0.25\nmap_Kd ./a.ppm\nnewmtl same\nmap_Kd ./a.ppm\n");
     Scene scene = scene_of_obj(
         "mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\nusemtl same\nf 1 2 3\n", "");
-    const Material *red = material_of(&scene, 0), *same = material_of(&scene, 1);
+    const Material *red = triangle_material(&scene, 0), *same = triangle_material(&scene, 1);
     assert_int_equal(scene.textures.count, 1);
     assert_string_equal(scene.textures.items[0].path, "./a.ppm");
     assert_int_equal(red->texture, 1);
@@ -270,8 +270,8 @@ static void images_of_materials_are_used(void **state)
     scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
                          "scene.yaml:4:18: warning: a.obj: no texture coordinates for the image './a.ppm' of "
                          "material 'red'\n");
-    assert_int_equal(material_of(&scene, 0)->texture, 0);
-    assert_vector(material_of(&scene, 0)->color, 0.75, 0.5, 0.25);
+    assert_int_equal(triangle_material(&scene, 0)->texture, 0);
+    assert_vector(triangle_material(&scene, 0)->color, 0.75, 0.5, 0.25);
     scene_free(&scene);
 
     static const struct {
@@ -322,7 +322,7 @@ static void what_is_not_used_is_reported_once(void **state)
         "a.obj:10:1: warning: 'l' is not used\n"
         "a.obj:11:1: warning: 'p' is not used\n"
         "a.obj:13:1: warning: 'cstype' is not used\n");
-    const Material *red = material_of(&scene, 0);
+    const Material *red = triangle_material(&scene, 0);
     assert_vector(red->color, 1, 1, 1);
     assert_number(red->specular, 0);
     assert_number(red->shininess, material_default().shininess);
