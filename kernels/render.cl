@@ -1,4 +1,4 @@
-// The image: each work-item renders a macro-tile, its packets together where there is a BVH, else in turn.
+// The image: each work-item renders a macro-tile, PACKETS of its packets at a time.
 #define COMPUTE_SIGNATURE 0
 #include "film.h"
 #include "shading/path.h"

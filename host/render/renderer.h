@@ -19,7 +19,7 @@ typedef struct {
     // only one is rendered, in color without AOVs. At most 4096.
     uint32_t cell;
     uint32_t sample_count; // per pixel, >= 1
-    uint32_t bounce_count; // at most, per ray; 0..16
+    uint32_t bounce_count; // at most, per ray; 0..BOUNCES_MAX
     Precision precision;
     uint32_t lanes; // rays per work-item: 1, 4, 8, 16; 0: device_lanes
     BvhChoice bvh;

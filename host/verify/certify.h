@@ -14,7 +14,7 @@ typedef struct {
     bool *shadows; // of each pixel, for each light
 } CertifySample;
 
-// Each decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
+// A decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
 bool certify_is_undecided(const ReferencePixel *pixel);
 
 // One pixel of each of about `count` equal parts of the image, at a place that a hash chooses; all of it if

@@ -3,9 +3,9 @@
 // Above this file code reads like the scalar algorithm, with a mask where that would branch. A mask is the
 // result of a comparison: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
 //
-// The host defines these macros before the text (variant_set in host/render/renderer.c):
+// The host defines these macros before the text (prelude_write in host/render/renderer_kernels.c):
 //     LANES            1, 4, 8 or 16
-//     IS_FAST, IS_STRICT, IS_DOUBLE    the precision, one of them 1; all 0 at `single`
+//     IS_FAST, IS_STRICT, IS_DOUBLE    the precision, at most one of them 1
 //     IS_CERTIFIED     1: every decision has a bound on its error: shapes/certain.h
 //     IS_PIXEL_LIST    1: renders a list of pixels instead of a band: film.h
 //     REPAIRS_DIVIDE   1 at `strict` where the device's division and square root are inexact: numerics.h
@@ -98,8 +98,8 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 // latencies of the others' roots and quotients, and their data stays near. With bounces, which go packet by
 // packet, one.
 #define PACKETS (HAS_BVH ? TILES : HAS_REFLECTION || HAS_TRANSMISSION || TILES < 4 ? 1 : 4)
-// Packets whose shadow rays are made before any is traced: those of a macro-tile would push each other out of
-// the nearest cache.
+// Packets whose shadow rays are all made before any is tested with what is outside the BVH: those of a
+// macro-tile would push each other out of the nearest cache.
 #define NEAR_PACKETS (HAS_BVH ? 1u : PACKETS)
 #if LANES == 1
 #define LANE_X ((integer)(0))
