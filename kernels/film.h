@@ -133,8 +133,8 @@ static inline void film_store_color(global scalar *film, const Tile *tile, Vecto
     film_store(film, tile, 3, 2, color.z);
 }
 
-// Notes the lanes in doubt: in a word per tile, as bits; of a list in its pixels' counts. A first launch
-// finds none.
+// Notes the lanes in doubt: in a word per tile, as bits; of a list in its pixels' counts. `is_first`:
+// nothing has been noted there yet.
 static inline void film_note_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
 {
     if (!is_first && !lanes_any(doubt)) return;

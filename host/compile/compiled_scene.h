@@ -45,8 +45,8 @@ typedef struct {
     FeatureSet features;           // that the kernels need
     double unit;                   // scene units per unit of length in the arrays, a power of two
     uint32_t pending_children_max; // of the BVH, while a ray visits it; 0 without one
-    double bvh_seconds;            // building the BVH
-    double flatten_seconds;        // everything else in scene_compile
+    double bvh_seconds;            // building or refitting the BVH
+    double flatten_seconds;        // everything else in scene_compile or scene_move
     // What the stages leave for later ones and for the header.
     CompiledTexture *textures;           // of each of the scene's textures
     uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays

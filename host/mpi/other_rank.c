@@ -99,8 +99,8 @@ static void scene_receive(Worker *worker, SceneVariant variant)
     }
 }
 
-// Renders until the first rank has no more rows, and says why the device could not. Before the next job it
-// waits for this one's end, which would end that.
+// Renders until the first rank has no more rows, and says why the device could not. It also waits for the
+// message that ends this job, which would end the next one if it came late.
 static void worker_render(Worker *worker, unsigned aovs)
 {
     char failure[sizeof worker->own.failure] = "";

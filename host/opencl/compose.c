@@ -13,7 +13,7 @@ typedef struct {
     char *missing;
 } Composer;
 
-// The name between the quotes where the line is `#include "name"`, else false.
+// The file's name, without its folder, where the line is `#include "name"`, else false.
 static bool include_name(const char *line, size_t length, const char **name, size_t *name_length)
 {
     const char *at = line, *end = line + length;

@@ -104,8 +104,6 @@ Place list_place(const Renderer *renderer, uint32_t count)
         .band = {{0, 0, count, 1}}, .items = {divide_up(count, of_item), 1}, .group = {side * side, 1}};
 }
 
-_Static_assert(sizeof((RenderReport){0}.rays) == RAYS_COUNT * sizeof(uint64_t), "one for each RAYS_…");
-
 static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
 {
     const uint32_t zeros[RAYS_COUNT] = {0};

@@ -171,7 +171,7 @@ bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, 
 
 // A kernel launch or a transfer.
 typedef struct {
-    const char *name; // "render", "aov", "path", "trace", "repeat", "read-back"
+    const char *name; // "render", "aov", "path", "repeat", "read-back"
     LaunchTime time;
 } NamedLaunch;
 
@@ -183,8 +183,8 @@ typedef struct {
     uint64_t kernel_hash;
     uint64_t scene_hash; // of this pass, see renderer_scene_hash
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
-    bool build_from_cache; // every program was
-    uint64_t rays[5];      // of each RAYS_… (kernels/types.h); where settings.counting
+    bool build_from_cache;     // every program was
+    uint64_t rays[RAYS_COUNT]; // of each RAYS_… (kernels/types.h); where settings.counting
     struct {
         NamedLaunch *items;
         size_t count, capacity;

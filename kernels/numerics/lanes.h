@@ -231,7 +231,7 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-// Within 2^-14. MASK_BITS says that the compiler knows __has_builtin.
+// 1 / a, off by 2^-14 of itself at most. MASK_BITS says that the compiler knows __has_builtin.
 #ifdef MASK_BITS
 #if LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
 #define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)

@@ -57,7 +57,7 @@ static inline void hit_light(const Scene *scene, uint index, LightVisibility *li
     hit->color = vector_add(hit->color, reflected);
 }
 
-// Traces `count` packets of rays and shades their hits; no colors if COMPUTE_SIGNATURE.
+// Traces `count` packets of rays and shades their hits; without lights if COMPUTE_SIGNATURE.
 static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, ShadedHit *hits)
 {
     Traversal traversals[PACKETS];
@@ -67,7 +67,7 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
     uint packets = 0; // that traverse the BVH
     for (uint i = 0; i < count; i++)
         if (traversal_begin(&traversals[i], scene, &rays[i], CLOSEST_HIT)) packets |= 1u << i;
-    if (HAS_BVH) traversals_end(traversals, scene, rays, packets);
+    if (HAS_BVH) packets_traverse_bvh(traversals, scene, rays, packets);
     for (uint i = 0; i < count; i++)
         hit_shade(scene, &rays[i], &traversals[i], &hits[i]);
     for (uint light = 0; light < light_count; light++) {
@@ -79,7 +79,7 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
             for (uint i = first; i < end; i++)
                 if (traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION)) packets |= 1u << i;
         }
-        if (HAS_BVH) traversals_end(traversals, scene, shadow_rays, packets);
+        if (HAS_BVH) packets_traverse_bvh(traversals, scene, shadow_rays, packets);
         for (uint i = 0; i < count; i++)
             hit_light(scene, light, &lights[i], &traversals[i], &hits[i]);
     }
@@ -100,10 +100,10 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
-// Traces a ray tree depth first, reflected before refracted. `is_shaded`: *shaded is the camera ray's hit,
-// from rays_shade; otherwise the loop traces it, whose traversal is then compiled once. If COMPUTE_SIGNATURE,
-// *path is the tree's signature (types.h), which in each lane is independent of the other lanes, and the
-// color is undefined. At `certified` *doubt are the lanes with any decision in doubt.
+// Traces a ray tree depth first, reflected before refracted. *shaded holds the hit of the ray that is
+// followed; with `is_shaded` at first the camera ray's, which rays_shade has traced with other packets. If
+// COMPUTE_SIGNATURE, *path is the tree's signature (types.h), which in each lane is independent of the other
+// lanes, and the color is undefined. At `certified` *doubt are the lanes with any decision in doubt.
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
                                     unsigned_integer *path, mask *doubt)
 {

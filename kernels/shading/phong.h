@@ -133,7 +133,7 @@ static inline void light_add_doubt(LightVisibility *visibility, const Hit *occlu
     visibility->doubt = visibility->doubt | (occlusion->doubt & visibility->lit);
 }
 
-// All of that but occlusion, for which the shadow ray is set, active in the lanes that may be lit.
+// A LightVisibility without occlusion, for which the shadow ray is set, active in the lanes that may be lit.
 static inline LightVisibility light_reach(const Scene *scene, const Surface *surface, uint index,
                                           Ray *shadow_ray)
 {

@@ -28,9 +28,10 @@ static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene
     return !cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0;
 }
 
-// Traverses the BVH with those of the packets, given as bits, for which traversal_begin left it. They are
-// independent of each other; if they have a common origin, all have the same.
-static OUT_OF_LINE void traversals_end(Traversal *traversals, const Scene *scene, Ray *rays, uint packets)
+// Traverses the BVH with `packets`, as bits: those for which traversal_begin left it. Their rays all have the
+// same common origin, or none. At one lane there is one packet. At `certified` traversal_judge comes last.
+static OUT_OF_LINE void packets_traverse_bvh(Traversal *traversals, const Scene *scene, Ray *rays,
+                                             uint packets)
 {
 #if LANES == 1
     if (packets) traverse_bvh(traversals, scene, rays); // Mesa 22.3 crashes in compiling a loop for it
@@ -48,7 +49,7 @@ static OUT_OF_LINE void traversals_end(Traversal *traversals, const Scene *scene
 // Traces one packet.
 static OUT_OF_LINE void ray_traverse(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
 {
-    if (traversal_begin(traversal, scene, ray, query)) traversals_end(traversal, scene, ray, 1);
+    if (traversal_begin(traversal, scene, ray, query)) packets_traverse_bvh(traversal, scene, ray, 1);
     if (IS_CERTIFIED) traversal_judge(traversal);
 }
 
