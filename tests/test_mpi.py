@@ -17,6 +17,7 @@ from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkp
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
+              "OMPI_MCA_odls_base_sigkill_timeout": "30",  # seconds that an interrupted rank has, 1 else: too few beside other tests
               "HWLOC_COMPONENTS": "-gl"}  # else an X server that ends takes mpirun with it
 BUILD = os.environ.get("BUILD", "build")
 RANKS = PROGRAM.parent / "glint-mpi"
