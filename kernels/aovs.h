@@ -27,7 +27,11 @@
 #define COLOR_LAYER(LAYER) \
     LAYER(COLOR, color, REAL, 3, "linear RGB, the mean of all samples")
 
-#define LAYER_LIST(LAYER) HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) COLOR_LAYER(LAYER)
+// host/render/repeat.c
+#define HOST_AOV_LIST(LAYER) \
+    LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where rendered again in double, 2 where undecided; else 0")
+
+#define LAYER_LIST(LAYER) HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)
 // clang-format on
 
 #endif

@@ -18,7 +18,7 @@
 
 static Random random_state;
 
-enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 120, AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH };
+enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 120, AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT };
 
 static const double half_tangent = 0.75, floor_y = -3;
 static const Vector3 eye = {0.1, -0.7, 3.3}, light = {2, 9, 1};
@@ -259,7 +259,7 @@ static Scene scene_attacking(Family family, unsigned seed)
 }
 
 typedef struct {
-    size_t wrong;
+    size_t wrong, unlisted; // pixels; the latter are not listed as undecided
     uint64_t repeated, undecided;
 } Answer;
 
@@ -276,8 +276,8 @@ static Answer answer(const Scene *scene, const CertifySample *reference, const R
     Film film;
     assert_true(renderer_render_film(renderer, AOVS, &film));
     const CertifyErrors errors = certify_compare(reference, &film);
-    const Answer counted = {errors.object + errors.shadow + errors.path, film.repeats.repeated,
-                            film.repeats.undecided};
+    const Answer counted = {errors.object + errors.shadow + errors.path, errors.unlisted,
+                            film.repeats.repeated, film.repeats.undecided};
     film_free(&film);
     renderer_close(renderer);
     return counted;
@@ -310,10 +310,9 @@ static void check_family(Family family)
             settings.perturb_seed = run == 2 ? 1 + seed : 0;
             if (run == 2 && !tests_are_long()) continue; // each seed takes three more kernels
             const Answer certified = answer(&scene, &reference, &settings);
-            if (certified.wrong > certified.undecided)
-                fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %llu samples undecided",
-                         family_names[family], seed, run, certified.wrong,
-                         (unsigned long long)certified.undecided);
+            if (certified.unlisted > 0)
+                fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not undecided",
+                         family_names[family], seed, run, certified.wrong, certified.unlisted);
             repeated += certified.repeated;
             undecided += certified.undecided;
         }
@@ -358,10 +357,11 @@ static void mirrors_glass_and_spots_are_decided(void **state)
     check_family(OPTICS);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(flat_shapes_are_decided), cmocka_unit_test(round_shapes_are_decided),
         cmocka_unit_test(planets_are_decided), cmocka_unit_test(mirrors_glass_and_spots_are_decided)};
+    if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

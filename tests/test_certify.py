@@ -3,7 +3,9 @@
 GLINT_LONG_TESTS=1 also on a mesh without other shapes.
 
 run_tests: sanitize-long-only"""
-from glint import IS_LONG, PLANET, ROOT, TestCase, main, need_device, write
+import unittest
+
+from glint import IS_LONG, PLANET, ROOT, TestCase, main, need_device, npy_read, write
 
 SCENES = ["demo", "mirror-glass", "paraboloids"] + (["triangles"] if IS_LONG else [])
 SMALL = "--size 96x64 --pixels 600"
@@ -12,6 +14,11 @@ camera: {position: [0, 0, -5], look_at: [0, 0, 0]}
 lights: [{point: {position: [2, 5, -4], intensity: 1e30, color: [1e30, 1, 1]}}]
 objects: [{sphere: {center: [0, 0, 0], radius: 1}}]
 """  # beyond float
+EDGE = """\
+camera: {position: [0, 0, -5], look_at: [0, 0, 0]}
+lights: [{point: {position: [2, 5, -4]}}]
+objects: [{triangle: {vertices: [[0, -1, 0], [0, 1.1, 0], [1, 0, 0]]}}]
+"""
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -55,6 +62,21 @@ class Certify(TestCase):
                 self.assertIn(name, row["reason"])
         self.assertEqual(self.glint(f"certify strong.yaml {SMALL}").stdout.count("unavailable: "), 5 - HAS_DOUBLE)
         self.refuses(f"certify strong.yaml {SMALL} --precision double,single", "single")
+
+    @unittest.skipUnless(HAS_DOUBLE, "no fp64")
+    def test_undecided_pixels(self):
+        """They are those on an edge through the centers of a column, where errors of double's size change the answer."""
+        write("edge.yaml", EDGE)
+        report = self.json("certify edge.yaml --size 33x33 --pixels 10000 --precision certified --json")
+        row = report["precisions"][0]
+        self.glint("render edge.yaml --size 33x33 --precision certified --quiet --aov doubt -o edge.png")
+        undecided = [i for i, doubt in enumerate(npy_read("edge.doubt.npy")[2]) if doubt == 2]
+        count = len(undecided)
+        self.assertGreater(count, 10)
+        self.assertEqual({i % 33 for i in undecided}, {16})
+        self.assertEqual(report["undecided"], count)
+        self.assertEqual(row["undecided"], {"pixels": count, "examined": count, "witnessed": count, "close": 0})
+        self.assertEqual(row["wrong_unlisted"], 0)
 
     def test_refused(self):
         for arguments, pattern in ((f"{ROOT}/scenes/demo.yaml --pixels 0", "--pixels"), ("", "no scene"), ("none.yaml", "none.yaml")):

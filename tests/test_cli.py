@@ -359,7 +359,7 @@ class Aovs(CliTestCase):
     def test_aovs(self):
         layouts = {"t": ((6, 8), "<f4"), "normal": ((6, 8, 3), "<f4"), "position": ((6, 8, 3), "<f8"),
                    "object": ((6, 8), "<u4"), "shadow": ((6, 8, 2), "<u4"), "ray": ((6, 8, 3), "<f4"),
-                   "path": ((6, 8), "<u4"), "color": ((6, 8, 3), "<f4")}
+                   "path": ((6, 8), "<u4"), "color": ((6, 8, 3), "<f4"), "doubt": ((6, 8), "<u4")}
         self.glint(f"render sphere.yaml {SMALL} --aov {','.join(layouts)} -o v.png")
         self.glint(f"render sphere.yaml {SMALL} -o v.npy")
         self.assertSameBytes("v.color.npy", "v.npy")
@@ -368,6 +368,7 @@ class Aovs(CliTestCase):
             *found, pixels[name] = npy_read(f"v.{name}.npy")
             self.assertEqual(tuple(found), layout, name)
         self.assertEqual(set(pixels["object"]), {0, 2**32 - 1})
+        self.assertEqual(set(pixels["doubt"]), {0})
         names = "object", "t", "path", "normal", "position", "ray", "shadow"
         for identity, t, path, normal, position, ray, shadow in zip(*(pixels[name] for name in names)):
             # FNV-1a of the word 8 (0 + 1) for the one object, of 0 for none

@@ -131,8 +131,8 @@ class Json(TestCase):
             f"bench plain.yaml {SMALL} {QUICK} --json --against {PROGRAM}", status=4))
 
     def test_certify(self):
-        self.check_members("glint certify", self.json(f"certify plain.yaml {SMALL} --precision single --json"),
-                           self.json(f"certify plain.yaml {SMALL} --precision single --json --perturb 1"))
+        self.check_members("glint certify", self.json(f"certify plain.yaml {SMALL} --precision single,certified --json"),
+                           self.json(f"certify plain.yaml {SMALL} --precision single,certified --json --perturb 1"))
 
     def test_verify(self):
         """Cases with a measure and without, one of them an image."""

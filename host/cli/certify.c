@@ -90,8 +90,21 @@ typedef struct {
         bool measured;
         char *failure; // why it is not measured where it was to be
         CertifyErrors errors;
+        CertifyDoubts doubts; // at `certified`
     } rows[PRECISION_COUNT];
 } Certification;
+
+static void doubts_print(const CertifyErrors *errors, const CertifyDoubts *doubts)
+{
+    if (errors->unlisted > 0)
+        printf("             %zu wrong pixels are not listed as undecided\n", errors->unlisted);
+    if (doubts->count == 0) return;
+    printf(
+        "             %zu pixels undecided; of %zu examined %zu change with errors of 2^-50, %zu are within "
+        "2^-49, %zu neither\n",
+        doubts->count, doubts->examined, doubts->witnessed, doubts->close,
+        doubts->examined - doubts->witnessed - doubts->close);
+}
 
 static void text_print(const Certification *certification)
 {
@@ -120,10 +133,12 @@ static void text_print(const Certification *certification)
         if (errors->object + errors->shadow + errors->path > 0)
             printf("    %.2g of the distance", errors->margin);
         putchar('\n');
+        if (i == PRECISION_CERTIFIED) doubts_print(errors, &certification->rows[i].doubts);
     }
 }
 
-static void row_json(Json *json, Precision precision, const CertifyErrors *errors)
+static void row_json(Json *json, Precision precision, const CertifyErrors *errors,
+                     const CertifyDoubts *doubts)
 {
     json_begin_object(json, NULL);
     json_text(json, "precision", precision_names[precision]);
@@ -141,6 +156,15 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_integer(json, "x", errors->worst[0]);
     json_integer(json, "y", errors->worst[1]);
     json_end(json);
+    if (precision == PRECISION_CERTIFIED) {
+        json_integer(json, "wrong_unlisted", (int64_t)errors->unlisted);
+        json_begin_object(json, "undecided");
+        json_integer(json, "pixels", (int64_t)doubts->count);
+        json_integer(json, "examined", (int64_t)doubts->examined);
+        json_integer(json, "witnessed", (int64_t)doubts->witnessed);
+        json_integer(json, "close", (int64_t)doubts->close);
+        json_end(json);
+    }
     json_end(json);
 }
 
@@ -167,7 +191,8 @@ static void json_report(const Certification *certification)
     json_integer(json, "undecided", (int64_t)undecided);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
-        if (certification->rows[i].measured) row_json(json, (Precision)i, &certification->rows[i].errors);
+        if (certification->rows[i].measured)
+            row_json(json, (Precision)i, &certification->rows[i].errors, &certification->rows[i].doubts);
         if (!certification->rows[i].failure) continue;
         json_begin_object(json, NULL);
         json_text(json, "precision", precision_names[i]);
@@ -192,11 +217,16 @@ static int precision_compare(Certification *certification, RenderSettings settin
         return EXIT_DONE;
     }
     messages_print(&messages, NULL);
+    const unsigned aovs = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT;
     Film film;
-    const bool whole = renderer && renderer_render_film(renderer, AOV_OBJECT | AOV_SHADOW | AOV_PATH, &film);
+    const bool whole = renderer && renderer_render_film(renderer, aovs, &film);
     if (whole) {
         certification->rows[precision].measured = true;
         certification->rows[precision].errors = certify_compare(&certification->sample, &film);
+        if (precision == PRECISION_CERTIFIED)
+            certification->rows[precision].doubts =
+                certify_doubts(certification->scene, &film, certification->options->pixels / 4 + 1,
+                               settings.bounce_count, progress_interrupted);
         film_free(&film);
     }
     renderer_close(renderer);

@@ -54,7 +54,8 @@ size_t film_tile_count(const Renderer *renderer, const Film *film)
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
 {
     // a kernel fills all of its layers, but computes shadows only on request
-    unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & AOVS_OF_PATH);
+    unsigned filled =
+        AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & (AOVS_OF_PATH | AOV_DOUBT));
     buffers->rows = film.height;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         bool empty = layer == LAYER_SHADOW && !(aovs & AOV_SHADOW);

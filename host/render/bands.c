@@ -122,6 +122,7 @@ static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows,
     const Place place = band_place(renderer, rows);
     bool go_on = true;
     pace_begin_band(pace);
+    if (first == 0) band_clear_doubts(renderer, buffers, rows);
     while (go_on && first < end) {
         uint32_t samples = pace_launch_samples(pace, pixels, end - first);
         double seconds = band_render(renderer, buffers, &place, first, first + samples);

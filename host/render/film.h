@@ -40,6 +40,8 @@ static inline RepeatCounts repeat_counts_add(RepeatCounts a, RepeatCounts b)
     return (RepeatCounts){a.repeated + b.repeated, a.undecided + b.undecided};
 }
 
+enum { DOUBT_REPEATED = 1, DOUBT_UNDECIDED }; // what the AOV says of such a pixel
+
 // Every pixel of an image's region or of a band of its rows, row by row from the top left. Layers are NULL
 // where they were not requested.
 //

@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
     uint32_t *items;
@@ -88,6 +89,30 @@ typedef struct {
     Film film;
 } RepeatedBand;
 
+void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows rows)
+{
+    if (!buffers->layers[LAYER_DOUBT]) return;
+    const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
+    const size_t size = film_layer_size(&band, LAYER_DOUBT);
+    void *values = renderer_map(renderer, buffers->layers[LAYER_DOUBT], size, CL_MAP_WRITE);
+    if (values) memset(values, 0, size);
+    renderer_unmap(renderer, buffers->layers[LAYER_DOUBT], values);
+}
+
+// Raises the doubt of the list's pixels.
+static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const PixelList *list, uint32_t doubt)
+{
+    cl_mem layer = band->buffers->layers[LAYER_DOUBT];
+    if (!layer) return;
+    uint32_t *values =
+        renderer_map(renderer, layer, film_layer_size(&band->film, LAYER_DOUBT), CL_MAP_READ | CL_MAP_WRITE);
+    for (size_t i = 0; values && i < list->index.count; i++) {
+        uint32_t *value = &values[list->index.items[i]];
+        if (*value < doubt) *value = doubt;
+    }
+    renderer_unmap(renderer, layer, values);
+}
+
 // Renders a list of the band's pixels by `repeat`, and puts them into the band's layers. `undecided`: of each
 // pixel, how many of its samples `repeat` leaves in doubt; NULL: not asked for.
 static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
@@ -152,10 +177,13 @@ void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
         uint32_t *undecided = memory_allocate(list.index.count, sizeof *undecided);
         counts->repeated +=
             (uint64_t)list.index.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
+        doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
         list_repeat(renderer, renderer->repeat, &band, &list, undecided);
         if (compute_ok(renderer->compute)) counts->undecided += list_keep_undecided(&list, undecided);
-        if (compute_ok(renderer->compute) && list.index.count > 0)
+        if (compute_ok(renderer->compute) && list.index.count > 0) {
+            doubts_raise(renderer, &band, &list, DOUBT_UNDECIDED);
             list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
+        }
         free(undecided);
     }
     free(list.pixels.items);

@@ -5,6 +5,7 @@
 #include "host/base/parallel.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 bool certify_is_undecided(const ReferencePixel *pixel)
 {
@@ -28,7 +29,7 @@ static void place_choose(const CertifySample *sample, uint32_t columns, uint32_t
 typedef struct {
     CertifySample *sample;
     const ReferenceScene *scene;
-    unsigned bounce_count;
+    ReferencePath path;
     bool (*stop)(void);
 } Computation;
 
@@ -41,7 +42,7 @@ static void pixels_compute(void *context, size_t begin, size_t end)
         const ReferenceRay ray =
             reference_camera_ray(&computation->scene->scene.camera, sample->width, sample->height,
                                  sample->places[i][0], sample->places[i][1]);
-        sample->pixels[i] = reference_pixel(computation->scene, &ray, computation->bounce_count,
+        sample->pixels[i] = reference_pixel(computation->scene, &ray, &computation->path,
                                             sample->shadows + i * sample->light_count);
     }
 }
@@ -62,7 +63,7 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
     for (size_t i = 0; i < sample->count; i++)
         place_choose(sample, columns, rows, i, sample->places[i]);
     ReferenceScene reference = reference_scene_open(scene);
-    Computation computation = {sample, &reference, bounce_count, stop};
+    Computation computation = {sample, &reference, {.bounce_count = bounce_count}, stop};
     parallel_run(sample->count, 1, pixels_compute, &computation);
     reference_scene_close(&reference);
     const bool stopped = stop && stop();
@@ -121,6 +122,7 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         const size_t pixel = (size_t)sample->places[i][1] * film->width + sample->places[i][0];
         const bool wrong = is_wrong(sample, i, film, pixel, &errors);
         if (wrong) errors.margin = fmax(errors.margin, expected->margin);
+        errors.unlisted += wrong && film->doubt[pixel] != DOUBT_UNDECIDED;
         if (expected->has_texture) continue;
         errors.colors++;
         const double error = color_error(film->color + 3 * pixel, &expected->color);
@@ -130,4 +132,76 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         *largest = fmax(*largest, error);
     }
     return errors;
+}
+
+enum { TRIES = 16 };
+
+typedef enum { LOOSE, CLOSE, WITNESSED } Doubt;
+
+typedef struct {
+    const ReferenceScene *scene;
+    const Film *film;
+    const size_t *pixels;
+    unsigned bounce_count;
+    bool (*stop)(void);
+    Doubt *doubts;
+} Examination;
+
+// Whether two answers differ in more than rounding.
+static bool is_other(const ReferencePixel *a, const ReferencePixel *b)
+{
+    const double color[3] = {a->color.x, a->color.y, a->color.z};
+    return a->object != b->object || a->path != b->path || color_error(color, &b->color) > 1e-6;
+}
+
+static void doubts_examine(void *context, size_t begin, size_t end)
+{
+    const Examination *examination = context;
+    const Scene *scene = &examination->scene->scene;
+    const Film *film = examination->film;
+    const size_t lights = scene->lights.count;
+    bool *shadows = memory_allocate_zeroed(2 * lights + 1, sizeof *shadows);
+    for (size_t i = begin; i < end; i++) {
+        if (examination->stop && examination->stop()) break;
+        const size_t pixel = examination->pixels[i];
+        const ReferenceRay ray =
+            reference_camera_ray(&scene->camera, film->width, film->height, (unsigned)(pixel % film->width),
+                                 (unsigned)(pixel / film->width));
+        ReferencePath path = {.bounce_count = examination->bounce_count};
+        const ReferencePixel exact = reference_pixel(examination->scene, &ray, &path, shadows);
+        examination->doubts[i] = exact.margin < 0x1p-49 ? CLOSE : LOOSE;
+        path.blur = 0x1p-50;
+        for (path.seed = 0; path.seed < TRIES && examination->doubts[i] != WITNESSED; path.seed++) {
+            const ReferencePixel other = reference_pixel(examination->scene, &ray, &path, shadows + lights);
+            if (is_other(&exact, &other) ||
+                (exact.object != UINT32_MAX && memcmp(shadows, shadows + lights, lights) != 0))
+                examination->doubts[i] = WITNESSED;
+        }
+    }
+    free(shadows);
+}
+
+CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, unsigned bounce_count,
+                             bool (*stop)(void))
+{
+    CertifyDoubts found = {0};
+    for (size_t i = 0; i < film_pixel_count(film); i++)
+        found.count += film->doubt[i] == DOUBT_UNDECIDED;
+    const size_t step = found.count / most + 1;
+    size_t *pixels = memory_allocate(found.count / step + 1, sizeof *pixels), chosen = 0;
+    for (size_t i = 0, seen = 0; i < film_pixel_count(film); i++)
+        if (film->doubt[i] == DOUBT_UNDECIDED && seen++ % step == 0) pixels[chosen++] = i;
+    Doubt *doubts = memory_allocate(chosen + 1, sizeof *doubts);
+    ReferenceScene reference = reference_scene_open(scene);
+    Examination examination = {&reference, film, pixels, bounce_count, stop, doubts};
+    parallel_run(chosen, 1, doubts_examine, &examination);
+    reference_scene_close(&reference);
+    found.examined = stop && stop() ? 0 : chosen;
+    for (size_t i = 0; i < found.examined; i++) {
+        found.witnessed += doubts[i] == WITNESSED;
+        found.close += doubts[i] == CLOSE;
+    }
+    free(doubts);
+    free(pixels);
+    return found;
 }

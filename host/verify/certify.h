@@ -34,7 +34,21 @@ typedef struct {
     // Of wrong pixels: how far the exact ray is from the curve at which its answer changes, the most, in
     // parts of the distance. What single may see wrong is at most some units of roundoff from it.
     double margin;
+    size_t unlisted; // wrong pixels that AOV_DOUBT does not list as undecided
 } CertifyErrors;
 
-// `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH and the color.
+// `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color.
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film);
+
+// Pixels that an image at `certified` leaves undecided, and what is known of those examined. That it is
+// double that cannot decide one has a witness if rays whose starts and directions err by up to 2^-50, as
+// double's may, 16 tries, give another answer. Else a quantity that decides may be below 2^-49, in parts of
+// the distance, as where surfaces coincide. The others may be open for loose bounds alone.
+typedef struct {
+    size_t count, examined, witnessed, close;
+} CertifyDoubts;
+
+// Examines at most about `most`, evenly over the image, on all processors. Nothing is examined if `stop`
+// returned true.
+CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, unsigned bounce_count,
+                             bool (*stop)(void));

@@ -278,27 +278,29 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
     if (transmission > 0) add_path(tree, &refracted, hit.object, weight * transmission, bounces_left - 1);
 }
 
-Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
+ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
+                               const ReferencePath *path, bool *shadows)
 {
-    const ReferenceScene world = {*scene, NULL};
-    Tree tree = {.world = &world, .blur = path->blur, .random = {path->seed}};
+    Tree tree = {.world = scene,
+                 .blur = path->blur,
+                 .random = {path->seed},
+                 .object = UINT32_MAX,
+                 .signature = PATH_START,
+                 .margin = INFINITY,
+                 .shadows = shadows};
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
     add_path(&tree, &first, UINT32_MAX, 1, path->bounce_count);
-    return tree.sum;
-}
-
-ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray, unsigned bounce_count,
-                               bool *shadows)
-{
-    Tree tree = {.world = scene, .object = UINT32_MAX, .signature = PATH_START, .margin = INFINITY};
-    tree.shadows = shadows;
-    add_path(&tree, ray, UINT32_MAX, 1, bounce_count);
     const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;
     return (ReferencePixel){.object = tree.object,
                             .path = tree.signature,
                             .color = tree.sum,
                             .margin = size > 0 ? tree.margin / size : tree.margin,
                             .has_texture = tree.has_texture};
+}
+
+Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
+{
+    return reference_pixel(&(ReferenceScene){*scene, NULL}, ray, path, NULL).color;
 }

@@ -28,7 +28,6 @@ typedef struct {
     double blur;
     uint64_t seed;
 } ReferencePath;
-Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);
 
 // What the AOVs of the same names hold.
 typedef struct {
@@ -38,6 +37,7 @@ typedef struct {
     bool has_texture; // somewhere on its way, where the color is undefined: textures are filtered, not exact
 } ReferencePixel;
 
-// `shadows`: of each light, true where it does not reach the surface; undefined without one.
-ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray, unsigned bounce_count,
-                               bool *shadows);
+// `shadows`: of each light, true where it does not reach the surface; undefined without one. Or NULL.
+ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
+                               const ReferencePath *path, bool *shadows);
+Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);

@@ -240,18 +240,20 @@ static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
 
 Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height)
 {
+    const unsigned aovs = AOVS_OF_HIT | AOVS_OF_PATH;
     Film film;
     const RenderSettings settings = scene_settings(run, bvh, width, height);
     scene_assign(run, run->painter, scene, &settings);
-    if (*run->painter && renderer_render_film(*run->painter, AOVS_ALL, &film))
+    if (*run->painter && renderer_render_film(*run->painter, aovs, &film))
         run->kernels->render_hash = renderer_report(*run->painter)->kernel_hash;
     else
-        film = film_allocate(width, height, (uint32_t)scene->lights.count, AOVS_ALL);
+        film = film_allocate(width, height, (uint32_t)scene->lights.count, aovs);
     const size_t pixels = film_pixel_count(&film);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
         run->result->unsound += !is_pixel_sound(run, &film, i);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!film.layers[layer]) continue;
         const size_t count = pixels * film_components(&film, layer);
         if (layer_types[layer] == LAYER_TYPE_INTEGER)
             hash_integers(run, film.layers[layer], count);
