@@ -204,14 +204,15 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     mask outer = a<(real)(0), grows = quadratic.h>(real)(0);
     real entry = lanes_select(outer, lanes_select(grows, far, (real)(-LARGEST)), near);
     real leave = lanes_select(outer, lanes_select(grows, (real)(LARGEST), near), far);
-    real roots[2] = {real_min(real_max(entry, from), to), real_min(real_max(leave, from), to)};
+    real roots[2] = {entry, leave};
     real before[2], after[2];
     for (uint i = 0; i < 2; i++) {
-        real t = roots[i];
+        real t = real_min(real_max(roots[i], from), to);
         RoundPoint point = round_point(round, ray, t);
         real slope = real_fma(a, t, quadratic.b); // half of it
         real step = divide_or((real)(0.5f) * point.value, slope, (real)(0));
-        mask settles = fabs(step) * (real)(0x1p6f) < fabs(t); // else the root was none
+        // else the root was none; from an end, where it is clamped, a step would lead beyond it
+        mask settles = (t == roots[i]) & (fabs(step) * (real)(0x1p6f) < fabs(t));
         t = lanes_select(settles, t - step, t);
         real band = (real)(2.5f) * point.band, bend = fabs(a) * band;
         real steepness = real_max(fabs(slope), (real)(0.5f) * real_sqrt(bend));
