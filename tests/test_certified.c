@@ -1,11 +1,13 @@
 // Images at `certified` of scenes that nearly touch the rays of pixels: round shapes and boxes that rays
 // graze, edges of triangles and rims through pixels' centers, faces that all but coincide, bodies of glass,
 // ground that is a planet's, mirrors, a spot's edge; shadows of all of them. Each object, shadow and path
-// must be the reference's, where `single` errs. run_tests: sanitize-long-only
+// must be the reference's, where `single` errs. So must those of the hard cases' images. The program takes a
+// pattern of its tests' names. run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/verify/certify.h"
+#include "host/verify/verify.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include <math.h>
@@ -357,11 +359,57 @@ static void mirrors_glass_and_spots_are_decided(void **state)
     check_family(OPTICS);
 }
 
+// What the certified images of the hard cases come to.
+typedef struct {
+    size_t images, compared, wrong, unlisted;
+} Pictures;
+
+static void picture_compare(void *context, const Scene *scene, const RenderSettings *settings)
+{
+    Pictures *pictures = context;
+    CertifySample reference;
+    assert_true(certify_sample_open(&reference, scene, settings->width, settings->height, 400,
+                                    settings->bounce_count, NULL));
+    RenderSettings certified = *settings;
+    certified.precision = PRECISION_CERTIFIED;
+    const Answer found = answer(scene, &reference, &certified);
+    if (found.unlisted > 0)
+        print_message("image %zu: %zu of %zu wrong, %zu of them not undecided\n", pictures->images,
+                      found.wrong, reference.count, found.unlisted);
+    pictures->images++;
+    pictures->compared += reference.count;
+    pictures->wrong += found.wrong;
+    pictures->unlisted += found.unlisted;
+    certify_sample_close(&reference);
+}
+
+static bool case_print(void *context, const VerifyResult *result)
+{
+    (void)context;
+    print_message("%s ", result->name);
+    return true;
+}
+
+static void hard_cases_are_decided(void **state)
+{
+    (void)state;
+    if (!tests_are_long() || !probe_compute.device->fp64) skip();
+    Pictures pictures = {0};
+    const VerifySettings settings = {
+        .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
+    verify_run(&probe_compute, &settings, NULL, case_print, NULL);
+    print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not undecided\n",
+                  pictures.images, pictures.compared, pictures.wrong, pictures.unlisted);
+    assert_true(pictures.images > 100);
+    assert_int_equal(pictures.unlisted, 0);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(flat_shapes_are_decided), cmocka_unit_test(round_shapes_are_decided),
-        cmocka_unit_test(planets_are_decided), cmocka_unit_test(mirrors_glass_and_spots_are_decided)};
+        cmocka_unit_test(planets_are_decided), cmocka_unit_test(mirrors_glass_and_spots_are_decided),
+        cmocka_unit_test(hard_cases_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

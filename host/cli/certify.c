@@ -225,14 +225,14 @@ static int precision_compare(Certification *certification, RenderSettings settin
         certification->rows[precision].errors = certify_compare(&certification->sample, &film);
         if (precision == PRECISION_CERTIFIED)
             certification->rows[precision].doubts =
-                certify_doubts(certification->scene, &film, certification->options->pixels / 4 + 1,
+                certify_doubts(certification->scene, &film, certification->options->pixels / 10 + 1,
                                settings.bounce_count, progress_interrupted);
         film_free(&film);
     }
     renderer_close(renderer);
-    return whole                    ? EXIT_DONE
-           : is_unfit               ? EXIT_USER
+    return is_unfit                 ? EXIT_USER
            : progress_interrupted() ? EXIT_INTERRUPTED
+           : whole                  ? EXIT_DONE
                                     : EXIT_MACHINE;
 }
 

@@ -243,6 +243,7 @@ Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
     const unsigned aovs = AOVS_OF_HIT | AOVS_OF_PATH;
     Film film;
     const RenderSettings settings = scene_settings(run, bvh, width, height);
+    if (run->settings->picture) run->settings->picture(run->settings->context, scene, &settings);
     scene_assign(run, run->painter, scene, &settings);
     if (*run->painter && renderer_render_film(*run->painter, aovs, &film))
         run->kernels->render_hash = renderer_report(*run->painter)->kernel_hash;
