@@ -2,12 +2,12 @@
 //
 // In the frame of the common origin, one coordinate axis is w and the other two are u and v. A ray there is a
 // point (u / w, v / w), a packet a rectangle of such points, and a box seen from the origin is a rectangle as
-// well. The children of a node are culled all at once, a lane per child, against the macro-tile's rectangle;
-// the packets of each child that is left all at once, a lane per packet; and the rays of each packet that is
-// left all at once, a lane per ray. Packets are frusta on a plane across the main axis in Wald, Ize, Kensler,
-// Knoll, Parker, Ray tracing animated scenes using coherent grid traversal, SIGGRAPH 2006, and culled in
-// groups in Reshetov, Soupikov, Hurley, Multi-level ray tracing algorithm, SIGGRAPH 2005; neither tests lanes
-// of three kinds.
+// well. The children of a node are culled all at once, a lane per child, against the macro-tile's rectangle,
+// and where its packets are few, against each one's; else the packets of each child that is left all at once,
+// a lane per packet. The rays of each packet that is left are culled all at once, a lane per ray. Packets are
+// frusta on a plane across the main axis in Wald, Ize, Kensler, Knoll, Parker, Ray tracing animated scenes
+// using coherent grid traversal, SIGGRAPH 2006, and culled in groups in Reshetov, Soupikov, Hurley,
+// Multi-level ray tracing algorithm, SIGGRAPH 2005; neither tests lanes of three kinds.
 #ifndef MACRO_TILE_H
 #define MACRO_TILE_H
 
@@ -36,9 +36,12 @@ typedef struct {
 } OriginFrame;
 
 typedef struct {
+    Traversal *traversals; // of each packet, as the rays
+    Ray *rays;
     OriginFrame frame;
-    uint packets; // those that take part, as bits
-    real slack;   // by which boxes are enlarged: for each lane's rays, from macro_tile_bound on for all
+    uint active;     // packets that still traverse, as bits
+    uint unprepared; // packets whose rays ray_prepare has yet to see, as bits
+    real slack;      // by which boxes are enlarged: for each lane's rays, from macro_tile_bound on for all
     // of each packet's rays: w per u and per v, w per t, and the w up to which they are traversed, -LARGEST
     // in lanes that are done
     real w_per_u[LANES], w_per_v[LANES], w_per_t[LANES], reach[LANES];
@@ -46,6 +49,7 @@ typedef struct {
     RealLanes u_min, u_max, v_min, v_max, reach_max;
     // bounds over all packets
     scalar tile_u_min, tile_u_max, tile_v_min, tile_v_max, tile_reach_max;
+    bool has_shrunk; // by a hit since tile_reach_max was set
 } MacroTile;
 
 static inline real vector_along(Vector vector, uint axis)
@@ -78,8 +82,9 @@ static inline OriginFrame origin_frame(const Scene *scene, const Ray *ray, mask 
     return frame;
 }
 
-static inline void macro_tile_set_reach(MacroTile *tile, uint packet, const Traversal *traversal)
+static inline void macro_tile_set_reach(MacroTile *tile, uint packet)
 {
+    const Traversal *traversal = &tile->traversals[packet];
     real t = (real)(1 + 16 * UNIT_ROUNDOFF);
     real limit = IS_CERTIFIED ? traversal->limit : traversal->hit.t;
     if (tile->frame.leaving) t = t * real_min(limit, (real)(LARGEST / 2));
@@ -96,12 +101,12 @@ static inline real slope_inverse(real slope)
 }
 
 // Adds a packet with active rays, unless one of its slopes is too large.
-static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint packet, const Ray *ray,
-                                  const Traversal *traversal)
+static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint packet)
 {
     const OriginFrame *frame = &tile->frame;
+    const Ray *ray = &tile->rays[packet];
     const real zero = (real)(0), none = (real)(LARGEST), away = (real)(frame->leaving ? 1 : -1);
-    mask active = traversal->active;
+    mask active = tile->traversals[packet].active;
     real w = vector_along(ray->direction, frame->w_axis) * (frame->reversed ? -away : away);
     real u = vector_along(ray->direction, frame->u_axis) * away;
     real v = vector_along(ray->direction, frame->v_axis) * away;
@@ -130,13 +135,14 @@ static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint pack
     real slack = real_fma((real)(TILE_POSITION_SLACK * UNIT_ROUNDOFF), max_norm1,
                           box_slack(ray, scene->header->bounds));
     tile->slack = real_max(tile->slack, lanes_select(active, slack, zero));
-    tile->packets |= 1u << packet;
-    macro_tile_set_reach(tile, packet, traversal);
+    tile->active |= 1u << packet;
+    macro_tile_set_reach(tile, packet);
 }
 
-static inline void macro_tile_bound_reach(MacroTile *tile, uint packets)
+static inline void macro_tile_bound_reach(MacroTile *tile)
 {
-    tile->tile_reach_max = lanes_largest(mask_of_bits(packets), tile->reach_max.all);
+    tile->tile_reach_max = lanes_largest(mask_of_bits(tile->active), tile->reach_max.all);
+    tile->has_shrunk = false;
 }
 
 static inline void macro_tile_bound(MacroTile *tile)
@@ -145,12 +151,12 @@ static inline void macro_tile_bound(MacroTile *tile)
     scalar origin_slack =
         TILE_POSITION_SLACK * UNIT_ROUNDOFF * (fabs(frame->u) + fabs(frame->v) + fabs(frame->w));
     tile->slack = (real)(lanes_largest(mask_all(), tile->slack) + origin_slack);
-    mask members = mask_of_bits(tile->packets);
+    mask members = mask_of_bits(tile->active);
     tile->tile_u_min = -lanes_largest(members, -tile->u_min.all);
     tile->tile_u_max = lanes_largest(members, tile->u_max.all);
     tile->tile_v_min = -lanes_largest(members, -tile->v_min.all);
     tile->tile_v_max = lanes_largest(members, tile->v_max.all);
-    macro_tile_bound_reach(tile, tile->packets);
+    macro_tile_bound_reach(tile);
 }
 
 // A node's boxes in the frame, a lane per child, and as seen from the origin: rectangles of slopes.
@@ -218,27 +224,58 @@ static inline bool rays_meet_child(const MacroTile *tile, uint packet, const Pro
     return lanes_any(entry <= exit);
 }
 
-// The packets, of those given, with a ray that may meet a child's box.
-static inline uint packets_meet_child(const MacroTile *tile, const ProjectedBoxes *boxes, uint child,
-                                      uint packets)
+// The packets, of those given, whose rectangle overlaps that of a child's box, a lane per packet.
+static inline uint packets_overlap_child(const MacroTile *tile, const ProjectedBoxes *boxes, uint child,
+                                         uint packets)
 {
-    packets &= lanes_bits(((real)(boxes->u_min.each[child]) <= tile->u_max.all) &
-                          (tile->u_min.all <= (real)(boxes->u_max.each[child])) &
-                          ((real)(boxes->v_min.each[child]) <= tile->v_max.all) &
-                          (tile->v_min.all <= (real)(boxes->v_max.each[child])) &
-                          ((real)(boxes->w_low.each[child]) <= tile->reach_max.all));
-    for (uint left = packets; left != 0; left &= left - 1) {
-        uint packet = lowest_bit(left);
-        if (!rays_meet_child(tile, packet, boxes, child)) packets &= ~(1u << packet);
-    }
-    return packets;
+    return packets & lanes_bits(((real)(boxes->u_min.each[child]) <= tile->u_max.all) &
+                                (tile->u_min.all <= (real)(boxes->u_max.each[child])) &
+                                ((real)(boxes->v_min.each[child]) <= tile->v_max.all) &
+                                (tile->v_min.all <= (real)(boxes->v_max.each[child])) &
+                                ((real)(boxes->w_low.each[child]) <= tile->reach_max.all));
 }
 
-// Pushes the children of a node that any of the packets may meet.
-static inline void visit_node_of_tile(TraversalStack *stack, const Scene *scene, global const BvhNode *node,
-                                      const MacroTile *tile, uint packets)
+// The same of all children, a lane per child: for each the packets, as bits.
+static inline integer packets_overlap_children(const MacroTile *tile, const ProjectedBoxes *boxes,
+                                               uint packets)
+{
+    integer overlapping = (integer)(0);
+    for (; packets != 0; packets &= packets - 1) {
+        uint packet = lowest_bit(packets);
+        mask overlaps = (boxes->u_min.all <= (real)(tile->u_max.each[packet])) &
+                        ((real)(tile->u_min.each[packet]) <= boxes->u_max.all) &
+                        (boxes->v_min.all <= (real)(tile->v_max.each[packet])) &
+                        ((real)(tile->v_min.each[packet]) <= boxes->v_max.all) &
+                        (boxes->w_low.all <= (real)(tile->reach_max.each[packet]));
+        integer with_packet = overlapping | (integer)((scalar_integer)1 << packet);
+        overlapping = lanes_select(overlaps, with_packet, overlapping);
+    }
+    return overlapping;
+}
+
+// Intersects the primitives of a leaf with the rays of packets.
+static inline void tile_intersect_leaf(MacroTile *tile, const Scene *scene, uint kind, uint first,
+                                       uint packets)
+{
+    for (; packets != 0; packets &= packets - 1) {
+        uint packet = lowest_bit(packets), bit = 1u << packet;
+        if (tile->unprepared & bit) ray_prepare(&tile->rays[packet]);
+        tile->unprepared &= ~bit;
+        Traversal *traversal = &tile->traversals[packet];
+        if (!intersect_leaf(traversal, scene, &tile->rays[packet], kind, first)) continue;
+        macro_tile_set_reach(tile, packet);
+        tile->has_shrunk = true;
+        if (!lanes_any(traversal->active)) tile->active &= ~bit;
+    }
+}
+
+// Intersects what is in the leaves among a node's children that any of the packets may meet, and pushes the
+// other children.
+static inline void tile_visit_node(MacroTile *tile, TraversalStack *stack, const Scene *scene,
+                                   global const BvhNode *node, uint packets)
 {
     const uint bottom = stack->count;
+    if (tile->has_shrunk) macro_tile_bound_reach(tile);
     ProjectedBoxes projected = project_boxes(tile, (global const scalar *)node->planes);
     uint children = lanes_bits((projected.u_min.all <= (real)(tile->tile_u_max)) &
                                ((real)(tile->tile_u_min) <= projected.u_max.all) &
@@ -246,10 +283,30 @@ static inline void visit_node_of_tile(TraversalStack *stack, const Scene *scene,
                                ((real)(tile->tile_v_min) <= projected.v_max.all) &
                                (projected.w_low.all <= (real)(tile->tile_reach_max)) &
                                (projected.w_high.all >= (real)(0)));
+    const bool by_packet = popcount(packets) < popcount(children); // the shorter loop runs
+    IntegerLanes overlapping;
+    if (by_packet) {
+        overlapping.all = packets_overlap_children(tile, &projected, packets);
+        children &= lanes_bits(overlapping.all != (integer)(0));
+    }
     for (; children != 0; children &= children - 1) {
         uint child = lowest_bit(children);
-        uint met = packets_meet_child(tile, &projected, child, packets);
-        if (met != 0) stack_push_child(stack, bottom, scene, node, child, met, projected.w_low.each[child]);
+        uint kind = ((global const uint *)node->child_kind)[child];
+        uint met = by_packet ? (uint)overlapping.each[child] & tile->active
+                             : packets_overlap_child(tile, &projected, child, packets);
+        // a sphere's first test costs no more than that of its box
+        uint untested = kind != BVH_NODE && (kind & 0xff) == KIND_SPHERES ? 0 : met;
+        for (; untested != 0; untested &= untested - 1) {
+            uint packet = lowest_bit(untested);
+            if (!rays_meet_child(tile, packet, &projected, child)) met &= ~(1u << packet);
+        }
+        if (met == 0) continue;
+        if (kind == BVH_NODE) {
+            stack_push_child(stack, bottom, scene, node, child, met, projected.w_low.each[child]);
+            continue;
+        }
+        tile_intersect_leaf(tile, scene, kind, ((global const uint *)node->child_index)[child], met);
+        if (tile->active == 0) return;
     }
 }
 
@@ -257,44 +314,26 @@ static inline void visit_node_of_tile(TraversalStack *stack, const Scene *scene,
 // active rays. Returns the others.
 static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scene, Ray *rays, uint packets)
 {
-    const uint first = lowest_bit(packets);
     MacroTile tile;
-    tile.frame = origin_frame(scene, &rays[first], traversals[first].active);
-    tile.packets = 0;
+    tile.traversals = traversals;
+    tile.rays = rays;
+    tile.active = 0;
+    tile.frame = origin_frame(scene, &rays[lowest_bit(packets)], traversals[lowest_bit(packets)].active);
     tile.slack = (real)(SMALLEST_RATIO);
     tile.u_min.all = tile.u_max.all = tile.v_min.all = tile.v_max.all = tile.reach_max.all = (real)(0);
-    for (uint left = packets; left != 0; left &= left - 1) {
-        uint packet = lowest_bit(left);
-        macro_tile_add(&tile, scene, packet, &rays[packet], &traversals[packet]);
-    }
-    const uint others = packets & ~tile.packets;
-    uint active = tile.packets, unprepared = active;
-    if (active == 0) return others;
+    for (uint left = packets; left != 0; left &= left - 1)
+        macro_tile_add(&tile, scene, lowest_bit(left));
+    const uint others = packets & ~tile.active;
+    if (tile.active == 0) return others;
+    tile.unprepared = tile.active;
     macro_tile_bound(&tile);
-    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)active, -LARGEST};
+    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)tile.active, -LARGEST};
     // entry distances are from the common origin: nearest the light is farthest from the surface
     TraversalStack stack = {entries, 0, false};
     for (;; next = entries[--stack.count]) {
-        uint met = next.lanes & active & lanes_bits((real)(next.entry) <= tile.reach_max.all);
-        if (met != 0 && next.child_kind == BVH_NODE) {
-            visit_node_of_tile(&stack, scene, &scene->nodes[next.child_index], &tile, met);
-        } else if (met != 0) {
-            bool shrunk = false;
-            for (; met != 0; met &= met - 1) {
-                uint packet = lowest_bit(met), bit = 1u << packet;
-                if (unprepared & bit) ray_prepare(&rays[packet]);
-                unprepared &= ~bit;
-                if (!intersect_leaf(&traversals[packet], scene, &rays[packet], next.child_kind,
-                                    next.child_index))
-                    continue;
-                shrunk = true;
-                macro_tile_set_reach(&tile, packet, &traversals[packet]);
-                if (!lanes_any(traversals[packet].active)) active &= ~bit;
-            }
-            if (active == 0) return others;
-            if (shrunk) macro_tile_bound_reach(&tile, active);
-        }
-        if (stack.count == 0) return others;
+        uint met = next.lanes & tile.active & lanes_bits((real)(next.entry) <= tile.reach_max.all);
+        if (met != 0) tile_visit_node(&tile, &stack, scene, &scene->nodes[next.child_index], met);
+        if (stack.count == 0 || tile.active == 0) return others;
     }
 }
 
