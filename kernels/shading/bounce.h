@@ -15,6 +15,7 @@ typedef struct {
     real origin_error, direction_error;
     integer left;
     mask leaves_outward;
+    real chord_turn, chord_end_place;
 } Bounce;
 
 static inline mask bounce_is_active(const Bounce *bounce)
@@ -31,6 +32,8 @@ static inline Ray bounce_ray(const Bounce *bounce)
         ray.direction_error = bounce->direction_error;
         ray.left = bounce->left;
         ray.leaves_outward = bounce->leaves_outward;
+        ray.chord_turn = bounce->chord_turn;
+        ray.chord_end_place = bounce->chord_end_place;
     }
     return ray;
 }
@@ -83,6 +86,14 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
 // The largest error of a bounced ray's direction that is still traced.
 #define BOUNCE_ERROR_MAX ((real)(0x1p-6f))
 
+static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask inside)
+{
+    bounce->chord_turn = lanes_select(inside, chord->turn, NEVER);
+    bounce->chord_end_place = lanes_select(inside, chord->end_place, NEVER);
+    real error = real_min(bounce->direction_error, chord->direction_error);
+    bounce->direction_error = lanes_select(inside, error, bounce->direction_error);
+}
+
 // The bounds of a surface's reflected and refracted ray. d - 2 (d . N) N is off by the error of d and twice
 // that of N; the refracted ray's, n d + N (s - sqrt(s^2 - k)), by those of d and N and by what the difference
 // changes with s. Lanes in doubt are not traced further.
@@ -90,7 +101,11 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
                                       Bounce *refracted, mask *doubt)
 {
     const real zero = (real)(0), one = (real)(1), rounding = (real)(32 * UNIT_ROUNDOFF);
+    const ChordEnd *end = &surface->chord_end;
     real normal_error = surface->normal_error, turn = ray->direction_error + rounding;
+    // of the angle of incidence
+    real angle_error = real_fma(turn, normal_error, turn + normal_error);
+    real cosine = fabs(vector_dot(ray->direction, surface->shading_normal));
     mask found = surface->found & ray->active, open = mask_none();
     real reflected_error = real_fma((real)(2), normal_error, turn);
     reflected->origin_error = refracted->origin_error = surface->place_error;
@@ -98,8 +113,15 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     reflected->direction_error = reflected_error;
     reflected->leaves_outward = surface->entering;
     refracted->leaves_outward = !surface->entering;
+    if (HAS_CHORDS) {
+        Chord chord =
+            chord_start(end, surface->place_error, cosine, real_fma((real)(3), end->normal, rounding),
+                        angle_error + end->normal + rounding);
+        bounce_set_chord(reflected, &chord, !surface->entering);
+        angle_error = real_min(angle_error, end->turn + end->normal + rounding);
+    }
     mask reflects = found & bounce_is_active(reflected);
-    open = reflects & !(reflected_error <= BOUNCE_ERROR_MAX);
+    open = reflects & !(reflected->direction_error <= BOUNCE_ERROR_MAX);
     if (HAS_TRIANGLES) {
         // the shading normal's reflection may run through the surface
         Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
@@ -108,9 +130,9 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     }
     if (HAS_TRANSMISSION) {
         mask transparent = found & (surface->transmission > zero);
-        real scale = lanes_select(surface->entering, one, surface->ior);
-        real cosine = fabs(vector_dot(ray->direction, surface->shading_normal)), scaled = scale * cosine;
-        real scaled_error = scale * (real_fma(turn, normal_error, turn + normal_error) + rounding);
+        real scale = lanes_select(surface->entering, one, surface->ior), scaled = scale * cosine;
+        real sine = real_sqrt(real_max(real_fma(-cosine, cosine, one), zero) + rounding);
+        real scaled_error = scale * (angle_error * (sine + angle_error) + rounding);
         real k =
             lanes_select(surface->entering, one - surface->ior, surface->ior - one) * (surface->ior + one);
         real squares = real_fma(scaled, scaled, surface->ior * surface->ior);
@@ -121,11 +143,25 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
         real least = real_max(scaled - scaled_error, zero), root = real_sqrt(real_max(squared, zero)),
              least_root = real_sqrt(lanes_select(least_squared > zero, least_squared, one));
         real change = real_divide(real_max(fabs(least - least_root), root - least), least_root);
-        real error = scale * turn + fabs(scaled - root) * normal_error + change * scaled_error +
-                     rounding * (scale + scaled + root + real_divide(squares, least_root));
         // over the length before it is made unit: the index on entering, 1 on leaving
-        real length = lanes_select(surface->entering, surface->ior, one);
-        refracted->direction_error = real_divide((real)(1.02f) * error, length) + rounding;
+        real inverse_length = real_divide((real)(1.02f), lanes_select(surface->entering, surface->ior, one));
+        real computed = real_fma(rounding * (scale + scaled + root + real_divide(squares, least_root)),
+                                 inverse_length, rounding);
+        real error = scale * turn + fabs(scaled - root) * normal_error + change * scaled_error;
+        refracted->direction_error = real_fma(error, inverse_length, computed);
+        if (HAS_CHORDS) {
+            real inner_cosine = real_divide(root, surface->ior);
+            Chord chord =
+                chord_start(end, surface->place_error, inner_cosine, NEVER,
+                            real_fma(angle_error, real_divide(one, surface->ior), computed + end->normal));
+            bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= one));
+            real steepest = real_divide(scaled + scaled_error, least_root);
+            real leaving =
+                computed + (real)(1.01f) * (divide_or(end->place, end->radius, NEVER) +
+                                            real_fma(steepest, end->turn + end->normal, end->normal));
+            refracted->direction_error = lanes_select(surface->entering, refracted->direction_error,
+                                                      real_min(leaving, refracted->direction_error));
+        }
         mask refracts = transparent & !total;
         open = open | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
         if (HAS_TRIANGLES)

@@ -2,6 +2,7 @@
 #ifndef SURFACE_H
 #define SURFACE_H
 
+#include "shading/chords.h"
 #include "shading/texture.h"
 #include "traversal/traversal.h"
 
@@ -40,6 +41,7 @@ typedef struct {
     real place_error, normal_error, geometric_error;
     integer object;
     mask doubt;
+    ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
 
 static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, uint index, const Ray *ray,
@@ -66,6 +68,19 @@ static inline mask shape_set_errors(const Scene *scene, uint kind, uint index, c
     }
     SHAPE_LIST(SHAPE_SET_ERRORS)
     return mask_none();
+}
+#endif
+
+#if IS_CERTIFIED
+// Where rays hit a sphere, in `lanes`.
+static inline void surface_set_chord_end(Surface *surface, const Scene *scene, uint index, const Ray *ray,
+                                         const Hit *hit, mask lanes, Vector position)
+{
+    Sphere sphere = scene->spheres[index];
+    ChordEnd end = chord_end(&sphere, ray, hit, position, lanes);
+    surface->place_error =
+        lanes_select(lanes, real_min(surface->place_error, end.place), surface->place_error);
+    surface->chord_end = chord_end_select(lanes, end, surface->chord_end);
 }
 #endif
 
@@ -276,6 +291,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         surface.place_error = hit_place_error(ray, hit);
         surface.object = hit->object;
         surface.doubt = hit->doubt;
+        surface.chord_end = chord_end_none();
     }
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
     integer pending = lanes_select(surface.found, hit->object, NO_OBJECT);
@@ -295,6 +311,8 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
         mask at_edge = mask_none();
 #if IS_CERTIFIED
+        if (HAS_CHORDS && entry.x == KIND_SPHERES)
+            surface_set_chord_end(&surface, scene, entry.y, ray, hit, found.lanes, found.point.position);
         at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
 #endif
         surface_point_replace(&point, found.lanes, &found.point);

@@ -22,9 +22,6 @@ typedef struct {
 // perpendicular, two sums to 2, an offset in the pixel to 1, the unit length's to 1.
 enum { CAMERA_DIRECTION_ERROR = 7 };
 
-// A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
-#define NEVER ((real)(LARGEST / 8))
-
 // a / b, or `otherwise` where that is out of range.
 static inline real divide_or(real a, real b, real otherwise)
 {

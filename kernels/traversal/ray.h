@@ -6,6 +6,9 @@
 
 #include "types.h"
 
+// A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
+#define NEVER ((real)(LARGEST / 8))
+
 typedef struct {
     Vector origin, direction; // the direction need not be unit
     real squared;             // direction . direction
@@ -24,6 +27,8 @@ typedef struct {
     integer left;
     mask leaves_outward;
     bool ends_at_light;
+    // of a ray along a chord of the sphere that it leaves, NEVER of others: as of a Chord (shading/chords.h)
+    real chord_turn, chord_end_place;
     mask is_loose;               // too far off for cull spheres
     real length, inverse_length; // of the direction, not below the exact ones, within 32 u
     // by ray_prepare: a bound on the length of across_u and across_v, and on the error of a triangle's corner
@@ -112,6 +117,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         ray.left = (integer)(-1);
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
+        ray.chord_turn = ray.chord_end_place = NEVER;
         ray.is_loose = mask_none();
     }
     ray.active = active & (ray.squared > (real)(0));

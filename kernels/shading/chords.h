@@ -1,0 +1,87 @@
+// Bounds of rays inside a sphere, at `certified`. A ray that is reflected there runs along chords of one
+// great circle, all of one angle of incidence, so that errors grow by addition. Bounds of place and direction
+// alone, which are correlated, would multiply with every chord. docs/numerics.md derives what is here.
+//
+// Rotate the computed path about the center so that it starts at the exact one's point: that moves no point
+// by more than `place`. What is left is an angle between the first chords, at most `turn`, by which the
+// points at their ends move at most twice the radius times.
+#ifndef CHORDS_H
+#define CHORDS_H
+
+#include "shapes/sphere.h"
+
+#define HAS_CHORDS (HAS_SPHERES && (HAS_REFLECTION || HAS_TRANSMISSION))
+
+// At a point of a sphere.
+typedef struct {
+    real radius;      // 0: no sphere, or too near to its tangent
+    real off;         // how far the computed point may be from the sphere, times 1.25
+    real normal;      // error of the normal, for the place where the computed ray meets the sphere
+    real place, turn; // of the chord that ends there; NEVER where none does
+} ChordEnd;
+
+// The bounds of the chord that a ray starts; NEVER where it starts none.
+typedef struct {
+    real turn, end_place; // end_place: of the point where it ends, but for what is computed there
+    real direction_error;
+} Chord;
+
+static inline ChordEnd chord_end_none(void)
+{
+    return (ChordEnd){(real)(0), (real)(0), (real)(0), NEVER, NEVER};
+}
+
+// Where rays hit a sphere at `point`, in `lanes`.
+static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit *hit, Vector point,
+                                 mask lanes)
+{
+    Vector center = vector_of(sphere->center_radius), f = vector_subtract(point, center);
+    real radius = (real)(sphere->center_radius.w), distance = vector_norm(f), center1 = vector_norm1(center);
+    real inverse = real_divide((real)(1), radius);
+    real rounding = vector_norm1(ray->origin) + vector_norm1(ray->direction) * fabs(hit->t);
+    ChordEnd end = chord_end_none();
+    end.off = (real)(1.25f) * (fabs(radius - distance) +
+                               (real)(UNIT_ROUNDOFF) * ((real)(12) * distance + (real)(4) * radius +
+                                                        (real)(2) * center1 + (real)(6) * rounding));
+    real cosine = fabs(vector_dot(f, ray->direction)) * inverse * ray->inverse_length;
+    real moved = divide_or(end.off, cosine, NEVER);
+    end.normal = inverse * (moved + (real)(UNIT_ROUNDOFF) * ((real)(4) * center1 + (real)(2) * rounding)) +
+                 (real)(16 * UNIT_ROUNDOFF);
+    mask usable = lanes & ((real)(16) * moved <= cosine * radius);
+    end.radius = lanes_select(usable, radius, (real)(0));
+    mask continues = usable & (hit->object == ray->left) & (ray->chord_turn < NEVER);
+    end.place = lanes_select(continues, ray->chord_end_place + moved, NEVER);
+    end.turn = lanes_select(continues, ray->chord_turn, NEVER);
+    return end;
+}
+
+static inline ChordEnd chord_end_select(mask condition, ChordEnd yes, ChordEnd no)
+{
+    return (ChordEnd){
+        lanes_select(condition, yes.radius, no.radius), lanes_select(condition, yes.off, no.off),
+        lanes_select(condition, yes.normal, no.normal), lanes_select(condition, yes.place, no.place),
+        lanes_select(condition, yes.turn, no.turn)};
+}
+
+// A chord from there, at the inner angle of incidence with this cosine. Its direction is off, seen from the
+// normal, by the end's turn and by `turned`, or, where no chord ended, by `turned_first`.
+static inline Chord chord_start(const ChordEnd *end, real place_error, real cosine, real turned,
+                                real turned_first)
+{
+    real moved = divide_or(end->off, cosine, NEVER);
+    mask continues = end->turn < NEVER;
+    real sine_squared = real_min((real)(1.04f) - cosine * cosine, (real)(1));
+    // asin(s) / s: what an angle across the plane of incidence is unrolled to
+    real unrolled = (real)(1.01f) * real_fma((real)(0.571f), sine_squared, (real)(1));
+    real inverse = real_divide((real)(1), lanes_select(end->radius > (real)(0), end->radius, (real)(1)));
+    real added = unrolled * (lanes_select(continues, turned, turned_first) + moved * inverse);
+    real turn = lanes_select(continues, end->turn, (real)(0)) + added,
+         place = lanes_select(continues, end->place, place_error) + moved;
+    real end_place = (real)(1.01f) * real_fma((real)(2) * end->radius, turn, place);
+    mask usable =
+        (end->radius > (real)(0)) & ((real)(16) * moved <= cosine * end->radius) & (turn <= (real)(0x1p-6f));
+    return (Chord){lanes_select(usable, turn, NEVER), lanes_select(usable, end_place, NEVER),
+                   lanes_select(usable, (real)(1.01f) * real_fma(place, inverse, turn), NEVER)};
+}
+
+#endif
