@@ -20,6 +20,7 @@
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
+#include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -28,6 +29,7 @@
 #include <linux/audit.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <pthread.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdarg.h>
@@ -292,6 +294,25 @@ ALLOCATING(char *, realpath, (const char *path, char *result), (path, result))
 ALLOCATING(FILE *, fopen, (const char *path, const char *mode), (path, mode))
 ALLOCATING(FILE *, fdopen, (int descriptor, const char *mode), (descriptor, mode))
 ALLOCATING(FILE *, tmpfile, (void), ())
+ALLOCATING(FILE *, open_memstream, (char **text, size_t *length), (text, length))
+ALLOCATING(DIR *, fdopendir, (int descriptor), (descriptor))
+
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *argument)
+{
+    if (ALLOCATION_FAILS("pthread_create")) return EAGAIN;
+    return ((int (*)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *))real("pthread_create"))(
+        thread, attributes, run, argument);
+}
+
+int inotify_init1(int flags)
+{
+    return ALLOCATION_FAILS("inotify_init1") ? -1 : ((int (*)(int))real("inotify_init1"))(flags);
+}
+
+int eventfd(unsigned value, int flags)
+{
+    return ALLOCATION_FAILS("eventfd") ? -1 : ((int (*)(unsigned, int))real("eventfd"))(value, flags);
+}
 
 int pipe2(int ends[2], int flags)
 {
