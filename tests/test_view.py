@@ -35,10 +35,11 @@ f 1 2 3
 f 1 3 4
 f 4 2 1
 """
-# Launches fail as long as there is a file of this name.
-FAILING_LAUNCHES = """\
+# Launches fail as long as there is a file of this name; files cannot be watched if there is one of that name.
+FAILING_CALLS = """\
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <errno.h>
 #include <stddef.h>
 #include <unistd.h>
 int clEnqueueNDRangeKernel(void *queue, void *kernel, unsigned dimensions, const size_t *offset, const size_t *items,
@@ -48,6 +49,13 @@ int clEnqueueNDRangeKernel(void *queue, void *kernel, unsigned dimensions, const
                   void *) = dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel");
     if (access("fails", F_OK) == 0) return -5;
     return launch(queue, kernel, dimensions, offset, items, group, count, events, event);
+}
+int inotify_init1(int flags)
+{
+    int (*init)(int) = dlsym(RTLD_NEXT, "inotify_init1");
+    if (access("unwatched", F_OK) != 0) return init(flags);
+    errno = EMFILE;
+    return -1;
 }
 """
 WIDTH, HEIGHT = 160, 120
@@ -396,11 +404,23 @@ class View(TestCase):
         write("scene.cfg", "")
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
+    @staticmethod
+    def failing_calls():
+        write("calls.c", FAILING_CALLS)
+        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-fPIC", "calls.c", "-o", "calls.so", "-ldl"], check=True)
+        return f"{os.getcwd()}/calls.so"
+
+    def test_unwatched_files(self):
+        """Whoever uses up what the system has for watching files learns that changes are not seen."""
+        write("unwatched", "")
+        window = Window(self, LD_PRELOAD=self.failing_calls())
+        window.line("^glint: warning: changes of files are not seen: Too many open files")
+        window.check()
+        window.close()
+
     def test_failing_device(self):
         """Its message is shown, and the window stays; the next movement tries again."""
-        write("launch.c", FAILING_LAUNCHES)
-        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-fPIC", "launch.c", "-o", "launch.so", "-ldl"], check=True)
-        window = Window(self, LD_PRELOAD=f"{os.getcwd()}/launch.so")
+        window = Window(self, LD_PRELOAD=self.failing_calls())
         window.saved()
         write("fails", "")
         for key in "Left", "Up":

@@ -4,10 +4,12 @@
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include <errno.h>
 #include <poll.h>
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -85,16 +87,22 @@ static void watch_free(Watch *watch)
     free(watch);
 }
 
+static void failure_print(const char *files, int error)
+{
+    fprintf(stderr, "glint: warning: changes of %s are not seen: %s\n", files, strerror(error));
+}
+
 Watch *watch_open(void (*changed)(void *context), void *context)
 {
     Watch *watch = memory_allocate_zeroed(1, sizeof *watch);
     watch->changed = changed;
     watch->context = context;
-    watch->notify = inotify_init1(IN_CLOEXEC);
-    watch->end = eventfd(0, EFD_CLOEXEC);
     pthread_mutex_init(&watch->mutex, NULL);
-    if (watch->notify >= 0 && watch->end >= 0 && pthread_create(&watch->thread, NULL, watch_run, watch) == 0)
-        return watch;
+    watch->notify = inotify_init1(IN_CLOEXEC);
+    watch->end = watch->notify < 0 ? -1 : eventfd(0, EFD_CLOEXEC);
+    const int error = watch->end < 0 ? errno : pthread_create(&watch->thread, NULL, watch_run, watch);
+    if (error == 0) return watch;
+    failure_print("files", error);
     watch_free(watch);
     return NULL;
 }
@@ -116,7 +124,9 @@ static void file_add(Watch *watch, const char *path)
     if (slash) folder[slash == path ? 1 : slash - path] = '\0';
     // the same folder gets the same watch
     int descriptor = inotify_add_watch(watch->notify, folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
+    const int error = errno;
     free(folder);
+    if (descriptor < 0 && error != ENOENT) failure_print(path, error); // who reads it says that it is missing
     if (descriptor < 0) return;
     WatchedFile file = {descriptor, memory_copy_text(slash ? slash + 1 : path)};
     array_push(watch->files, file);
