@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -126,16 +127,26 @@ static void store_and_list(void *result)
     *(bool *)result = cache_list(&entries, &messages) || cache_clear(&messages);
 }
 
+static void load_without_rights(void *result)
+{
+    if (geteuid() != 0 || setuid(65534) == 0) load_twice(result);
+}
+
 // Loads nothing, and warns once: in a process of its own, as this one must not have warned yet.
-static void assert_refused(const char *reason)
+static void assert_load_refused(void (*load)(void *result), const char *reason)
 {
     bool loaded = true;
-    ChildEnd end = child_run(load_twice, &loaded, sizeof loaded);
+    ChildEnd end = child_run(load, &loaded, sizeof loaded);
     assert_int_equal(end.status, 0);
     assert_false(loaded);
     if (!strstr(end.errors, reason)) print_error("%s", end.errors);
     assert_non_null(strstr(end.errors, reason));
     assert_null(strstr(strchr(end.errors, '\n'), "warning"));
+}
+
+static void assert_refused(const char *reason)
+{
+    assert_load_refused(load_twice, reason);
 }
 
 // An entry that others may have written is not loaded, and replaced.
@@ -320,6 +331,48 @@ static void test_clear_that_fails(void **state)
     rmdir(secret);
     free(secret);
     free(path);
+}
+
+static void test_folder_without_rights(void **state)
+{
+    (void)state;
+    char *cache = cache_folder_path();
+    store(key);
+    assert_int_equal(chmod(cache, 0), 0);
+    assert_load_refused(load_without_rights, "Permission denied");
+    assert_int_equal(chmod(cache, 0700), 0);
+    free(cache);
+}
+
+// However few files may be open, no entry is left out in silence, and none is called removed that is not.
+static void test_few_descriptors(void **state)
+{
+    (void)state;
+    enum { ROOM_END = 4 };
+    struct rlimit usual;
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &usual), 0);
+    const int next = open(".", O_RDONLY | O_CLOEXEC);
+    assert_true(next >= 0);
+    close(next);
+    bool listed = false, cleared = false;
+    for (rlim_t room = 0; room < ROOM_END; room++) {
+        store(key);
+        const struct rlimit few = {(rlim_t)next + room, usual.rlim_max};
+        MessageList messages[2] = {0};
+        CacheEntries entries;
+        assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+        listed = cache_list(&entries, &messages[0]);
+        cleared = cache_clear(&messages[1]);
+        assert_int_equal(setrlimit(RLIMIT_NOFILE, &usual), 0);
+        assert_int_equal(entries.count, listed ? 1 : 0);
+        assert_false(cleared && loads(key));
+        assert_int_equal(messages[0].count, listed ? 0 : 1);
+        assert_int_equal(messages[1].count, cleared ? 0 : 1);
+        cache_entries_free(&entries);
+        for (int i = 0; i < 2; i++)
+            message_list_free(&messages[i]);
+    }
+    assert_true(listed && cleared);
 }
 
 // Each byte changed, each shorter length, one byte more; then repaired by storing again.
@@ -545,6 +598,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_race_on_an_empty_cache, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_list, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_clear_that_fails, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_folder_without_rights, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_few_descriptors, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_of_another_key, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_entry_without_rights, set_up, tear_down),

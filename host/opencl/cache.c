@@ -105,7 +105,7 @@ static void make_folders(char *path)
     mkdir(path, 0700);
 }
 
-// -1 without a folder, with a message if there is one that cannot be trusted.
+// -1 without a folder, with a message if there is one that cannot be opened or trusted.
 static int folder_open(bool makes, MessageList *messages)
 {
     char *path = cache_folder_path();
@@ -114,10 +114,13 @@ static int folder_open(bool makes, MessageList *messages)
     struct stat status;
     const char *why = NULL;
     int folder = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (folder >= 0 && fstat(folder, &status) == 0)
-        why = distrust(&status, S_IFDIR);
+    const int error = errno;
+    if (folder >= 0)
+        why = fstat(folder, &status) == 0 ? distrust(&status, S_IFDIR) : "it has no status";
     else if (lstat(path, &status) == 0 && S_ISLNK(status.st_mode))
         why = "a symbolic link";
+    else if (error != ENOENT && error != ENOTDIR)
+        why = strerror(error);
     if (why) {
         message_add(messages, MESSAGE_WARNING, "the kernel cache '%s' is not used: %s", path, why);
         if (folder >= 0) close(folder);
@@ -282,29 +285,6 @@ static bool is_temporary(const char *name)
     return is_of_entry;
 }
 
-// Lists the entries, the least recently used first, and removes stale temporaries; other files are not ours.
-static CacheEntries entries_list(int folder)
-{
-    CacheEntries entries = {0};
-    int descriptor = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    DIR *items = descriptor < 0 ? NULL : fdopendir(descriptor);
-    if (!items) return entries;
-    for (const struct dirent *item; (item = readdir(items)) != NULL;) {
-        struct stat status;
-        if (is_temporary(item->d_name)) output_remove_stale(folder, item->d_name);
-        if (!starts_with_entry_name(item->d_name) || item->d_name[ENTRY_NAME_LENGTH] != '\0') continue;
-        if (fstatat(folder, item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
-        if (S_ISDIR(status.st_mode)) continue;
-        array_push(entries, ((CacheEntry){.name = memory_copy_text(item->d_name),
-                                          .size = (uint64_t)status.st_size,
-                                          .used = status.st_mtim}));
-        entries.size += (uint64_t)status.st_size;
-    }
-    closedir(items);
-    if (entries.count > 0) qsort(entries.items, entries.count, sizeof *entries.items, entries_compare);
-    return entries;
-}
-
 void cache_entries_free(CacheEntries *entries)
 {
     for (size_t i = 0; i < entries->count; i++) {
@@ -313,6 +293,36 @@ void cache_entries_free(CacheEntries *entries)
     }
     free(entries->items);
     *entries = (CacheEntries){0};
+}
+
+// Lists the entries, the least recently used first, and removes stale temporaries; other files are not ours.
+// False, with a message and no entries, if the folder cannot be read to its end.
+static bool entries_list(CacheEntries *entries, int folder, MessageList *messages)
+{
+    *entries = (CacheEntries){0};
+    int descriptor = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *items = descriptor < 0 ? NULL : fdopendir(descriptor);
+    for (const struct dirent *item; items && (errno = 0, item = readdir(items)) != NULL;) {
+        struct stat status;
+        if (is_temporary(item->d_name)) output_remove_stale(folder, item->d_name);
+        if (!starts_with_entry_name(item->d_name) || item->d_name[ENTRY_NAME_LENGTH] != '\0') continue;
+        if (fstatat(folder, item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
+        if (S_ISDIR(status.st_mode)) continue;
+        array_push(*entries, ((CacheEntry){.name = memory_copy_text(item->d_name),
+                                           .size = (uint64_t)status.st_size,
+                                           .used = status.st_mtim}));
+        entries->size += (uint64_t)status.st_size;
+    }
+    const int error = errno; // of what came last, which may be the end
+    if (items) closedir(items);
+    if (!items && descriptor >= 0) close(descriptor);
+    if (error != 0) {
+        message_add(messages, MESSAGE_ERROR, "cannot list the kernel cache: %s", strerror(error));
+        cache_entries_free(entries);
+        return false;
+    }
+    if (entries->count > 0) qsort(entries->items, entries->count, sizeof *entries->items, entries_compare);
+    return true;
 }
 
 // False, with a message, unless the file is gone.
@@ -326,7 +336,8 @@ static bool file_remove(int folder, const char *name, MessageList *messages)
 // Removes, too, what is too large to be loaded. False, with messages, if something remains.
 static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
 {
-    CacheEntries entries = entries_list(folder);
+    CacheEntries entries;
+    if (!entries_list(&entries, folder, messages)) return false;
     uint64_t left = entries.size;
     bool is_trimmed = true;
     for (size_t i = 0; i < entries.count; i++)
@@ -409,11 +420,11 @@ bool cache_list(CacheEntries *entries, MessageList *messages)
     *entries = (CacheEntries){0};
     int folder = folder_open(false, messages);
     if (folder < 0) return messages->count == 0;
-    *entries = entries_list(folder);
+    const bool is_listed = entries_list(entries, folder, messages);
     for (size_t i = 0; i < entries->count; i++)
         entry_describe(&entries->items[i], folder);
     close(folder);
-    return true;
+    return is_listed;
 }
 
 bool cache_clear(MessageList *messages)

@@ -38,7 +38,7 @@ typedef struct {
 } CacheEntries;
 
 // Lists and checks all entries; without a folder there are none. False, with a message, if the folder cannot
-// be trusted.
+// be trusted or read.
 bool cache_list(CacheEntries *entries, MessageList *messages);
 void cache_entries_free(CacheEntries *entries);
 // Removes all entries and the hash's key. False as cache_list, or if one cannot be removed.
