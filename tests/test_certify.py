@@ -19,6 +19,13 @@ camera: {position: [0, 0, -5], look_at: [0, 0, 0]}
 lights: [{point: {position: [2, 5, -4]}}]
 objects: [{triangle: {vertices: [[0, -1, 0], [0, 1.1, 0], [1, 0, 0]]}}]
 """
+TILTED = """\
+camera: {position: [0, 0, -5], look_at: [0, 0, 0]}
+lights: [{point: {position: [8, 0, 2]}}, {point: {position: [3, 1, -4]}}]
+objects:
+  - triangle: {vertices: [[-2, -1, 0], [0, 2, 0], [2, -1, 0]], normals: [[3, 0, -1], [3, 1, -1], [1, 0, -1]], material: {reflection: 0.5}}
+  - sphere: {center: [3, 0, 3], radius: 2}
+"""
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -40,6 +47,15 @@ class Certify(TestCase):
                 self.assertEqual(rows[best]["compared"], report["pixels"] - report["undecided"])
                 if HAS_DOUBLE:
                     self.assertLess(rows[best]["color"]["max_right"], 1e-10)
+
+    @unittest.skipUnless(HAS_DOUBLE, "no fp64")
+    def test_tilted_normals(self):
+        """By a smooth triangle's normals the reflected ray would run through it, and a light behind it shine on it."""
+        write("tilted.yaml", TILTED)
+        _, rows = self.certify("tilted.yaml", "--precision double,certified")
+        for row in rows.values():
+            self.assertEqual([row["wrong"][name] for name in ("object", "shadow", "path")], [0, 0, 0])
+        self.assertLess(rows["double"]["color"]["max_right"], 1e-10)
 
     def test_errors_are_noticed(self):
         """A planet at fast loses the shadow of a small sphere; a wrong pixel has a wrong color."""

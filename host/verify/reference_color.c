@@ -24,9 +24,10 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
     return (ReferenceRay){quad3(camera->position), quad3_add(forward, sideways), 0, (Quad)FLT_MAX};
 }
 
-// A point of a surface, the unit normal that faces the eye and the unit direction to the eye.
+// A point of a surface, the unit normals that face the eye, of shading and of the geometry, and the unit
+// direction to the eye.
 typedef struct {
-    Quad3 point, normal, to_eye;
+    Quad3 point, normal, geometric, to_eye;
     Quad scale; // how far the point is from the ray's origin
     Quad start; // rays that leave it have gone this far before they meet anything
     bool entering;
@@ -99,6 +100,10 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
                            directional ? (Quad)LDBL_MAX : 1 - SHADOW_MARGIN};
     Quad strength =
         light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
+    // a light before the shading normal but behind the surface
+    const Quad height = quad3_dot(surface->geometric, to_light);
+    sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(height) * surface->scale));
+    if (height <= 0) strength *= material->full_shadow ? 0 : material->transmission;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Material *medium = &scene->materials.items[object->material];
@@ -131,6 +136,7 @@ static Surface surface_at(const Scene *scene, const ReferenceRay *ray, Reference
     Quad length = quad3_length(ray->direction);
     Surface surface = {.point = reference_point(ray, hit->t),
                        .normal = hit->shading_normal,
+                       .geometric = hit->normal,
                        .to_eye = quad3_scale(ray->direction, -1 / length),
                        .scale = hit->t * length,
                        .entering = hit->entering,
@@ -184,6 +190,20 @@ static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted, d
     *refracted =
         quad3_add(quad3_scale(direction, eta), quad3_scale(normal, eta * cosine - quad_root(squared)));
     return true;
+}
+
+static Quad3 reflect(Quad3 direction, Quad3 normal)
+{
+    return quad3_subtract(direction, quad3_scale(normal, 2 * quad3_dot(direction, normal)));
+}
+
+// Whether a bounced ray keeps to its side of the surface, the normal's or the other. If not, as smooth
+// triangles' shading normals may have it, it is bent by the geometric normal instead.
+static bool is_on_side(Quad3 direction, Quad3 normal, int side, double *margin)
+{
+    const Quad height = side * quad3_dot(quad3_unit(direction), normal);
+    *margin = fmin(*margin, (double)quad_absolute(height));
+    return height > 0;
 }
 
 // Tie rule: an opaque surface within CONTACT_PART * distance of a transparent one is the visible one.
@@ -263,17 +283,21 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
     double reflection = material->reflection, transmission = material->transmission;
     ReferenceRay refracted = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, reflected = refracted;
     Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
+    const bool is_smooth = surface.object->kind == SHAPE_TRIANGLE && surface.object->as.triangle.smooth;
     bool is_total = false;
     if (transmission > 0) {
         is_total = !refract(direction, surface.normal, eta, &refracted.direction, &tree->margin);
+        if (is_smooth && !is_total && !is_on_side(refracted.direction, surface.geometric, -1, &tree->margin))
+            is_total = !refract(direction, surface.geometric, eta, &refracted.direction, &tree->margin);
         reflection += is_total ? transmission : 0;
         transmission = is_total ? 0 : transmission;
     }
     signature_add(tree, hit.object,
                   (reflection > 0 ? PATH_REFLECTED : 0u) | (transmission > 0 ? PATH_REFRACTED : 0u) |
                       (is_total ? PATH_TOTAL_REFLECTION : 0u));
-    Quad away = quad3_dot(direction, surface.normal);
-    reflected.direction = quad3_subtract(direction, quad3_scale(surface.normal, 2 * away));
+    reflected.direction = reflect(direction, surface.normal);
+    if (reflection > 0 && is_smooth && !is_on_side(reflected.direction, surface.geometric, 1, &tree->margin))
+        reflected.direction = reflect(direction, surface.geometric);
     if (reflection > 0) add_path(tree, &reflected, hit.object, weight * reflection, bounces_left - 1);
     if (transmission > 0) add_path(tree, &refracted, hit.object, weight * transmission, bounces_left - 1);
 }
