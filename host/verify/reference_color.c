@@ -310,8 +310,8 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
                  .random = {path->seed},
                  .object = UINT32_MAX,
                  .signature = PATH_START,
-                 .margin = INFINITY,
-                 .shadows = shadows};
+                 .margin = INFINITY};
+    tree.shadows = shadows;
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
