@@ -32,8 +32,10 @@ static inline Ray bounce_ray(const Bounce *bounce)
         ray.direction_error = bounce->direction_error;
         ray.left = bounce->left;
         ray.leaves_outward = bounce->leaves_outward;
-        ray.chord_turn = bounce->chord_turn;
-        ray.chord_end_place = bounce->chord_end_place;
+        if (HAS_CHORDS) {
+            ray.chord_turn = bounce->chord_turn;
+            ray.chord_end_place = bounce->chord_end_place;
+        }
     }
     return ray;
 }

@@ -10,8 +10,6 @@
 
 #include "shapes/sphere.h"
 
-#define HAS_CHORDS (HAS_SPHERES && (HAS_REFLECTION || HAS_TRANSMISSION))
-
 // At a point of a sphere.
 typedef struct {
     real radius;      // 0: no sphere, or too near to its tangent

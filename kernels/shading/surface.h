@@ -291,7 +291,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         surface.place_error = hit_place_error(ray, hit);
         surface.object = hit->object;
         surface.doubt = hit->doubt;
-        surface.chord_end = chord_end_none();
+        if (HAS_CHORDS) surface.chord_end = chord_end_none();
     }
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
     integer pending = lanes_select(surface.found, hit->object, NO_OBJECT);

@@ -9,6 +9,9 @@
 // A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
 #define NEVER ((real)(LARGEST / 8))
 
+// Rays may run inside a sphere (shading/chords.h).
+#define HAS_CHORDS (HAS_SPHERES && (HAS_REFLECTION || HAS_TRANSMISSION))
+
 typedef struct {
     Vector origin, direction; // the direction need not be unit
     real squared;             // direction . direction
@@ -117,7 +120,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         ray.left = (integer)(-1);
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
-        ray.chord_turn = ray.chord_end_place = NEVER;
+        if (HAS_CHORDS) ray.chord_turn = ray.chord_end_place = NEVER;
         ray.is_loose = mask_none();
     }
     ray.active = active & (ray.squared > (real)(0));
