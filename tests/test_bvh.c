@@ -4,10 +4,12 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/bvh_widen.h"
+#include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
 #include "tests/film.h"
 #include "tests/probe.h"
+#include "tests/scene_reading.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -207,6 +209,41 @@ static void few_boxes_make_a_tree(void **state)
             kinds[i] = (uint8_t)(i % 3);
         }
         tree_check(boxes, kinds, count);
+    }
+}
+
+// Beside a town of size 2: the slack of its boxes must not be a planet's.
+static void planets_stay_outside_the_tree(void **state)
+{
+    (void)state;
+    static const struct {
+        double radii[2]; // of planets
+        uint32_t in_tree;
+    } skies[] = {{{0.5, 15.9}, 2}, {{0.5, 16.1}, 1}, {{17, 18}, 2}, {{17, 600}, 0}};
+    enum { HOUSES = 30 };
+    for (size_t i = 0; i < sizeof skies / sizeof *skies; i++) {
+        Text text = {0};
+        text_appendf(&text, "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\nobjects:\n");
+        for (size_t k = 0; k < 2; k++)
+            text_appendf(&text, "  - sphere: {center: [0, %g, 0], radius: %g}\n", -skies[i].radii[k],
+                         skies[i].radii[k]);
+        for (int k = 0; k < HOUSES; k++)
+            text_appendf(&text, "  - sphere: {center: [%g, 0.1, 0], radius: 0.1}\n",
+                         0.9 * (2.0 * k / (HOUSES - 1) - 1));
+        Scene scene = scene_of_text("town.yaml", text_c(&text));
+        const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
+        CompiledScene compiled;
+        MessageList messages = {0};
+        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+        assert_int_equal(compiled.bounded_counts[KIND_SPHERES], HOUSES + skies[i].in_tree);
+        // the first two objects; the larger one first leaves
+        const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
+        for (uint32_t k = 0; k < 2; k++)
+            assert_int_equal(entries[k].kind_index_material.y < HOUSES + skies[i].in_tree,
+                             k < skies[i].in_tree);
+        compiled_scene_free(&compiled);
+        scene_free(&scene);
+        text_free(&text);
     }
 }
 
@@ -565,8 +602,11 @@ static void closed_meshes_do_not_leak(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_boxes_make_a_tree),      cmocka_unit_test(few_boxes_make_a_tree),
-        cmocka_unit_test(no_hit_depends_on_the_tree), cmocka_unit_test(rays_may_look_behind_their_start),
+        cmocka_unit_test(any_boxes_make_a_tree),
+        cmocka_unit_test(few_boxes_make_a_tree),
+        cmocka_unit_test(planets_stay_outside_the_tree),
+        cmocka_unit_test(no_hit_depends_on_the_tree),
+        cmocka_unit_test(rays_may_look_behind_their_start),
         cmocka_unit_test(closed_meshes_do_not_leak),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);

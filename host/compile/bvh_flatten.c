@@ -10,6 +10,11 @@
 // From this many bounded primitives on a BVH is faster than testing each.
 enum { BVH_WORTHWHILE = 24 };
 
+// A primitive this many times as large as all others together stays outside the tree, such as a planet below
+// a town: most rays meet it anyway, and the slack of boxes, which grows with their common bounds, would be as
+// large as the town.
+enum { HUGE_RATIO = 16 };
+
 // The bounded primitives on their way into the tree.
 typedef struct {
     Bounds *boxes;
@@ -54,6 +59,38 @@ static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
             bounded->places[bounded->count++] = (uint32_t)i;
             bounded->kind_counts[kind]++;
         }
+    }
+}
+
+static double box_size(const Bounds *box)
+{
+    const Vector3 extent = vector_subtract(box->max, box->min);
+    return fmax(extent.x, fmax(extent.y, extent.z));
+}
+
+static void bounded_remove(Bounded *bounded, size_t index)
+{
+    bounded->kind_counts[bounded->kinds[index]]--;
+    const size_t left = --bounded->count - index;
+    memmove(&bounded->boxes[index], &bounded->boxes[index + 1], left * sizeof *bounded->boxes);
+    memmove(&bounded->kinds[index], &bounded->kinds[index + 1], left * sizeof *bounded->kinds);
+    memmove(&bounded->places[index], &bounded->places[index + 1], left * sizeof *bounded->places);
+}
+
+static void huge_remove(Bounded *bounded)
+{
+    while (bounded->count > 1) {
+        size_t largest = 0;
+        for (size_t i = 1; i < bounded->count; i++)
+            if (box_size(&bounded->boxes[i]) > box_size(&bounded->boxes[largest])) largest = i;
+        const double size = box_size(&bounded->boxes[largest]);
+        Bounds others = bounds_empty();
+        for (size_t i = 0; i < bounded->count; i++) {
+            if (i == largest) continue;
+            others = bounds_join(others, bounded->boxes[i]);
+            if (size < HUGE_RATIO * box_size(&others)) return;
+        }
+        bounded_remove(bounded, largest);
     }
 }
 
@@ -114,19 +151,23 @@ static void range_enter(void *context, size_t begin, size_t end)
     }
 }
 
-// Moves a shape's primitives into the leaves' order, the unbounded behind them, and updates the objects'
-// entries.
+// Moves a shape's primitives into the leaves' order, those outside the tree behind them, and updates the
+// objects' entries.
 static void array_reorder(CompiledScene *compiled, size_t kind, const Bvh *bvh, const Bounded *bounded)
 {
     FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
     if (array->count == 0) return;
     uint32_t *from = memory_allocate(array->count, sizeof *from);
+    bool *in_tree = memory_allocate_zeroed(array->count, sizeof *in_tree);
     size_t count = 0;
-    for (size_t i = 0; i < bvh->primitive_count; i++)
-        if (bvh->kinds[i] == kind) from[count++] = bounded->places[bvh->order[i]];
-    Bounds box;
+    for (size_t i = 0; i < bvh->primitive_count; i++) {
+        if (bvh->kinds[i] != kind) continue;
+        from[count] = bounded->places[bvh->order[i]];
+        in_tree[from[count++]] = true;
+    }
     for (size_t i = 0; count < array->count; i++)
-        if (!primitive_bounds(kind, flat_array_at(array, i), &box)) from[count++] = (uint32_t)i;
+        if (!in_tree[i]) from[count++] = (uint32_t)i;
+    free(in_tree);
     array_permute(array, from);
     free(from);
     Entering entering = {array, compiled->arrays[FLAT_OBJECTS].items};
@@ -207,6 +248,7 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     if (settings->bvh == BVH_OFF) return;
     Bounded bounded;
     bounded_collect(&bounded, compiled);
+    huge_remove(&bounded);
     if (bounded.count < (settings->bvh == BVH_ON ? 1 : BVH_WORTHWHILE)) {
         bounded_free(&bounded);
         return;
