@@ -17,7 +17,6 @@ from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkp
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
-              "OMPI_MCA_odls_base_sigkill_timeout": "30",  # seconds that an interrupted rank has, 1 else: too few beside other tests
               "HWLOC_COMPONENTS": "-gl"}  # else an X server that ends takes mpirun with it
 BUILD = os.environ.get("BUILD", "build")
 RANKS = PROGRAM.parent / "glint-mpi"
@@ -249,8 +248,11 @@ class Mpi(TestCase):
             with self.subTest(fault=fault):
                 self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: it sent what is not a band")
 
-    def start(self, command, *options):
-        """A job with a checkpoint; returns when that has another band, or the job is done."""
+    def start(self, command, patience=1):
+        """A job with a checkpoint; returns when that has another band, or the job is done.
+
+        `patience`: the seconds for which mpirun waits before it ends a rank, and again before it kills it.
+        """
         def size():
             try:
                 return os.stat("saved").st_size
@@ -258,7 +260,8 @@ class Mpi(TestCase):
                 return 0
 
         before = max(size(), 4096)
-        process = subprocess.Popen(["mpirun", "-n", "3", RANKS, *command.split(), "-o", "ranks.npy", "--checkpoint", "saved", *options],
+        process = subprocess.Popen(["mpirun", "--mca", "odls_base_sigkill_timeout", str(patience), "-n", "3", RANKS, *command.split(),
+                                    "-o", "ranks.npy", "--checkpoint", "saved"],
                                    env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                    text=True)
         while process.poll() is None and size() <= before:
@@ -276,9 +279,9 @@ class Mpi(TestCase):
 
     def test_interrupts(self):
         """Of mpirun, which then exits with a status of its own, and of the first rank alone."""
-        command = f"{RENDER.replace('20', '100000')} --precision strict"
+        command = f"{RENDER.replace('20', '100000').replace('64x96', '64x4096')} --precision strict"  # minutes
         for interrupted, signal_number, status in ("mpirun", signal.SIGINT, None), ("rank", signal.SIGTERM, 130):
-            process = self.start(command)
+            process = self.start(command, patience=4)  # beside other tests a second is too short
             self.assertIsNone(process.poll(), "it was done before the interrupt")
             os.kill(process.pid if interrupted == "mpirun" else self.ranks_of(process)[0], signal_number)
             _, errors = process.communicate(timeout=60)
