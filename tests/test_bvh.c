@@ -235,8 +235,8 @@ static void planets_stay_outside_the_tree(void **state)
         CompiledScene compiled;
         MessageList messages = {0};
         assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-        assert_int_equal(compiled.bounded_counts[KIND_SPHERES], HOUSES + skies[i].in_tree);
-        // the first two objects; the larger one first leaves
+        assert_int_equal(compiled.bvh_counts[KIND_SPHERES], HOUSES + skies[i].in_tree);
+        // the first two objects, the larger one last
         const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
         for (uint32_t k = 0; k < 2; k++)
             assert_int_equal(entries[k].kind_index_material.y < HOUSES + skies[i].in_tree,
@@ -245,6 +245,26 @@ static void planets_stay_outside_the_tree(void **state)
         scene_free(&scene);
         text_free(&text);
     }
+}
+
+// Triangles without area are points; here all are the same. They stay in the tree, and the planet out of it.
+static void points_make_a_tree(void **state)
+{
+    (void)state;
+    enum { POINTS = 100000 };
+    Scene scene = scene_of_text("points.yaml", "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\n"
+                                               "objects:\n"
+                                               "  - sphere: {center: [0, -3, 0], radius: 2}\n");
+    for (int i = 0; i < POINTS; i++)
+        array_push(scene.objects, ((Object){.kind = SHAPE_TRIANGLE}));
+    const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
+    CompiledScene compiled;
+    MessageList messages = {0};
+    assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+    assert_int_equal(compiled.bvh_counts[KIND_TRIANGLES], POINTS);
+    assert_int_equal(compiled.bvh_counts[KIND_SPHERES], 0);
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
 }
 
 // On and off
@@ -602,11 +622,9 @@ static void closed_meshes_do_not_leak(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_boxes_make_a_tree),
-        cmocka_unit_test(few_boxes_make_a_tree),
-        cmocka_unit_test(planets_stay_outside_the_tree),
-        cmocka_unit_test(no_hit_depends_on_the_tree),
-        cmocka_unit_test(rays_may_look_behind_their_start),
+        cmocka_unit_test(any_boxes_make_a_tree),         cmocka_unit_test(few_boxes_make_a_tree),
+        cmocka_unit_test(planets_stay_outside_the_tree), cmocka_unit_test(points_make_a_tree),
+        cmocka_unit_test(no_hit_depends_on_the_tree),    cmocka_unit_test(rays_may_look_behind_their_start),
         cmocka_unit_test(closed_meshes_do_not_leak),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);

@@ -10,9 +10,9 @@
 // From this many bounded primitives on a BVH is faster than testing each.
 enum { BVH_WORTHWHILE = 24 };
 
-// A primitive this many times as large as all others together stays outside the tree, such as a planet below
-// a town: most rays meet it anyway, and the slack of boxes, which grows with their common bounds, would be as
-// large as the town.
+// A primitive this many times as large as all others together, by their boxes' longest edges, stays outside
+// the BVH, such as a planet below a town: most rays meet it anyway, and the slack of boxes, which grows with
+// their common bounds, would be as large as the town. Two of one size both stay in.
 enum { HUGE_RATIO = 16 };
 
 // The bounded primitives on their way into the tree.
@@ -88,7 +88,7 @@ static void huge_remove(Bounded *bounded)
         for (size_t i = 0; i < bounded->count; i++) {
             if (i == largest) continue;
             others = bounds_join(others, bounded->boxes[i]);
-            if (size < HUGE_RATIO * box_size(&others)) return;
+            if (!(size > HUGE_RATIO * box_size(&others))) return; // also where all are one point
         }
         bounded_remove(bounded, largest);
     }
@@ -266,7 +266,7 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     bvh.nodes = NULL;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         array_reorder(compiled, kind, &bvh, &bounded);
-    memcpy(compiled->bounded_counts, bounded.kind_counts, sizeof compiled->bounded_counts);
+    memcpy(compiled->bvh_counts, bounded.kind_counts, sizeof compiled->bvh_counts);
     bvh_free(&bvh);
     bounded_free(&bounded);
 }

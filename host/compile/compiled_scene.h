@@ -48,13 +48,13 @@ typedef struct {
     double bvh_seconds;            // building or refitting the BVH
     double flatten_seconds;        // everything else in scene_compile or scene_move
     // What the stages leave for later ones and for the header.
-    CompiledTexture *textures;           // of each of the scene's textures
-    uint32_t bounded_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
-    Bounds bvh_bounds;                   // of these; 0 where there are none
-    uint32_t cull_sphere_count;          // of each common origin
-    Vector3 eye;                         // from which the arrays are seen; NAN: a move failed
-    Vector3 eye_offset;                  // of the camera's eye from there; 0 unless a preview
-    Bounds contact;                      // where transparent and opaque primitives may touch
+    CompiledTexture *textures;       // of each of the scene's textures
+    uint32_t bvh_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
+    Bounds bvh_bounds;               // of these; 0 where there are none
+    uint32_t cull_sphere_count;      // of each common origin
+    Vector3 eye;                     // from which the arrays are seen; NAN: a move failed
+    Vector3 eye_offset;              // of the camera's eye from there; 0 unless a preview
+    Bounds contact;                  // where transparent and opaque primitives may touch
 } CompiledScene;
 
 void compiled_scene_free(CompiledScene *compiled); // and zeroes

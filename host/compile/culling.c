@@ -18,7 +18,7 @@ static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_
 {
     uint32_t count = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        count += compiled->bounded_counts[kind];
+        count += compiled->bvh_counts[kind];
     if (count == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_MAX}};
     return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, slack);
 }
@@ -31,7 +31,7 @@ typedef struct {
 
 static Outside outside_bvh(const CompiledScene *compiled, size_t kind)
 {
-    size_t first = compiled->bounded_counts[kind];
+    size_t first = compiled->bvh_counts[kind];
     return (Outside){first, kind == KIND_PLANES ? first : compiled->arrays[FLAT_FIRST_SHAPE + kind].count};
 }
 

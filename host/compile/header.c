@@ -41,7 +41,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + kind].count;
     memcpy(header.counts, counts, sizeof counts);
-    memcpy(header.bvh_counts, compiled->bounded_counts, sizeof compiled->bounded_counts);
+    memcpy(header.bvh_counts, compiled->bvh_counts, sizeof compiled->bvh_counts);
     flat_array_renew(compiled, FLAT_HEADER, 1);
     *(SceneHeader *)compiled->arrays[FLAT_HEADER].items = header;
 }

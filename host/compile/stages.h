@@ -38,7 +38,8 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
                  MessageList *messages);
 
 // bvh_flatten.c: builds the BVH (bvh.c), widens it for the kernel's lanes (bvh_widen.c) and fills FLAT_NODES;
-// orders each shape's array as the leaves have it, unbounded shapes last. Without a BVH, one empty node.
+// orders each shape's array as the leaves have it, what is unbounded or huge last. Without a BVH, one empty
+// node.
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
 
 // The same tree, with boxes around the primitives as they are now.

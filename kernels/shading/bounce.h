@@ -157,7 +157,8 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
                 chord_start(end, surface->place_error, inner_cosine, NEVER,
                             real_fma(angle_error, real_divide(one, surface->ior), computed + end->normal));
             bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= one));
-            real steepest = real_divide(scaled + scaled_error, least_root);
+            // in the plane of incidence; across it n, which is more where n < 1
+            real steepest = real_max(real_divide(scaled + scaled_error, least_root), scale);
             real leaving =
                 computed + (real)(1.01f) * (divide_or(end->place, end->radius, NEVER) +
                                             real_fma(steepest, end->turn + end->normal, end->normal));

@@ -263,14 +263,15 @@ static inline void tile_intersect_leaf(MacroTile *tile, const Scene *scene, uint
         tile->unprepared &= ~bit;
         Traversal *traversal = &tile->traversals[packet];
         if (!intersect_leaf(traversal, scene, &tile->rays[packet], kind, first)) continue;
+        const scalar before = tile->reach_max.each[packet];
         macro_tile_set_reach(tile, packet);
-        tile->has_shrunk = true;
+        tile->has_shrunk = tile->has_shrunk || tile->reach_max.each[packet] < before;
         if (!lanes_any(traversal->active)) tile->active &= ~bit;
     }
 }
 
 // Intersects what is in the leaves among a node's children that any of the packets may meet, and pushes the
-// other children.
+// other children. Bounds of the reach may be too large after a leaf's hits, which costs tests alone.
 static inline void tile_visit_node(MacroTile *tile, TraversalStack *stack, const Scene *scene,
                                    global const BvhNode *node, uint packets)
 {
@@ -295,9 +296,9 @@ static inline void tile_visit_node(MacroTile *tile, TraversalStack *stack, const
         uint met = by_packet ? (uint)overlapping.each[child] & tile->active
                              : packets_overlap_child(tile, &projected, child, packets);
         // a sphere's first test costs no more than that of its box
-        uint untested = kind != BVH_NODE && (kind & 0xff) == KIND_SPHERES ? 0 : met;
-        for (; untested != 0; untested &= untested - 1) {
-            uint packet = lowest_bit(untested);
+        const bool has_spheres = HAS_SPHERES && kind >> 8 > 0 && (kind & 0xff) == KIND_SPHERES;
+        for (uint left = has_spheres ? 0 : met; left != 0; left &= left - 1) {
+            uint packet = lowest_bit(left);
             if (!rays_meet_child(tile, packet, &projected, child)) met &= ~(1u << packet);
         }
         if (met == 0) continue;

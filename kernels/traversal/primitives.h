@@ -90,7 +90,7 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
     return false;
 }
 
-// Intersects all primitives outside the BVH: the unbounded ones, or all in a scene without a BVH.
+// Intersects all primitives outside the BVH: the unbounded and the huge, or all in a scene without a BVH.
 static inline void intersect_outside_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
