@@ -40,10 +40,10 @@ typedef struct {
 // `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color.
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film);
 
-// Pixels that an image at `certified` leaves undecided, and what is known of those examined. That it is
-// double that cannot decide one has a witness if rays whose starts and directions err by up to 2^-50, as
-// double's may, 16 tries, give another answer. Else a quantity that decides may be below 2^-49, in parts of
-// the distance, as where surfaces coincide. The others may be open for loose bounds alone.
+// Pixels that an image at `certified` leaves undecided, and why those examined are. Witnessed: rays whose
+// starts and directions err by up to 2^-50, as double's may, give another answer in one of 16 tries. Close:
+// else a quantity that decides may be below 2^-49, in parts of the distance, as where surfaces coincide. The
+// others may be open for loose bounds alone.
 typedef struct {
     size_t count, examined, witnessed, close;
 } CertifyDoubts;
