@@ -7,7 +7,7 @@ in between, the answer is open and nothing is compared."""
 from math import floor, inf, log, sqrt
 
 import exact
-from exact import cross, dot, fraction, length, middle, rational, subtract
+from exact import cross, dot, fraction, length, middle, off_axis_squared, rational, subtract
 from flint import arb, fmpq
 from scene import unit
 
@@ -71,6 +71,11 @@ def grown(shape, by):
     return exact.Revolution(base, times(shape.axis, 1 + 2 * ends), radii, shape.infinite, shape.caps)
 
 
+def off_axis(shape, point):
+    p = subtract(point, shape.base if isinstance(shape, exact.Revolution) else shape.center)
+    return sqrt(max(as_float(off_axis_squared(p, shape.axis)), 0.0))
+
+
 def curvature(thing, point):
     """The largest at a place of the surface: how fast the shading normal turns."""
     shape = thing.shape
@@ -82,14 +87,12 @@ def curvature(thing, point):
         return 0.0
     if isinstance(shape, exact.Torus):
         hole = shape.major_radius - shape.radius
-        off_axis = hole if hole > 0 else sqrt(max(as_float(shape.flat(subtract(point, shape.center))), 1e-60))
-        return 1 / min(shape.radius, off_axis)
+        return 1 / min(shape.radius, hole if hole > 0 else max(off_axis(shape, point), 1e-30))
     if isinstance(shape, exact.Sphere):
         return 1 / shape.radius
-    base = shape.center if isinstance(shape, exact.DoubleCone) else shape.base
-    p = subtract(point, base)
-    off_axis = as_float(dot(p, p) - dot(p, shape.axis) ** 2 / shape.axis_squared)
-    return 1 / sqrt(max(off_axis, 1e-60))
+    if isinstance(shape, exact.Paraboloid):
+        return 1 / (2 * as_float(shape.focal_length))
+    return 1 / max(off_axis(shape, point), 1e-30)
 
 
 def rim_distance(shape, point):
@@ -102,10 +105,13 @@ def rim_distance(shape, point):
         ends = sorted(abs(h) * shape.axis_length for h in (height, height - 1))
         if ends[0] > 1e-25:
             return ends[0]
-        p = subtract(point, shape.base)
-        across = sqrt(max(as_float(dot(p, p) - dot(p, shape.axis) ** 2 / shape.axis_squared), 0.0))
         start, end = map(as_float, shape.radii)
-        return abs(start + (end - start) * height - across)
+        return abs(start + (end - start) * height - off_axis(shape, point))
+    if isinstance(shape, exact.Paraboloid) and shape.has_end():
+        below = abs(as_float((shape.end - dot(subtract(point, shape.center), shape.axis)) / shape.unit))
+        if below > 1e-25:
+            return below
+        return abs(2 * sqrt(as_float(shape.focal_length * shape.end / shape.unit)) - off_axis(shape, point))
     return inf
 
 

@@ -59,6 +59,10 @@ def length(a):
     return sqrt(float(fraction(dot(a, a))))
 
 
+def off_axis_squared(p, axis):
+    return dot(p, p) - dot(p, axis) ** 2 / dot(axis, axis)
+
+
 class Ray:
     def __init__(self, origin, direction, start=0):
         self.origin, self.direction, self.start = vector(origin), vector(direction), rational(start)
@@ -66,6 +70,11 @@ class Ray:
 
     def at(self, t):
         return [o + t * d for o, d in zip(self.origin, self.direction)]
+
+    def polynomials(self, base, axis):
+        """In t, of the point p seen from the base: |p|^2 and p . axis."""
+        f, d = subtract(self.origin, base), self.direction
+        return fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)]), fmpq_poly([dot(f, axis), dot(d, axis)])
 
 
 def polynomial_roots(coefficients):
@@ -164,14 +173,13 @@ class Revolution(Shape):
 
     def boundary_ts(self, ray):
         # (|p|^2 - h^2 / |w|^2) = (r + (R - r) h / |w|^2)^2 with h = p . w, times |w|^4
-        f, d, w, ww = subtract(ray.origin, self.base), ray.direction, self.axis, self.axis_squared
-        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
-        height = fmpq_poly([dot(f, w), dot(d, w)])
+        ww = self.axis_squared
+        p_p, height = ray.polynomials(self.base, self.axis)
         radius = self.radii[0] * ww + (self.radii[1] - self.radii[0]) * height
         side = p_p * ww**2 - height * height * ww - radius * radius
         found = polynomial_roots(side.coeffs())
-        if self.has_ends() and dot(d, w) != 0:
-            found += [(end - dot(f, w)) / dot(d, w) for end in (fmpq(0), ww)]
+        if self.has_ends() and height[1] != 0:
+            found += [(end - height[0]) / height[1] for end in (fmpq(0), ww)]
         return found
 
     def has_ends(self):
@@ -221,9 +229,7 @@ class DoubleCone(Shape):
         # |p|^2 |w|^2 - h^2 = slope^2 h^2 with h = p . w
         found = []
         for tip, w in self.tips():
-            f, d = subtract(ray.origin, tip), ray.direction
-            height = fmpq_poly([dot(f, w), dot(d, w)])
-            p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+            p_p, height = ray.polynomials(tip, w)
             found += polynomial_roots((p_p * self.axis_squared - height * height * (1 + self.slope**2)).coeffs())
         return found
 
@@ -251,26 +257,20 @@ class Torus(Shape):
 
     def boundary_ts(self, ray):
         # (|p|^2 + R^2 - r^2)^2 = 4 R^2 (|p|^2 - h^2 / |w|^2) with h = p . w
-        f, d = subtract(ray.origin, self.center), ray.direction
-        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
-        height = fmpq_poly([dot(f, self.axis), dot(d, self.axis)])
+        p_p, height = ray.polynomials(self.center, self.axis)
         sum_ = p_p + (self.major**2 - self.minor**2)
         flat = p_p - height * height / self.axis_squared
         return polynomial_roots((sum_ * sum_ - 4 * self.major**2 * flat).coeffs())
-
-    def flat(self, p):
-        """The squared distance from the axis."""
-        return dot(p, p) - dot(p, self.axis) ** 2 / self.axis_squared
 
     def contains(self, point):
         # the sum is below 0 only where the tube of a spindle, minor > major, reaches beyond the axis
         p = subtract(point, self.center)
         sum_ = dot(p, p) + self.major**2 - self.minor**2
-        return sum_ <= 0 or sum_**2 <= 4 * self.major**2 * self.flat(p)
+        return sum_ <= 0 or sum_**2 <= 4 * self.major**2 * off_axis_squared(p, self.axis)
 
     def normal(self, point):
         p = subtract(point, self.center)
-        across = middle(arb(self.flat(p)).sqrt())
+        across = middle(arb(off_axis_squared(p, self.axis)).sqrt())
         if across == 0:
             return p
         height = dot(p, self.axis) / self.axis_squared
@@ -292,12 +292,10 @@ class Paraboloid(Shape):
 
     def boundary_ts(self, ray):
         # |p|^2 - h^2 / |w|^2 = 4 f h / |w| with h = p . w
-        f, d, w = subtract(ray.origin, self.center), ray.direction, self.axis
-        height = fmpq_poly([dot(f, w), dot(d, w)])
-        p_p = fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)])
+        p_p, height = ray.polynomials(self.center, self.axis)
         found = polynomial_roots((p_p - height * height / self.axis_squared - 4 * self.focal_length / self.unit * height).coeffs())
-        if self.has_end() and dot(d, w) != 0:
-            found.append((self.end - dot(f, w)) / dot(d, w))
+        if self.has_end() and height[1] != 0:
+            found.append((self.end - height[0]) / height[1])
         return found
 
     def has_end(self):
@@ -314,7 +312,7 @@ class Paraboloid(Shape):
         height = dot(p, self.axis)
         if self.has_end() and height > self.end:
             return False
-        return dot(p, p) - height**2 / self.axis_squared <= 4 * self.focal_length / self.unit * height
+        return off_axis_squared(p, self.axis) <= 4 * self.focal_length / self.unit * height
 
     def normal(self, point):
         p = subtract(point, self.center)
