@@ -284,11 +284,11 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         surface.transmission = (real)(0);
         surface.ior = (real)(1);
     }
-    if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
+    surface.travelled = HAS_IMAGES ? ray->travelled + hit->t : (real)(0);
+    surface.place_error = IS_CERTIFIED ? hit_place_error(ray, hit) : (real)(0);
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
     if (IS_CERTIFIED) {
-        surface.place_error = hit_place_error(ray, hit);
         surface.object = hit->object;
         surface.doubt = hit->doubt;
         if (HAS_CHORDS) surface.chord_end = chord_end_none();
