@@ -200,11 +200,12 @@ CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy-14
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
+for_embree := $(embree_sources) tools/peers/hard-cases.c
 linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
-          $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
+          $(if $(has_embree),$(for_embree)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
-             tests/oracle/*.h tests/failing/*.h) $(embree_sources) $(embree_headers)
+             tests/oracle/*.h tests/failing/*.h) $(for_embree) $(embree_headers)
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)

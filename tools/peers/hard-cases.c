@@ -17,8 +17,12 @@ enum { TRIANGLES_MAX = 1 << 15 };
 
 static void numbers_read(float *numbers, int count)
 {
-    for (int i = 0; i < count; i++)
-        if (scanf("%f", &numbers[i]) != 1) exit(1);
+    for (int i = 0; i < count; i++) {
+        char word[64], *end;
+        if (scanf("%63s", word) != 1) exit(1);
+        numbers[i] = strtof(word, &end);
+        if (*end != '\0') exit(1);
+    }
 }
 
 static void buffer_fill(RTCGeometry geometry, enum RTCBufferType type, enum RTCFormat format,
