@@ -1,8 +1,6 @@
 #include "tests/child.h"
 
 #include "host/base/fault.h"
-#include "host/base/memory.h"
-#include <ftw.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,26 +40,4 @@ ChildEnd child_run(void (*work)(void *result), void *result, size_t size)
     memcpy(result, shared, size);
     munmap(shared, size);
     return end;
-}
-
-char *scratch_open(void)
-{
-    char folder[] = "/tmp/glint-test-XXXXXX";
-    if (!mkdtemp(folder)) fault("no scratch folder");
-    setenv("XDG_CACHE_HOME", folder, 1);
-    setenv("POCL_CACHE_DIR", folder, 1);
-    setenv("TMPDIR", folder, 1);
-    return memory_copy_text(folder);
-}
-
-static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place)
-{
-    (void)status, (void)kind, (void)place;
-    return remove(path);
-}
-
-void scratch_close(char *folder)
-{
-    nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
-    free(folder);
 }

@@ -1,4 +1,4 @@
-// Work in a process of its own: OpenCL reads its environment once a process, and a fault ends one.
+// Work in a process of its own: OpenCL reads its environment once per process, and a fault ends one.
 #pragma once
 
 #include <stddef.h>
@@ -10,8 +10,3 @@ typedef struct {
 
 // Runs `work` on a copy of `result` and copies back what it left there.
 ChildEnd child_run(void (*work)(void *result), void *result, size_t size);
-
-// An empty folder for this test, also given out as XDG_CACHE_HOME, POCL_CACHE_DIR and TMPDIR; and its
-// removal.
-char *scratch_open(void);
-void scratch_close(char *folder);

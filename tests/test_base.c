@@ -2,12 +2,12 @@
 // target.
 #include "host/base/array.h"
 #include "host/base/base64.h"
-#include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/output.h"
 #include "host/base/stage.h"
 #include "host/base/text.h"
+#include "tests/files.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -24,20 +24,6 @@
 #include <unistd.h>
 
 #include <cmocka.h>
-
-static char folder[] = "/tmp/glint-test-XXXXXX";
-
-static int folder_make(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int folder_remove(void **state)
-{
-    (void)state;
-    return chdir("/") == 0 && rmdir(folder) == 0 ? 0 : -1;
-}
 
 static char *printed(const MessageList *messages)
 {
@@ -172,46 +158,11 @@ static void test_array(void **state)
     free(numbers.items);
 }
 
-static void test_clock(void **state)
-{
-    (void)state;
-    double last = clock_seconds();
-    for (int i = 0; i < 1000; i++) {
-        double now = clock_seconds();
-        assert_true(now >= last);
-        last = now;
-    }
-}
-
-static void file_write(const char *path, const char *bytes)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_true(fputs(bytes, file) >= 0);
-    assert_int_equal(fclose(file), 0);
-}
-
-static void check_content(const char *path, const char *expected)
-{
-    Text text = {0};
-    MessageList messages = {0};
-    assert_true(text_read_file(&text, path, &messages));
-    assert_string_equal(text_c(&text), expected);
-    text_free(&text);
-}
-
 static void check_only_message(MessageList *messages, const char *expected)
 {
     assert_int_equal(messages->count, 1);
     assert_string_equal(messages->items[0].text, expected);
     message_list_free(messages);
-}
-
-static unsigned mode_of(const char *path)
-{
-    struct stat status;
-    assert_int_equal(lstat(path, &status), 0);
-    return status.st_mode & 0777;
 }
 
 static void test_read_failures(void **state)
@@ -263,18 +214,6 @@ int fsync(int descriptor) // NOLINT(readability-inconsistent-declaration-paramet
     return -1;
 }
 
-// Temporaries in the folder.
-static int temporary_count(void)
-{
-    int count = 0;
-    DIR *here = opendir(".");
-    assert_non_null(here);
-    for (const struct dirent *item; (item = readdir(here)) != NULL;)
-        count += strstr(item->d_name, ".glint-") != NULL;
-    closedir(here);
-    return count;
-}
-
 static void test_output_commit(void **state)
 {
     (void)state;
@@ -288,7 +227,7 @@ static void test_output_commit(void **state)
     assert_true(output_commit(&output, &messages));
     umask(mask);
     check_content("new", "whole");
-    assert_int_equal(temporary_count(), 0);
+    assert_int_equal(folder_count(".glint-"), 0);
     assert_int_equal(sync_count, 2); // the file and its folder
     assert_int_equal(mode_of("new"), 0640);
     assert_int_equal(messages.count, 0);
@@ -419,9 +358,9 @@ static void test_output_abandon(void **state)
     for (int named = 0; named < 2; named++) {
         unnamed_are_refused = named == 1;
         output_write_new(&output, "kept", &messages);
-        assert_int_equal(temporary_count(), named);
+        assert_int_equal(folder_count(".glint-"), named);
         output_abandon(&output);
-        assert_int_equal(temporary_count(), 0);
+        assert_int_equal(folder_count(".glint-"), 0);
         check_content("kept", "old");
     }
     unnamed_are_refused = false;
@@ -459,20 +398,20 @@ static void test_output_of_killed_processes(void **state)
     OutputFile living, output;
     file_write("kept", "old");
     output_in_killed_process(WRITING);
-    assert_int_equal(temporary_count(), 0);
+    assert_int_equal(folder_count(".glint-"), 0);
     static const KilledWhile leaving[] = {WRITING_NAMED, RENAMING};
     for (size_t i = 0; i < 2; i++) {
         output_in_killed_process(leaving[i]);
-        assert_int_equal(temporary_count(), 1);
+        assert_int_equal(folder_count(".glint-"), 1);
         unnamed_are_refused = true;
         output_write_new(&living, "kept", &messages);
-        assert_int_equal(temporary_count(), 1);
+        assert_int_equal(folder_count(".glint-"), 1);
         output_write_new(&output, "kept", &messages);
-        assert_int_equal(temporary_count(), 2);
+        assert_int_equal(folder_count(".glint-"), 2);
         assert_true(output_commit(&living, &messages));
         assert_true(output_commit(&output, &messages));
         unnamed_are_refused = false;
-        assert_int_equal(temporary_count(), 0);
+        assert_int_equal(folder_count(".glint-"), 0);
         check_content("kept", "new");
         file_write("kept", "old");
     }
@@ -585,7 +524,6 @@ int main(void)
         cmocka_unit_test(test_text_character_size),
         cmocka_unit_test(test_text_nearest),
         cmocka_unit_test(test_array),
-        cmocka_unit_test(test_clock),
         cmocka_unit_test(test_stage),
         cmocka_unit_test(test_hash),
         cmocka_unit_test(test_read_failures),
@@ -600,5 +538,5 @@ int main(void)
         cmocka_unit_test(test_base64),
         cmocka_unit_test(test_fault_removes_the_temporary),
     };
-    return cmocka_run_group_tests(tests, folder_make, folder_remove);
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

@@ -3,7 +3,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/render/scheduler.h"
-#include "tests/child.h"
+#include "tests/files.h"
 #include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -20,7 +20,7 @@ static const FilmHeader film = {.width = WIDTH,
                                 .light_count = 2,
                                 .real_size = sizeof(float),
                                 .layers = AOV_COLOR | AOV_OBJECT};
-static char *folder, path[64];
+static char path[64];
 
 static float color_value(uint32_t row, uint32_t i)
 {
@@ -111,14 +111,6 @@ static Text file_make(void)
     return bytes;
 }
 
-static void file_write(const char *bytes, size_t size)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
-}
-
 static size_t file_size(void)
 {
     struct stat status;
@@ -151,7 +143,7 @@ static void test_torn_writes(void **state)
     const size_t record_size = (bytes.count - header_size) / BANDS;
     assert_int_equal(record_size * BANDS, bytes.count - header_size);
     for (size_t size = 0; size <= bytes.count; size++) {
-        file_write(bytes.items, size);
+        file_write_bytes(path, bytes.items, size);
         Checkpoint *checkpoint = open_checked();
         kept = size < header_size ? 0 : (size - header_size) / record_size;
         assert_int_equal(band_count(checkpoint), kept);
@@ -176,7 +168,7 @@ static void test_wrong_bytes(void **state)
     const size_t header_size = file_size(), record_size = (bytes.count - header_size) / BANDS;
     for (size_t at = header_size; at < bytes.count; at++) {
         bytes.items[at] ^= 0x10;
-        file_write(bytes.items, bytes.count);
+        file_write_bytes(path, bytes.items, bytes.count);
         Checkpoint *checkpoint = open_checked();
         assert_int_equal(band_count(checkpoint), (at - header_size) / record_size);
         close_checked(checkpoint, false);
@@ -248,7 +240,7 @@ static void test_refusals(void **state)
     unlink(path);
     close_checked(open_checked(), false);
     const size_t header_size = file_size();
-    file_write(bytes.items, bytes.count);
+    file_write_bytes(path, bytes.items, bytes.count);
     refused("size: 6x12\nscene: 1234\n", "is of another image (size: 5x12, not 6x12)");
     refused("size: 5x12\nscene: 9\n", "is of another image (scene: 1234, not 9)");
     refused("size: 5x12\nlanes: 4\nscene: 1234\n", "is of another image (lanes: none, not 4)");
@@ -257,14 +249,14 @@ static void test_refusals(void **state)
     close_checked(checkpoint, false);
     for (size_t at = 24; at < bytes.count && at < header_size; at++) { // after magic and format
         bytes.items[at] ^= 0x10;
-        file_write(bytes.items, bytes.count);
+        file_write_bytes(path, bytes.items, bytes.count);
         refused(key, at < 26 || at >= 32 ? "is damaged" : "is not a checkpoint");
         bytes.items[at] ^= 0x10;
     }
-    file_write("camera: {position: [0, 0, 0]}\n", 30);
+    file_write_bytes(path, "camera: {position: [0, 0, 0]}\n", 30);
     refused(key, "is not a checkpoint of this version of glint");
     bytes.items[16]++; // the format
-    file_write(bytes.items, bytes.count);
+    file_write_bytes(path, bytes.items, bytes.count);
     refused(key, "is not a checkpoint of this version of glint");
     text_free(&bytes);
 
@@ -404,16 +396,8 @@ static void test_a_render_goes_on(void **state)
 
 static int set_up(void **state)
 {
-    (void)state;
-    folder = scratch_open();
-    snprintf(path, sizeof path, "%s/checkpoint", folder);
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    scratch_close(folder);
+    scratch_set_up(state);
+    snprintf(path, sizeof path, "%s/checkpoint", scratch);
     return 0;
 }
 
@@ -428,5 +412,5 @@ int main(void)
                                        cmocka_unit_test(test_a_file_that_stays),
                                        cmocka_unit_test(test_a_file_removed_before_the_lock),
                                        cmocka_unit_test(test_a_render_goes_on)};
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, set_up, scratch_tear_down);
 }

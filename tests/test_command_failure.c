@@ -5,6 +5,7 @@
 #include "host/cli/commands.h"
 #include "tests/child.h"
 #include "tests/failing/calls.h"
+#include "tests/files.h"
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>

@@ -1,7 +1,7 @@
 // Images out and in: every format's round trip, notes, and failures that leave the old file as it was.
 #include "host/image/image.h"
+#include "tests/files.h"
 
-#include <dirent.h>
 #include <math.h>
 #include <openexr.h>
 #include <png.h>
@@ -16,36 +16,7 @@
 
 #include <cmocka.h>
 
-static char folder[] = "/tmp/glint-test-XXXXXX";
 static const ImageNote notes[] = {{"Software", "glint 1"}, {"Scene", "caf\xC3\xA9.yaml"}, {NULL, NULL}};
-
-static int folder_make(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static unsigned folder_count(void)
-{
-    unsigned count = 0;
-    DIR *entries = opendir(folder);
-    assert_non_null(entries);
-    for (const struct dirent *entry; (entry = readdir(entries));)
-        count += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
-    closedir(entries);
-    return count;
-}
-
-static int folder_remove(void **state)
-{
-    (void)state;
-    DIR *entries = opendir(folder);
-    if (!entries) return -1;
-    for (const struct dirent *entry; (entry = readdir(entries));)
-        unlink(entry->d_name);
-    closedir(entries);
-    return chdir("/") == 0 && rmdir(folder) == 0 ? 0 : -1;
-}
 
 // Values from below 0 to above 1, none of them alike.
 static float *values_make(uint32_t count)
@@ -270,30 +241,12 @@ static void test_exr_notes(void **state)
     assert_int_equal(exr_finish(&context), EXR_ERR_SUCCESS);
 }
 
-static void file_write(const char *path, const char *bytes, size_t length)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, length, file), length);
-    assert_int_equal(fclose(file), 0);
-}
-
-static void check_content(const char *path, const char *expected)
-{
-    char bytes[64] = "";
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    (void)!fread(bytes, 1, sizeof bytes - 1, file);
-    fclose(file);
-    assert_string_equal(bytes, expected);
-}
-
 static const char *const endings[] = {"png", "ppm", "exr", "npy"};
 
 static void old_file_make(char *path, size_t size, const char *ending)
 {
     snprintf(path, size, "old.%s", ending);
-    file_write(path, "old", 3);
+    file_write(path, "old");
 }
 
 static ImageWriter *writer_of_8_by_40(const char *path, MessageList *messages)
@@ -311,12 +264,12 @@ static void test_abandoned_leaves_the_old_file(void **state)
     for (size_t i = 0; i < 4; i++) {
         char path[16];
         old_file_make(path, sizeof path, endings[i]);
-        unsigned before = folder_count();
+        unsigned before = folder_count("");
         MessageList messages = {0};
         ImageWriter *writer = writer_of_8_by_40(path, &messages);
         assert_true(image_writer_rows(writer, values, 20, &messages));
         image_writer_abandon(writer);
-        assert_int_equal(folder_count(), before);
+        assert_int_equal(folder_count(""), before);
         check_content(path, "old");
         check_no_messages(&messages);
     }
@@ -353,7 +306,7 @@ static void test_finished_is_yet_to_be_renamed(void **state)
     for (size_t i = 0; i < 4; i++) {
         char path[16];
         old_file_make(path, sizeof path, endings[i]);
-        unsigned before = folder_count();
+        unsigned before = folder_count("");
         MessageList messages = {0};
         for (int commits = 0; commits < 2; commits++) {
             ImageWriter *writer = writer_of_8_by_40(path, &messages);
@@ -364,7 +317,7 @@ static void test_finished_is_yet_to_be_renamed(void **state)
                 assert_true(image_writer_commit(writer, &messages));
             else
                 image_writer_abandon(writer);
-            assert_int_equal(folder_count(), before);
+            assert_int_equal(folder_count(""), before);
         }
         Image image;
         assert_true(image_read(&image, path, &messages));
@@ -399,7 +352,7 @@ static void test_format_by_ending(void **state)
 
 static void check_refused(const char *bytes, size_t length, const char *reason)
 {
-    file_write("bad", bytes, length);
+    file_write_bytes("bad", bytes, length);
     MessageList messages = {0};
     Image image;
     assert_false(image_read(&image, "bad", &messages));
@@ -477,10 +430,10 @@ static void test_pixels_are_limited(void **state)
 {
     (void)state;
     image_limit_pixels(5);
-    file_write("small.ppm", "P6 2 2 255 123456789abc", 23);
+    file_write_bytes("small.ppm", "P6 2 2 255 123456789abc", 23);
     Image image = image_read_file("small.ppm");
     image_free(&image);
-    file_write("large.ppm", "P6 3 2 255 123456789abcdefghi", 29);
+    file_write_bytes("large.ppm", "P6 3 2 255 123456789abcdefghi", 29);
     MessageList messages = {0};
     assert_false(image_read(&image, "large.ppm", &messages));
     assert_int_equal(messages.count, 1);
@@ -498,7 +451,7 @@ static void test_text_pixmap(void **state)
 {
     (void)state;
     const char bytes[] = "P3 # colors\n# more\n2 1\n4\n0 1 2\n3 4 # last\n1";
-    file_write("text.ppm", bytes, sizeof bytes - 1);
+    file_write_bytes("text.ppm", bytes, sizeof bytes - 1);
     Image image = image_read_file("text.ppm");
     assert_int_equal(image.width, 2);
     assert_int_equal(image.channels, 3);
@@ -529,5 +482,5 @@ int main(void)
         cmocka_unit_test(test_pixels_are_limited),
         cmocka_unit_test(test_text_pixmap),
     };
-    return cmocka_run_group_tests(tests, folder_make, folder_remove);
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

@@ -1,6 +1,7 @@
 // EXR files as other programs write them: halves, every lossless compression, tiles, more channels than
 // three.
 #include "host/image/image.h"
+#include "tests/files.h"
 
 #include <openexr.h>
 #include <setjmp.h>
@@ -13,7 +14,7 @@
 
 enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 4 }; // at most
 
-static char path[] = "/tmp/glint-test-XXXXXX";
+static const char path[] = "a.exr";
 
 // 0 to 2047 / 2048: exact in a half, and another value in each channel. Runs of equal values compress well:
 // the library that writes these files spoils a block whose compressed size happens to be its full size
@@ -45,7 +46,7 @@ static void chunk_write(exr_context_t context, const exr_chunk_info_t *chunk, co
 }
 
 // `names`: a letter for each channel, in the order of EXR, which is that of the alphabet.
-static void file_write(const char *names, exr_compression_t compression, exr_pixel_type_t type, bool is_tiled)
+static void exr_write(const char *names, exr_compression_t compression, exr_pixel_type_t type, bool is_tiled)
 {
     static float pixels[HEIGHT][WIDTH][CHANNELS];
     for (uint32_t y = 0; y < HEIGHT; y++) {
@@ -87,7 +88,7 @@ static void file_write(const char *names, exr_compression_t compression, exr_pix
 static void check_read(const char *names, const char *expected, exr_compression_t compression,
                        exr_pixel_type_t type, bool is_tiled)
 {
-    file_write(names, compression, type, is_tiled);
+    exr_write(names, compression, type, is_tiled);
     MessageList messages = {0};
     Image image;
     if (!image_read(&image, path, &messages))
@@ -185,19 +186,6 @@ static void test_integer_channels_are_refused(void **state)
     message_list_free(&messages);
 }
 
-static int file_make(void **state)
-{
-    (void)state;
-    int descriptor = mkstemp(path);
-    return descriptor < 0 ? -1 : close(descriptor);
-}
-
-static int file_remove(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -206,5 +194,5 @@ int main(void)
         cmocka_unit_test(test_blocks_as_large_as_compressed),
         cmocka_unit_test(test_integer_channels_are_refused),
     };
-    return cmocka_run_group_tests(tests, file_make, file_remove);
+    return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

@@ -3,6 +3,7 @@
 #include "host/base/memory.h"
 #include "host/opencl/compute.h"
 #include "tests/child.h"
+#include "tests/files.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>

@@ -2,6 +2,7 @@
 #include "host/compile/compile.h"
 #include "host/compile/scene_bounds.h"
 #include "host/import/mesh/mesh_import.h"
+#include "tests/files.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
@@ -16,34 +17,21 @@
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"                                                   \
     "lights: [{point: {position: [0, 0, -5]}}]\n"
 
-static char folder[] = "/tmp/glint-mesh-XXXXXX";
 static char *corpus; // one file for each format that assimp reads
 
-static int folder_open(void **state)
+static int meshes_open(void **state)
 {
     corpus = realpath("tests/fuzz/corpus/assimp", NULL);
-    return corpus && mkdtemp(folder) && chdir(folder) == 0 ? probe_open(state) : -1;
+    return corpus && folder_open(state) == 0 ? probe_open(state) : -1;
 }
 
-static int folder_close(void **state)
+static int meshes_close(void **state)
 {
-    static const char *const names[] = {"a.obj", "a.mtl", "a.ply", "a.stl", "a.gltf", "a.off"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        unlink(names[i]);
-    probe_close(state);
     free(corpus);
-    return chdir("/") == 0 ? rmdir(folder) : -1;
+    return probe_close(state) + folder_close(state);
 }
 
-static void file_write(const char *name, const char *text)
-{
-    FILE *file = fopen(name, "w");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0);
-    assert_int_equal(fclose(file), 0);
-}
-
-// A scene whose only objects are `objects`, one a line.
+// A scene whose only objects are `objects`, one per line.
 static Scene scene_of_objects(const char *objects)
 {
     Text text = {0};
@@ -615,5 +603,5 @@ int main(void)
         cmocka_unit_test(copies_are_limited),
         cmocka_unit_test(device_without_room_is_reported),
     };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
+    return cmocka_run_group_tests(tests, meshes_open, meshes_close);
 }

@@ -1,5 +1,6 @@
 // OBJ and MTL files: the layouts that are read, materials and their images, and each message with its place.
 #include "host/import/load.h"
+#include "tests/files.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,31 +17,6 @@
 
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 #define FACE    CORNERS "f 1 2 3\n"
-
-static char folder[] = "/tmp/glint-obj-XXXXXX";
-static const char *const names[] = {"a.obj", "a.mtl", "b c.mtl", "d.mtl", "a.ppm", "textures/a.ppm", "a.tga"};
-
-static int folder_open(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int folder_close(void **state)
-{
-    (void)state;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        unlink(names[i]);
-    return chdir("/") == 0 ? rmdir(folder) : -1;
-}
-
-static void file_write(const char *name, const char *text)
-{
-    FILE *file = fopen(name, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(text, 1, strlen(text), file), strlen(text));
-    assert_int_equal(fclose(file), 0);
-}
 
 // Reads the scene of the mesh; all messages with their files, a line each, must be `expected`.
 static bool scene_read(Scene *scene, const char *text, const char *expected)

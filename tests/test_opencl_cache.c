@@ -3,6 +3,7 @@
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include "tests/child.h"
+#include "tests/files.h"
 #include <fcntl.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,22 +19,6 @@
 static const char key[] = "device x\ntext y";
 static const char machine_code[] = "machine\0code\xff\n";
 enum { CODE_LENGTH = sizeof machine_code, FORMAT_OFFSET = 8 };
-
-static char *folder;
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = scratch_open();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    scratch_close(folder);
-    return 0;
-}
 
 static void store(const char *entry_key)
 {
@@ -57,14 +42,6 @@ static bool loads(const char *entry_key)
     return found;
 }
 
-static void file_write(const char *path, const void *bytes, size_t length)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, length, file), length);
-    assert_int_equal(fclose(file), 0);
-}
-
 static void test_store_and_load(void **state)
 {
     (void)state;
@@ -75,7 +52,7 @@ static void test_store_and_load(void **state)
     assert_false(loads(""));
 
     Text path = {0};
-    text_appendf(&path, "%s/glint", folder);
+    text_appendf(&path, "%s/glint", scratch);
     struct stat status;
     assert_int_equal(stat(text_c(&path), &status), 0);
     assert_int_equal(status.st_mode & 0777, 0700);
@@ -88,13 +65,6 @@ static void entry_set_used(const char *entry_key, time_t when)
     const struct timespec moments[2] = {{when, 0}, {when, 0}};
     assert_int_equal(utimensat(AT_FDCWD, path, moments, 0), 0);
     free(path);
-}
-
-static mode_t mode_of(const char *path)
-{
-    struct stat status;
-    assert_int_equal(lstat(path, &status), 0);
-    return status.st_mode & 0777;
 }
 
 // Whatever the umask permits, entries are private.
@@ -171,7 +141,7 @@ static void test_folder_of_others(void **state)
 {
     (void)state;
     char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
-    assert_true(asprintf(&moved, "%s/moved", folder) > 0);
+    assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
     for (int kind = 0; kind < 3; kind++) {
         store(key);
         assert_true(loads(key));
@@ -291,14 +261,14 @@ static void test_list(void **state)
     Text content = {0};
     assert_true(text_read_file(&content, path, &messages));
     content.items[FORMAT_OFFSET]++;
-    file_write(path, content.items, content.count);
+    file_write_bytes(path, content.items, content.count);
     text_free(&content);
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 2);
     assert_null(entries.items[1].fault);
     assert_null(entries.items[1].device);
     cache_entries_free(&entries);
-    file_write(path, machine_code, CODE_LENGTH);
+    file_write_bytes(path, machine_code, CODE_LENGTH);
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 2);
     assert_null(entries.items[0].fault);
@@ -387,18 +357,18 @@ static void test_damage(void **state)
     assert_true(entry.count > strlen(key) + CODE_LENGTH);
     for (size_t i = 0; i < entry.count; i++) {
         entry.items[i] ^= 0x10;
-        file_write(path, entry.items, entry.count);
+        file_write_bytes(path, entry.items, entry.count);
         assert_false(loads(key));
         entry.items[i] ^= 0x10;
     }
     for (size_t length = 0; length < entry.count; length++) {
-        file_write(path, entry.items, length);
+        file_write_bytes(path, entry.items, length);
         assert_false(loads(key));
     }
-    file_write(path, entry.items, entry.count);
+    file_write_bytes(path, entry.items, entry.count);
     assert_true(loads(key));
     text_append(&entry, "", 1);
-    file_write(path, entry.items, entry.count);
+    file_write_bytes(path, entry.items, entry.count);
     assert_false(loads(key));
 
     store(key);
@@ -478,9 +448,9 @@ static void test_no_place(void **state)
     store(key);
     assert_int_not_equal(access("relative", F_OK), 0);
 
-    setenv("HOME", folder, 1);
+    setenv("HOME", scratch, 1);
     char *path = cache_entry_path(key), *expected = NULL;
-    assert_true(asprintf(&expected, "%s/.cache/glint/", folder) > 0);
+    assert_true(asprintf(&expected, "%s/.cache/glint/", scratch) > 0);
     assert_memory_equal(path, expected, strlen(expected));
     store(key);
     assert_true(loads(key));
@@ -498,8 +468,8 @@ static void test_unwritable(void **state)
 {
     (void)state;
     char *path = NULL;
-    assert_true(asprintf(&path, "%s/glint", folder) > 0);
-    file_write(path, "in the way", 10);
+    assert_true(asprintf(&path, "%s/glint", scratch) > 0);
+    file_write_bytes(path, "in the way", 10);
     store(key);
     assert_false(loads(key));
     free(path);
@@ -589,26 +559,26 @@ static void test_trim(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_store_and_load, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_modes, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_others_may_access, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_folder_of_others, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_key_of_the_hash, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_too_large, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_race_on_an_empty_cache, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_list, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_clear_that_fails, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_folder_without_rights, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_few_descriptors, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_of_another_key, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_without_rights, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_that_is_none_of_ours, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_no_place, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_unwritable, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_folder_in_place_of_entry, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_many_processes, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_trim, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_store_and_load, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_modes, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_others_may_access, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_folder_of_others, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_key_of_the_hash, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_too_large, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_race_on_an_empty_cache, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_list, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_clear_that_fails, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_folder_without_rights, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_few_descriptors, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_damage, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_of_another_key, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_without_rights, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_entry_that_is_none_of_ours, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_no_place, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_unwritable, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_folder_in_place_of_entry, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_many_processes, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_trim, scratch_set_up, scratch_tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

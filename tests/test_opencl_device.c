@@ -1,6 +1,7 @@
 // Choice among fabricated devices, and the list of the real ones.
 #include "host/opencl/device.h"
 #include "tests/child.h"
+#include "tests/files.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdlib.h>

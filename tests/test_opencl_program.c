@@ -5,6 +5,7 @@
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include "tests/child.h"
+#include "tests/files.h"
 #include <ftw.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,22 +15,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <cmocka.h>
-
-static char *folder;
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = scratch_open();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    scratch_close(folder);
-    return 0;
-}
 
 // features.h has nothing for the device: the prelude is the kernel.
 static const char triple[] =
@@ -136,7 +121,7 @@ static ProgramRequest triple_request(void)
 static void drivers_own_cache_empty(void)
 {
     char *empty = NULL;
-    assert_true(asprintf(&empty, "%s/driver-XXXXXX", folder) > 0);
+    assert_true(asprintf(&empty, "%s/driver-XXXXXX", scratch) > 0);
     assert_non_null(mkdtemp(empty));
     setenv("POCL_CACHE_DIR", empty, 1);
     free(empty);
@@ -204,7 +189,7 @@ static int find_entry(const char *path, const struct stat *status, int kind, str
 static Text the_entry(char **key)
 {
     entry_path_found = NULL;
-    nftw(folder, find_entry, 16, FTW_PHYS);
+    nftw(scratch, find_entry, 16, FTW_PHYS);
     assert_non_null(entry_path_found);
     Text entry = {0};
     MessageList messages = {0};
@@ -289,7 +274,7 @@ static void test_text_that_does_not_compile(void **state)
     assert_int_equal(end.status, 2);
     assert_non_null(strstr(end.errors, "CL_BUILD_PROGRAM_FAILURE"));
     assert_non_null(strstr(end.errors, "prelude:2"));
-    char *saved = strstr(end.errors, folder);
+    char *saved = strstr(end.errors, scratch);
     assert_non_null(saved);
     saved[strcspn(saved, "\n")] = '\0';
     Text text = {0};
@@ -398,17 +383,17 @@ static void test_failures(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_cold_and_warm, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_what_the_key_holds, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_no_cache, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_damaged_entry_is_replaced, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_refused_binary_is_replaced, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_two_processes_at_once, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_unwritable_cache, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_text_that_does_not_compile, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_missing_root, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_place_of_a_compile_error, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_failures, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_cold_and_warm, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_what_the_key_holds, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_no_cache, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_damaged_entry_is_replaced, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_refused_binary_is_replaced, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_two_processes_at_once, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_unwritable_cache, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_text_that_does_not_compile, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_missing_root, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_place_of_a_compile_error, scratch_set_up, scratch_tear_down),
+        cmocka_unit_test_setup_teardown(test_failures, scratch_set_up, scratch_tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 // PLY files: the layouts that are read, as one square, and the errors for files shorter than they
 // hold.
 #include "host/scene/vector.h"
+#include "tests/files.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
@@ -28,32 +29,9 @@
 static const double corners[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
 static const uint32_t triangles[2][3] = {{0, 1, 2}, {1, 3, 2}};
 
-static char folder[] = "/tmp/glint-ply-XXXXXX";
-
-static int folder_open(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int folder_close(void **state)
-{
-    (void)state;
-    unlink("a.ply");
-    return chdir("/") == 0 ? rmdir(folder) : -1;
-}
-
-static void file_write(const Text *text)
-{
-    FILE *file = fopen("a.ply", "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(text_c(text), 1, text->count, file), text->count);
-    assert_int_equal(fclose(file), 0);
-}
-
 static void assert_square(const Text *text)
 {
-    file_write(text);
+    file_write_bytes("a.ply", text->items, text->count);
     Scene scene = scene_of_text("scene.yaml", SCENE);
     assert_int_equal(scene.meshes.count, 1);
     const Mesh *mesh = &scene.meshes.items[0];
@@ -69,7 +47,7 @@ static void assert_square(const Text *text)
 static void assert_refused(const Text *text, const char *message)
 {
     Text expected = {0};
-    file_write(text);
+    file_write_bytes("a.ply", text->items, text->count);
     text_appendf(&expected, "%s\n", message);
     assert_messages("scene.yaml", SCENE, text_c(&expected));
     text_free(&expected);
@@ -292,7 +270,7 @@ static void binary_file_cut_short_is_refused(void **state)
     for (size_t size = strlen(BINARY("uchar")); size < whole.count; size++) {
         Text cut = {0};
         text_append(&cut, text_c(&whole), size);
-        file_write(&cut);
+        file_write_bytes("a.ply", cut.items, cut.count);
         Text messages = scene_messages("scene.yaml", SCENE, false);
         assert_non_null(strstr(text_c(&messages), "4:18: error: a.ply: byte "));
         text_free(&messages);
@@ -305,7 +283,7 @@ static Scene scene_of_ply(const char *ply, const char *expected)
 {
     Text text = {0};
     text_appendf(&text, "%s", ply);
-    file_write(&text);
+    file_write_bytes("a.ply", text.items, text.count);
     text_free(&text);
     assert_messages("scene.yaml", SCENE, expected);
     return scene_of_text("scene.yaml", SCENE);

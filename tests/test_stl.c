@@ -1,4 +1,5 @@
 // STL files in text and binary: facets, and what is wrong with them.
+#include "tests/files.h"
 #include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,29 +18,6 @@
     "facet normal 0 0 9\n  outer loop\n    vertex " a "\n    vertex " b "\n    vertex " c "\n  endloop\n"    \
     "endfacet\n"
 #define TWO_FACETS FACET("0 0 0", "1 0 0", "0 1 0") FACET("0 1 0", "1.0e0 0 0", "+1 1 -0")
-
-static char folder[] = "/tmp/glint-stl-XXXXXX";
-
-static int folder_open(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int folder_close(void **state)
-{
-    (void)state;
-    unlink("a.stl");
-    return chdir("/") == 0 ? rmdir(folder) : -1;
-}
-
-static void file_write(const char *bytes, size_t length)
-{
-    FILE *file = fopen("a.stl", "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, length, file), length);
-    assert_int_equal(fclose(file), 0);
-}
 
 // Two triangles of four vertices, whose facets' normals are not theirs.
 static void assert_square(const char *messages)
@@ -74,7 +52,7 @@ static void text_is_read(void **state)
          "11:1: warning: 'color' is not used\n"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        file_write(cases[i].text, strlen(cases[i].text));
+        file_write("a.stl", cases[i].text);
         assert_square(cases[i].messages);
     }
 }
@@ -100,12 +78,12 @@ static void binary_is_read(void **state)
     char bytes[WHOLE + 3] = {0};
     for (size_t i = 0; i < 3; i++) {
         binary_fill(bytes, titles[i]);
-        file_write(bytes, WHOLE);
+        file_write_bytes("a.stl", bytes, WHOLE);
         assert_square("");
     }
     binary_fill(bytes, "colored");
     bytes[WHOLE - 1] = 1;
-    file_write(bytes, WHOLE + 3);
+    file_write_bytes("a.stl", bytes, WHOLE + 3);
     assert_square("4:18: warning: a.stl: attributes of facets, such as colors, are not used\n"
                   "4:18: warning: a.stl: 3 bytes behind the last facet are not used\n");
 }
@@ -130,20 +108,20 @@ static void faults_have_their_place(void **state)
                   "its facets\n"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        file_write(cases[i].text, strlen(cases[i].text));
+        file_write("a.stl", cases[i].text);
         assert_messages("scene.yaml", SCENE, cases[i].message);
     }
     char bytes[WHOLE];
     binary_fill(bytes, "");
-    file_write(bytes, WHOLE - 1);
+    file_write_bytes("a.stl", bytes, WHOLE - 1);
     assert_messages("scene.yaml", SCENE,
                     "4:18: error: a.stl: byte 80: 2 facets are declared, the file has 1\n");
     memset(bytes + 80, 0xff, 4);
-    file_write(bytes, WHOLE);
+    file_write_bytes("a.stl", bytes, WHOLE);
     assert_messages("scene.yaml", SCENE, "4:18: error: a.stl: byte 80: too many facets\n");
     binary_fill(bytes, "");
     memset(bytes + HEADER + 12, 0xff, 4);
-    file_write(bytes, WHOLE);
+    file_write_bytes("a.stl", bytes, WHOLE);
     assert_messages("scene.yaml", SCENE,
                     "4:18: error: a.stl: vertex 0 (from 0) is not finite or too large\n");
 }
