@@ -17,7 +17,7 @@ import threading
 import time
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, ROOT, TestCase, main, need_device, png_read, run, skip_all, write
+from glint import IS_LONG, PROGRAM, ROOT, TestCase, main, need_device, npy_read, png_read, run, skip_all, write
 
 SCENE = """\
 camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
@@ -524,6 +524,9 @@ class View(TestCase):
         window.line(r"^pixel 80,60: sphere 3, scene.yaml:6, t ")
         numbers = window.line(r"^  at ([-.\d]+) ([-.\d]+) ([-.\d]+), normal ([-.\d]+) ([-.\d]+) ([-.\d]+)$").groups()
         point, normal = [float(number) for number in numbers[:3]], [float(number) for number in numbers[3:]]
+        self.glint(f"render scene.yaml --size {WIDTH}x{HEIGHT} --aov position -o image.npy")
+        for printed, position in zip(point, npy_read("image.position.npy")[2][60 * WIDTH + 80], strict=True):
+            self.assertAlmostEqual(printed, position, 5)
         for axis, center in enumerate((0.25, 0.5, -2)):  # of radius 0.5
             self.assertAlmostEqual((point[axis] - center) / 0.5, normal[axis], 3)
         window.line(r"^  reflected, 0.5: nothing$")

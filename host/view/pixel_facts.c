@@ -80,7 +80,7 @@ static void branch_write(Tree *tree, const Branch *branch)
 char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y)
 {
     Tree tree = {.view = view};
-    const Vector3 ray = camera_ray(&view->scene->camera, view->size, x + 0.5, y + 0.5);
+    const Vector3 ray = camera_ray(&view->scene->camera, view->size, x, y);
     const double eye[3] = {0}, direction[3] = {ray.x, ray.y, ray.z}; // the eye is the origin
     const Branch first = {NULL, 1, 0, ray_from(eye, direction)};
     text_appendf(&tree.text, "pixel %u,%u: ", x, y);
