@@ -86,7 +86,11 @@ class Html(TestCase):
         self.assertNotIn("<", embedded)
         self.assertEqual(embedded.replace("\\u003c", "<").strip(), process.stdout.strip())
         self.assertEqual(re.findall(r"(?:src|href)=\"(?!data:|#)[^\"]*\"|url\(|@import", page), [])
-        return page, json.loads(process.stdout)
+        report = json.loads(process.stdout)
+        for precision in {variant["precision"] for scene in report["scenes"] for variant in scene["variants"]}:
+            self.assertIn(f'id="mark-{precision}"', page)
+            self.assertRegex(page, rf"(?m)^\.{precision} {{ --mark:")
+        return page, report
 
     def check_axis(self, ticks, points):
         """Ticks and points, value and position, lie as on a logarithmic axis; 0 has a tick of its own."""
@@ -169,7 +173,7 @@ class Html(TestCase):
 
     def test_two_scenes(self):
         shutil.copy("spheres16.yaml", "<!--<script>&\"é.yaml")
-        page, report = self.page("spheres16.yaml '<!--<script>&\"é.yaml' --precision fast,double")
+        page, report = self.page("spheres16.yaml '<!--<script>&\"é.yaml' --precision fast,certified,double")
         self.check_drawn(page, report)
 
     def test_crossed_out(self):
