@@ -284,6 +284,9 @@ class Failures(CliTestCase):
         self.assertEqual({name: read(name) for name in files}, files)
         self.glint(f"render globe.yaml {SMALL} -o globe/other.png")
         os.remove("globe.png")
+        os.mkdir("globe.png")
+        self.refuses("check globe.yaml", r"^globe\.yaml:\d+:\d+: error: .*'globe\.png': not a regular file")
+        os.rmdir("globe.png")
         self.refuses("check globe.yaml", r"^globe\.yaml:\d+:\d+: error: .*'globe\.png': No such file")
 
 

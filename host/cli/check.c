@@ -1,5 +1,6 @@
 // glint check: reads a scene and reports its contents; needs no device.
 #include "host/base/fault.h"
+#include "host/base/file.h"
 #include "host/base/json.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
@@ -9,11 +10,9 @@
 #include "host/import/report.h"
 #include "host/scene/describe.h"
 #include <ctype.h>
-#include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 enum { OPTION_JSON = OPTION_OWN, OPTION_OBJECT };
 
@@ -156,8 +155,8 @@ static bool images_are_there(const Scene *scene, MessageList *messages)
     Report report = report_open(&source, messages);
     for (size_t i = 0; i < scene->textures.count && !report_is_full(&report); i++) {
         const SceneTexture *texture = &scene->textures.items[i];
-        if (access(texture->path, R_OK) != 0)
-            report_error(&report, texture->offset, "cannot read '%s': %s", texture->path, strerror(errno));
+        const char *obstacle = file_obstacle(texture->path);
+        if (obstacle) report_error(&report, texture->offset, "cannot read '%s': %s", texture->path, obstacle);
     }
     return report_close(&report);
 }
