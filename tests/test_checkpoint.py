@@ -134,7 +134,7 @@ class Checkpoints(TestCase):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
         self.glint(f"{single} -o other.png", env=POCL)
         self.refuses(f"{single} -o other.png --checkpoint saved", "File too large", env=POCL, preexec_fn=limit)
-        self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"of another image \(devices: ", env=POCL)
+        self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"of another image \(device: ", env=POCL)
 
     def test_the_image_itself(self):
         """A checkpoint of the image's own name is replaced by the image, not removed."""

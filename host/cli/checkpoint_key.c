@@ -13,32 +13,28 @@ static unsigned long long kernels_hash(void)
     return hash;
 }
 
-static void model_append(Text *models, const char *name, const char *driver, uint32_t lanes)
+// Each model once.
+static void model_append(Text *key, const char *name, const char *driver, uint32_t lanes)
 {
     Text model = {0};
-    text_appendf(&model, "%s, %s, %u lanes", name, driver, lanes);
-    if (!strstr(text_c(models), text_c(&model)))
-        text_appendf(models, "%s%s", models->count > 0 ? " + " : "", text_c(&model));
+    text_appendf(&model, "device: %s, %s, %u lanes\n", name, driver, lanes);
+    if (!strstr(text_c(key), text_c(&model))) text_append(key, model.items, model.count);
     text_free(&model);
 }
 
-// Each model once.
 static void devices_append(Text *key, Renderer *const *renderers, size_t count, const Ranks *ranks)
 {
-    Text models = {0};
     for (size_t i = 0; i < count; i++) {
         const Device *device = renderer_report(renderers[i])->device;
         Text driver = {0};
         text_appendf(&driver, "%s, %s", device->platform_name, device->driver);
-        model_append(&models, device->name, text_c(&driver), renderer_report(renderers[i])->lanes);
+        model_append(key, device->name, text_c(&driver), renderer_report(renderers[i])->lanes);
         text_free(&driver);
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
         if (ranks->items[i].lanes[PASS_ALL] > 0) // else it cannot render
-            model_append(&models, ranks->items[i].device, ranks->items[i].driver,
+            model_append(key, ranks->items[i].device, ranks->items[i].driver,
                          ranks->items[i].lanes[PASS_ALL]);
-    text_appendf(key, "devices: %s\n", text_c(&models));
-    text_free(&models);
 }
 
 void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,

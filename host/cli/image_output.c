@@ -99,14 +99,18 @@ static void notes_add(Notes *notes, const char *key, const char *value)
 static bool is_mixed(const ImageOutput *output)
 {
     const Device *first = renderer_report(output->renderers[0])->device;
+    char driver[sizeof((Rank *)NULL)->driver]; // as a rank writes it
+    snprintf(driver, sizeof driver, "%s, %s", first->platform_name, first->driver);
     bool differs = false;
     for (size_t i = 1; i < output->renderer_count; i++) {
         const Device *device = renderer_report(output->renderers[i])->device;
         differs =
             differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
     }
-    for (size_t i = 0; output->ranks && i < output->ranks->count; i++)
-        differs = differs || strcmp(output->ranks->items[i].device, first->name) != 0;
+    for (size_t i = 0; output->ranks && i < output->ranks->count; i++) {
+        const Rank *rank = &output->ranks->items[i];
+        differs = differs || strcmp(rank->device, first->name) != 0 || strcmp(rank->driver, driver) != 0;
+    }
     return differs && output->settings->precision != PRECISION_STRICT;
 }
 
