@@ -92,15 +92,22 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList 
         return false;
     }
     done = output_write(&output, text.items, text.count, messages) && output_finish(&output, messages);
-    pthread_mutex_lock(&loop->mutex);
-    if (done) {
-        text_free(&loop->written);
-        loop->written = text;
-        loop->file_camera = *camera;
+    if (!done) {
+        text_free(&text);
+        output_abandon(&output);
+        return false;
     }
+    // before the change can be seen, which the loop must know as its own
+    pthread_mutex_lock(&loop->mutex);
+    text_free(&loop->written);
+    loop->written = text;
+    const Camera file_camera = loop->file_camera;
+    loop->file_camera = *camera;
     pthread_mutex_unlock(&loop->mutex);
-    if (done) return output_commit(&output, messages);
-    text_free(&text);
-    output_abandon(&output);
+    if (output_commit(&output, messages)) return true;
+    pthread_mutex_lock(&loop->mutex);
+    text_free(&loop->written);
+    loop->file_camera = file_camera;
+    pthread_mutex_unlock(&loop->mutex);
     return false;
 }

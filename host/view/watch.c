@@ -53,7 +53,8 @@ static bool events_read(Watch *watch)
     bool found = false;
     for (ssize_t at = 0; at < size;) {
         const struct inotify_event *event = (const void *)(events + at);
-        found |= is_watched(watch, event);
+        // after an overflow of the queue any file may have changed
+        found |= event->mask & IN_Q_OVERFLOW || is_watched(watch, event);
         at += (ssize_t)(sizeof *event + event->len);
     }
     return found;
