@@ -24,7 +24,7 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
-    "Compares two images (PNG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal; 3: "
+    "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal; 3: "
     "different.\n\n"
     "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_MAX_PIXELS
         HELP_JSON HELP_HELP;

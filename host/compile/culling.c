@@ -64,6 +64,7 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
     }
     if (count > CULL_SPHERES_MAX / (1 + lights->count)) {
         // a kernel's argument all the same
+        compiled->cull_sphere_count = 0;
         flat_array_renew(compiled, FLAT_CULL_SPHERES, 1);
         return;
     }

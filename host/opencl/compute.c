@@ -69,7 +69,9 @@ bool compute_check_object(Compute *compute, const void *object, cl_int status, c
 
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped)
 {
+    fault_note_call("clEnqueueUnmapMemObject");
     cl_int status = clEnqueueUnmapMemObject(compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL);
+    fault_note_call(NULL);
     if (status != CL_SUCCESS && compute->unmap_failure.status == CL_SUCCESS)
         compute->unmap_failure = (ComputeFailure){.call = "clEnqueueUnmapMemObject", .status = status};
 }
