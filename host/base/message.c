@@ -64,6 +64,16 @@ void message_add(MessageList *list, MessageSeverity severity, const char *format
     array_push(*list, message);
 }
 
+bool message_error(MessageList *list, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    Message message = {.severity = MESSAGE_ERROR, .text = message_format(format, arguments)};
+    va_end(arguments);
+    array_push(*list, message);
+    return false;
+}
+
 static Message message_place(const Source *source, size_t offset)
 {
     Message message = {0};

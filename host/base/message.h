@@ -31,6 +31,9 @@ typedef struct {
 void message_add(MessageList *list, MessageSeverity severity, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
+// Adds an error without a file. Returns false, as what found the error does.
+bool message_error(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
 // Adds a message at a byte offset of a source, which determines its line, column and source line. An offset
 // past the end points at the end. Control characters are replaced by `?`.
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,

@@ -55,7 +55,7 @@ static void pending_drop(const char *name)
 
 static bool output_failed(OutputFile *output, const char *doing, MessageList *messages)
 {
-    message_add(messages, MESSAGE_ERROR, "cannot %s '%s': %s", doing, output->target, strerror(errno));
+    message_error(messages, "cannot %s '%s': %s", doing, output->target, strerror(errno));
     output_abandon(output);
     return false;
 }
@@ -271,8 +271,7 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages)
 {
     if (size == 0 || fwrite(bytes, 1, size, output->file) == size || output->file == stdout) return true;
-    message_add(messages, MESSAGE_ERROR, "cannot write '%s': %s", output->target, strerror(errno));
-    return false;
+    return message_error(messages, "cannot write '%s': %s", output->target, strerror(errno));
 }
 
 bool output_finish(OutputFile *output, MessageList *messages)

@@ -81,25 +81,17 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
     text->capacity = text->count + 1;
     text->items = memory_resize(text->items, text->capacity, 1);
 
-    bool whole = true;
-    if (ferror(file)) {
-        message_add(messages, MESSAGE_ERROR, "cannot read '%s': %s", path, strerror(errno));
-        whole = false;
-    } else if (text->count - start > largest) {
-        message_add(messages, MESSAGE_ERROR, "cannot read '%s': larger than 2 GiB", path);
-        whole = false;
-    }
-    return whole;
+    if (ferror(file)) return message_error(messages, "cannot read '%s': %s", path, strerror(errno));
+    if (text->count - start > largest)
+        return message_error(messages, "cannot read '%s': larger than 2 GiB", path);
+    return true;
 }
 
 bool text_read_file(Text *text, const char *path, MessageList *messages)
 {
     bool is_standard_input = strcmp(path, "-") == 0;
     FILE *file = is_standard_input ? stdin : fopen(path, "rbe");
-    if (!file) {
-        message_add(messages, MESSAGE_ERROR, "cannot read '%s': %s", path, strerror(errno));
-        return false;
-    }
+    if (!file) return message_error(messages, "cannot read '%s': %s", path, strerror(errno));
     bool whole = text_read_open_file(text, file, path, messages);
     if (!is_standard_input) fclose(file);
     return whole;

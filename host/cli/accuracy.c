@@ -143,14 +143,14 @@ static bool reference_read(Accuracy *accuracy)
     const char *fault = image.display ? "display values; linear light is needed, of an .exr or .npy"
                         : image.data || image.channels != 3 ? "no colors"
                                                             : NULL;
-    if (fault) message_add(&accuracy->messages, MESSAGE_ERROR, "the reference '%s' holds %s", path, fault);
+    if (fault) message_error(&accuracy->messages, "the reference '%s' holds %s", path, fault);
     const uint32_t factor = image.width / settings->width;
     const bool fits = factor > 0 && image.width % settings->width == 0 &&
                       image.height / factor == settings->height && image.height % factor == 0;
     if (!fault && !fits)
-        message_add(&accuracy->messages, MESSAGE_ERROR,
-                    "the reference '%s' has %ux%u pixels, which is no multiple of the images' %ux%u", path,
-                    image.width, image.height, settings->width, settings->height);
+        message_error(&accuracy->messages,
+                      "the reference '%s' has %ux%u pixels, which is no multiple of the images' %ux%u", path,
+                      image.width, image.height, settings->width, settings->height);
     if (!fault && fits)
         accuracy->reference = (Film){.width = settings->width,
                                      .height = settings->height,
@@ -283,20 +283,17 @@ static bool folder_make(Accuracy *accuracy)
 {
     const char *folder = accuracy->options.folder;
     if (!folder || mkdir(folder, 0777) == 0 || errno == EEXIST) return true;
-    message_add(&accuracy->messages, MESSAGE_ERROR, "cannot make the folder '%s': %s", folder,
-                strerror(errno));
-    return false;
+    return message_error(&accuracy->messages, "cannot make the folder '%s': %s", folder, strerror(errno));
 }
 
 static bool has_reference(Accuracy *accuracy)
 {
     const Device *device = accuracy->open.compute.device;
     if (accuracy->options.reference_path || device->fp64) return true;
-    message_add(&accuracy->messages, MESSAGE_ERROR,
-                "the device \"%s\" has no 64-bit floating point for a reference: name one with "
-                "--reference",
-                device->name);
-    return false;
+    return message_error(&accuracy->messages,
+                         "the device \"%s\" has no 64-bit floating point for a reference: name one with "
+                         "--reference",
+                         device->name);
 }
 
 static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)

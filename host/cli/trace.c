@@ -86,14 +86,14 @@ static bool ray_check(Report *report, size_t line, const double numbers[8], int 
     for (int i = 3; i < 6 && !beyond; i++)
         has_direction |= precision == PRECISION_DOUBLE ? numbers[i] != 0 : (float)numbers[i] != 0;
     if (count != 6 && count != 8)
-        report_error(report, line, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d", count);
-    else if (beyond)
-        report_error(report, line, "a number is beyond the precision's range; only tmax may be infinite");
-    else if (!has_direction)
-        report_error(report, line, "a ray's direction cannot be 0 0 0 at its precision");
-    else
-        return true;
-    return false;
+        return report_error(report, line, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d",
+                            count);
+    if (beyond)
+        return report_error(report, line,
+                            "a number is beyond the precision's range; only tmax may be infinite");
+    if (!has_direction)
+        return report_error(report, line, "a ray's direction cannot be 0 0 0 at its precision");
+    return true;
 }
 
 static TraceRay ray_make(const double n[8], int count, double farthest)
@@ -129,8 +129,8 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
     Text text = {0};
     bool read = text_read_file(&text, options->rays, &messages);
     if (read && is_npy(&text)) {
-        message_add(
-            &messages, MESSAGE_ERROR,
+        message_error(
+            &messages,
             "%s: a NumPy array; rays are text, six or eight numbers a line: origin, direction and, if "
             "given, tmin and tmax",
             options->rays);

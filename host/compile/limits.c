@@ -9,9 +9,7 @@ bool size_fits(const Scene *scene, MessageList *messages)
     const size_t largest = (size_t)1 << 28; // bits that the BVH counts with
     size_t count = scene_primitive_count(scene);
     if (count <= largest) return true;
-    message_add(messages, MESSAGE_ERROR, "the scene has %zu objects and triangles, more than %zu", count,
-                largest);
-    return false;
+    return message_error(messages, "the scene has %zu objects and triangles, more than %zu", count, largest);
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
@@ -24,12 +22,11 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
         const Light *light = &scene->lights.items[i];
         double distance = vector_largest(vector_subtract(light->position, eye));
         if (light->kind == LIGHT_DIRECTIONAL || distance <= farthest) continue;
-        message_add(messages, MESSAGE_ERROR,
-                    "a light lies %.3g from the eye, farther than precision %s can square (%.3g): use a "
-                    "directional light or --precision double",
-                    distance * compiled->unit, precision_names[settings->precision],
-                    farthest * compiled->unit);
-        return false;
+        return message_error(
+            messages,
+            "a light lies %.3g from the eye, farther than precision %s can square (%.3g): use a "
+            "directional light or --precision double",
+            distance * compiled->unit, precision_names[settings->precision], farthest * compiled->unit);
     }
     return true;
 }
@@ -77,8 +74,7 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
     for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)
         fits = !compiled->changed[kind] || array_fits(&compiled->arrays[kind], largest);
     if (fits) return true;
-    message_add(messages, MESSAGE_ERROR,
-                "a number of the scene does not fit precision %s: its magnitude is beyond %s",
-                precision_names[settings->precision], is_double ? "1.8e308" : "3.4e38");
-    return false;
+    return message_error(messages,
+                         "a number of the scene does not fit precision %s: its magnitude is beyond %s",
+                         precision_names[settings->precision], is_double ? "1.8e308" : "3.4e38");
 }

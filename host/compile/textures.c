@@ -125,8 +125,7 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
     Image image;
     MessageList problems = {0};
     const char *obstacle = file_obstacle(scene_texture->path);
-    if (obstacle)
-        message_add(&problems, MESSAGE_ERROR, "cannot read '%s': %s", scene_texture->path, obstacle);
+    if (obstacle) message_error(&problems, "cannot read '%s': %s", scene_texture->path, obstacle);
     bool done = !obstacle && image_read(&image, scene_texture->path, &problems);
     if (done) {
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);

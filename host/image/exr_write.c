@@ -42,9 +42,9 @@ static int64_t exr_write_bytes(exr_const_context_t context, void *user_data, con
 static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList *messages)
 {
     const ExrWriter *state = writer->state;
-    message_add(messages, MESSAGE_ERROR, "cannot write '%s': %s", writer->output.target,
-                state->write_error ? strerror(state->write_error) : exr_get_default_error_message(code));
-    return false;
+    return message_error(messages, "cannot write '%s': %s", writer->output.target,
+                         state->write_error ? strerror(state->write_error)
+                                            : exr_get_default_error_message(code));
 }
 
 // The first failure of a sequence of calls.
@@ -92,11 +92,9 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
     if (header->channels != 1 && header->channels != 3)
         fault("EXR is written with 1 or 3 channels, not %u", header->channels);
     // The block offset table precedes the blocks and is written last.
-    if (fseeko(writer->output.file, 0, SEEK_SET) != 0) {
-        message_add(messages, MESSAGE_ERROR, "cannot write '%s': EXR needs a file, not a pipe",
-                    writer->output.target);
-        return false;
-    }
+    if (fseeko(writer->output.file, 0, SEEK_SET) != 0)
+        return message_error(messages, "cannot write '%s': EXR needs a file, not a pipe",
+                             writer->output.target);
     exr_result_t code = exr_header(writer);
     if (code != EXR_ERR_SUCCESS) return exr_write_failed(writer, code, messages);
     state->block =

@@ -69,10 +69,8 @@ static bool disk_has_room(const ImageWriter *writer, MessageList *messages)
     if (!writer->output.has_folder || fstatvfs(writer->output.folder, &disk) != 0) return true;
     double room = (double)disk.f_bavail * (double)disk.f_frsize;
     if (disk.f_blocks == 0 || (double)bytes <= room) return true;
-    message_add(messages, MESSAGE_ERROR,
-                "cannot write '%s': it has %.3g MB or more, and its disk has %.3g MB left",
-                writer->output.target, 1e-6 * (double)bytes, 1e-6 * room);
-    return false;
+    return message_error(messages, "cannot write '%s': it has %.3g MB or more, and its disk has %.3g MB left",
+                         writer->output.target, 1e-6 * (double)bytes, 1e-6 * room);
 }
 
 uint64_t image_writer_bytes(const ImageWriter *writer)
@@ -149,8 +147,7 @@ bool image_refuse(const ImageFile *file, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(reason, sizeof reason, format, arguments);
     va_end(arguments);
-    message_add(file->messages, MESSAGE_ERROR, "cannot read '%s': %s", file->path, reason);
-    return false;
+    return message_error(file->messages, "cannot read '%s': %s", file->path, reason);
 }
 
 static uint32_t pixels_max = IMAGE_PIXELS_MAX;

@@ -44,9 +44,8 @@ static void png_flush_none(png_structp png)
 
 static bool png_write_failed(ImageWriter *writer, MessageList *messages)
 {
-    message_add(messages, MESSAGE_ERROR, "cannot write '%s': %s", writer->output.target,
-                ((PngState *)writer->state)->problem);
-    return false;
+    return message_error(messages, "cannot write '%s': %s", writer->output.target,
+                         ((PngState *)writer->state)->problem);
 }
 
 // tEXt is Latin-1, iTXt UTF-8; ASCII fits both, and more programs show tEXt.

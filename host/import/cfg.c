@@ -142,24 +142,17 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
         return true;
     }
     const Key *key = key_find(block, word);
-    if (!key) {
-        report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name, word_shown(word),
-                     word.text);
-        return false;
-    }
-    if (seen[key - keys]) {
-        report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
-        return false;
-    }
+    if (!key)
+        return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
+                            word_shown(word), word.text);
+    if (seen[key - keys]) return report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
     seen[key - keys] = true;
     size_t offset = line_peek(line).offset;
     void *target = (char *)values + key->offset;
     bool read = key->is_vector ? line_blank_vector(line, key->name, key->range, target)
                                : line_number(line, key->name, key->range, target);
-    if (read && !strcmp(key->name, "normal") && vector_is_zero(values->normal)) {
-        report_error(&reader->report, offset, "'normal' must not be zero");
-        return false;
-    }
+    if (read && !strcmp(key->name, "normal") && vector_is_zero(values->normal))
+        return report_error(&reader->report, offset, "'normal' must not be zero");
     if (read && !strcmp(key->name, "color") && vector_largest(values->color) > COLOR_MAX) {
         report_warning(&reader->report, offset, "'color' exceeds 255, and is cut to it");
         values->color = vector_min(values->color, vector_all(COLOR_MAX));
@@ -187,15 +180,12 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
     Line *line = &reader->line;
     bool seen[KEY_COUNT] = {false}, all_read = true;
     for (;;) {
-        if (!line_next_filled(line)) {
-            report_error(&reader->report, reader->report.source->length, "'}' is missing");
-            return false;
-        }
+        if (!line_next_filled(line))
+            return report_error(&reader->report, reader->report.source->length, "'}' is missing");
         Word word = line_peek(line);
         if (word_opens_block(word)) {
-            report_error(&reader->report, word.offset, "'}' is missing");
             line->next = line->start; // the next block is still read
-            return false;
+            return report_error(&reader->report, word.offset, "'}' is missing");
         }
         if (word_is(word, "}")) break;
         all_read &= key_read(reader, block, values, seen);

@@ -101,11 +101,10 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3
 {
     Word word;
     if (!line_field(line, name, &word)) return false;
-    if (comma_count(word) != 2) {
-        report_error(line->report, word.offset, "'%s' must be three numbers with commas between, not '%.*s'",
-                     name, word_shown(word), word.text);
-        return false;
-    }
+    if (comma_count(word) != 2)
+        return report_error(line->report, word.offset,
+                            "'%s' must be three numbers with commas between, not '%.*s'", name,
+                            word_shown(word), word.text);
     double values[3];
     size_t start = 0;
     for (size_t i = 0; i < 3; i++) {
@@ -125,10 +124,8 @@ bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3
 {
     double values[3];
     for (size_t i = 0; i < 3; i++) {
-        if (i && !line_peek(line).length) {
-            report_error(line->report, line->at, "'%s' must be three numbers, not %zu", name, i);
-            return false;
-        }
+        if (i && !line_peek(line).length)
+            return report_error(line->report, line->at, "'%s' must be three numbers, not %zu", name, i);
         if (!line_number(line, name, range, &values[i])) return false;
     }
     *value = (Vector3){values[0], values[1], values[2]};

@@ -40,11 +40,8 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
     bool is_known = false;
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
         is_known |= ends_with(path, endings[i]);
-    if (!is_known) {
-        message_add(messages, MESSAGE_ERROR, "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff",
-                    path);
-        return false;
-    }
+    if (!is_known)
+        return message_error(messages, "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff", path);
     Text text = {0};
     stage_begin(options->stage, "reading", path, 0);
     bool read = text_read_file(&text, path, messages);

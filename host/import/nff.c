@@ -114,8 +114,7 @@ static bool view_is_complete(NffReader *reader, size_t offset, const bool *seen)
 {
     for (size_t i = 0; i < VIEW_REQUIRED; i++) {
         if (seen[i]) continue;
-        report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i].name);
-        return false;
+        return report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i].name);
     }
     const Camera *camera = &reader->scene->camera;
     bool looks = !vector_is_zero(vector_subtract(camera->look_at, camera->position));
@@ -126,25 +125,18 @@ static bool view_is_complete(NffReader *reader, size_t offset, const bool *seen)
 static bool read_view(NffReader *reader)
 {
     size_t offset = reader->line.start;
-    if (reader->has_view) {
-        report_error(&reader->report, offset, "a second view");
-        return false;
-    }
+    if (reader->has_view) return report_error(&reader->report, offset, "a second view");
     reader->has_view = true;
-    if (reader->scene->objects.count) {
-        report_error(&reader->report, offset, "the view must stand before the objects");
-        return false;
-    }
+    if (reader->scene->objects.count)
+        return report_error(&reader->report, offset, "the view must stand before the objects");
     reader->scene->camera.field_axis = FIELD_VERTICAL;
     bool seen[VIEW_KEYS] = {false};
     while (reach_word(reader)) {
         Word word = line_peek(&reader->line);
         size_t index = view_key_index(word);
         if (index == VIEW_KEYS) break;
-        if (seen[index]) {
-            report_error(&reader->report, word.offset, "a second '%s'", view_keys[index].name);
-            return false;
-        }
+        if (seen[index])
+            return report_error(&reader->report, word.offset, "a second '%s'", view_keys[index].name);
         seen[index] = true;
         line_word(&reader->line);
         if (!view_keys[index].read(reader) || !line_end(&reader->line)) return false;
@@ -154,10 +146,8 @@ static bool read_view(NffReader *reader)
 
 static bool read_background(NffReader *reader)
 {
-    if (reader->has_background) {
-        report_error(&reader->report, reader->line.start, "a second background");
-        return false;
-    }
+    if (reader->has_background)
+        return report_error(&reader->report, reader->line.start, "a second background");
     reader->has_background = true;
     return read_color(reader, &reader->scene->background) && line_end(&reader->line);
 }
@@ -216,10 +206,7 @@ static bool read_sphere(NffReader *reader)
     reach_word(reader);
     size_t offset = line_peek(&reader->line).offset;
     if (!read_number(reader, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
-    if (radius == 0) {
-        report_error(&reader->report, offset, "'radius' must not be 0");
-        return false;
-    }
+    if (radius == 0) return report_error(&reader->report, offset, "'radius' must not be 0");
     object.as.sphere.radius = fabs(radius);
     object.as.sphere.only_inside = radius < 0;
     object_add(reader, object);
@@ -241,10 +228,7 @@ static bool read_cone(NffReader *reader)
     if (vector_is_zero(axis)) fault = "a cone's base and apex must differ";
     if (base_radius * apex_radius < 0) fault = "a cone's radii must not be of different signs";
     if (base_radius == 0 && apex_radius == 0) fault = "a cone's radii must not both be 0";
-    if (fault) {
-        report_error(&reader->report, offset, "%s", fault);
-        return false;
-    }
+    if (fault) return report_error(&reader->report, offset, "%s", fault);
     bool only_inside = base_radius < 0 || apex_radius < 0;
     Object object;
     if (base_radius == apex_radius) {
@@ -279,10 +263,8 @@ static bool read_corners(NffReader *reader, bool smooth)
             reach_word(reader);
             size_t offset = line_peek(&reader->line).offset;
             if (!read_vector(reader, "normal", NULL, &normal)) return false;
-            if (vector_is_zero(normal)) {
-                report_error(&reader->report, offset, "'normal' must not be zero");
-                return false;
-            }
+            if (vector_is_zero(normal))
+                return report_error(&reader->report, offset, "'normal' must not be zero");
         }
         array_push(reader->corners, corner);
         array_push(reader->normals, normal);

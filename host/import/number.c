@@ -124,21 +124,15 @@ bool number_read_field(Report *report, size_t offset, const char *name, const ch
 {
     switch (number_read(text, length, value)) {
     case NUMBER_MALFORMED:
-        if (length)
-            report_error(report, offset, "'%s' must be a number, not '%.*s'", name,
-                         (int)(length < WORD_SHOWN ? length : WORD_SHOWN), text);
-        else
-            report_error(report, offset, "'%s' must be a number, not nothing", name);
-        return false;
+        if (!length) return report_error(report, offset, "'%s' must be a number, not nothing", name);
+        return report_error(report, offset, "'%s' must be a number, not '%.*s'", name,
+                            (int)(length < WORD_SHOWN ? length : WORD_SHOWN), text);
     case NUMBER_TOO_LARGE:
-        report_error(report, offset, "'%s' is too large: numbers reach to %g", name, NUMBER_MAX);
-        return false;
+        return report_error(report, offset, "'%s' is too large: numbers reach to %g", name, NUMBER_MAX);
     case NUMBER_READ:
         break;
     }
-    if (range && !range_holds(range, *value)) {
-        report_error(report, offset, "'%s' must be %s", name, range->must);
-        return false;
-    }
+    if (range && !range_holds(range, *value))
+        return report_error(report, offset, "'%s' must be %s", name, range->must);
     return true;
 }

@@ -22,13 +22,14 @@ static void report_add(Report *report, MessageSeverity severity, size_t offset, 
     free(text);
 }
 
-void report_error(Report *report, size_t offset, const char *format, ...)
+bool report_error(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->error_count++ >= MESSAGES_MAX) return;
+    if (report->error_count++ >= MESSAGES_MAX) return false;
     va_list arguments;
     va_start(arguments, format);
     report_add(report, MESSAGE_ERROR, offset, format, arguments);
     va_end(arguments);
+    return false;
 }
 
 void report_warning(Report *report, size_t offset, const char *format, ...)
@@ -104,8 +105,7 @@ bool report_close(Report *report)
     }
     list->count = kept;
     message_list_move(list, &report->included);
-    if (report_is_full(report))
-        message_add(list, MESSAGE_ERROR, "%s: many errors: reading stopped", report->source->file);
+    if (report_is_full(report)) message_error(list, "%s: many errors: reading stopped", report->source->file);
     if (report->warning_count > MESSAGES_MAX)
         message_add(list, MESSAGE_WARNING, "%s: %zu more warnings", report->source->file,
                     report->warning_count - MESSAGES_MAX);

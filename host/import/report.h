@@ -16,7 +16,8 @@ typedef struct {
 
 Report report_open(const Source *source, MessageList *messages);
 
-void report_error(Report *report, size_t offset, const char *format, ...)
+// Returns false, as what found the error does.
+bool report_error(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void report_warning(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -78,10 +78,8 @@ static bool read_ambient(RtReader *reader)
 {
     double ratio;
     Color color;
-    if (reader->has_ambient) {
-        report_error(&reader->report, reader->line.start, "a second ambient light");
-        return false;
-    }
+    if (reader->has_ambient)
+        return report_error(&reader->report, reader->line.start, "a second ambient light");
     reader->has_ambient = true;
     if (!line_number(&reader->line, "ratio", &range_unit, &ratio) || !read_color(&reader->line, &color) ||
         !element_end(reader))
@@ -115,10 +113,7 @@ static bool read_camera(RtReader *reader, Camera *camera)
 
 static bool read_only_camera(RtReader *reader)
 {
-    if (reader->has_camera) {
-        report_error(&reader->report, reader->line.start, "a second camera");
-        return false;
-    }
+    if (reader->has_camera) return report_error(&reader->report, reader->line.start, "a second camera");
     reader->has_camera = true;
     return read_camera(reader, &reader->scene->camera);
 }
@@ -148,10 +143,7 @@ static bool read_light(RtReader *reader)
 
 static bool read_resolution(RtReader *reader)
 {
-    if (reader->has_size) {
-        report_error(&reader->report, reader->line.start, "a second resolution");
-        return false;
-    }
+    if (reader->has_size) return report_error(&reader->report, reader->line.start, "a second resolution");
     reader->has_size = true;
     return line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
            line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height) &&

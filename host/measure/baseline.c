@@ -102,8 +102,7 @@ static Baseline *baseline_read(struct fy_document *document, const char *path, M
     struct fy_node *root = document ? fy_document_root(document) : NULL;
     struct fy_node *runs = member(root, "runs");
     if (!runs || !fy_node_is_sequence(runs) || number_of(member(root, "schema")) != BENCH_SCHEMA) {
-        message_add(messages, MESSAGE_ERROR, "'%s' is no report of glint bench --json with schema %d", path,
-                    BENCH_SCHEMA);
+        message_error(messages, "'%s' is no report of glint bench --json with schema %d", path, BENCH_SCHEMA);
         return NULL;
     }
     Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);

@@ -53,18 +53,14 @@ const char *image_kind(const Image *image)
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages)
 {
     if (reference->width != test->width || reference->height != test->height ||
-        reference->channels != test->channels) {
-        message_add(messages, MESSAGE_ERROR, "the images differ in size: %ux%u with %u %s, and %ux%u with %u",
-                    reference->width, reference->height, reference->channels,
-                    reference->channels == 1 ? "channel" : "channels", test->width, test->height,
-                    test->channels);
-        return false;
-    }
-    if (strcmp(image_kind(reference), image_kind(test)) != 0) {
-        message_add(messages, MESSAGE_ERROR, "the images differ in kind: the first holds %s, the second %s",
-                    image_kind(reference), image_kind(test));
-        return false;
-    }
+        reference->channels != test->channels)
+        return message_error(messages, "the images differ in size: %ux%u with %u %s, and %ux%u with %u",
+                             reference->width, reference->height, reference->channels,
+                             reference->channels == 1 ? "channel" : "channels", test->width, test->height,
+                             test->channels);
+    if (strcmp(image_kind(reference), image_kind(test)) != 0)
+        return message_error(messages, "the images differ in kind: the first holds %s, the second %s",
+                             image_kind(reference), image_kind(test));
     return true;
 }
 

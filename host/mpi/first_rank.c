@@ -47,7 +47,7 @@ static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned a
     for (size_t i = 0; i < ranks->count; i++) {
         const Rank *rank = &ranks->items[i];
         if (rank->failure[0] == '\0') continue;
-        message_add(messages, MESSAGE_ERROR, "rank %zu on %s: %s", i + 1, rank->host, rank->failure);
+        message_error(messages, "rank %zu on %s: %s", i + 1, rank->host, rank->failure);
         all_fit = false;
     }
     if (!all_fit) ranks_start(false);

@@ -314,7 +314,7 @@ static void report_no_match(const DeviceList *list, const char *selector, Messag
         text_appendf(&text,
                      "; if it is installed, its cache needs a writable folder: set HOME, XDG_CACHE_HOME "
                      "or POCL_CACHE_DIR");
-    message_add(messages, MESSAGE_ERROR, "%s", text_c(&text));
+    message_error(messages, "%s", text_c(&text));
     text_free(&text);
     free(failure);
 }
@@ -376,8 +376,7 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
         free(part);
         if (!device) return 0;
         if (is_listed(chosen, count, device)) {
-            message_add(messages, MESSAGE_ERROR, "device %u (%s) is listed twice", device->index,
-                        device->name);
+            message_error(messages, "device %u (%s) is listed twice", device->index, device->name);
             return 0;
         }
         chosen[count++] = device;

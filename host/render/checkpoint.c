@@ -187,8 +187,7 @@ static const char *key_value(const char *key, const char *line, size_t name_leng
 
 static void damage_report(const char *path, MessageList *messages)
 {
-    message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is damaged; remove it or name another file",
-                path);
+    message_error(messages, "the checkpoint '%s' is damaged; remove it or name another file", path);
 }
 
 // A value of a key as messages have it.
@@ -208,8 +207,8 @@ static void difference_report(const char *path, const char *key, const char *fou
         const char *other = key_value(found, line, name_length, &other_length);
         if (length == other_length && strncmp(value, other, length) == 0) continue;
         char *own = value_text(value, length), *others = value_text(other, other_length);
-        message_add(
-            messages, MESSAGE_ERROR,
+        message_error(
+            messages,
             "the checkpoint '%s' is of another image (%.*s: %s, not %s); remove it or name another file",
             path, (int)name_length, line, others, own);
         free(own);
@@ -221,8 +220,7 @@ static void difference_report(const char *path, const char *key, const char *fou
 
 static bool open_failed(const char *path, const char *doing, MessageList *messages)
 {
-    message_add(messages, MESSAGE_ERROR, "cannot %s the checkpoint '%s': %s", doing, path, strerror(errno));
-    return false;
+    return message_error(messages, "cannot %s the checkpoint '%s': %s", doing, path, strerror(errno));
 }
 
 // A new file's header and key.
@@ -272,11 +270,8 @@ static bool header_check(Checkpoint *checkpoint, const char *key, MessageList *m
     bool is_checkpoint = S_ISREG(status.st_mode) && memcmp(header.magic, file_magic, magic_size) == 0 &&
                          (size < sizeof header || (header.format == file_format && header.key_length > 0 &&
                                                    header.key_length <= KEY_BYTES_MAX));
-    if (!is_checkpoint) {
-        message_add(messages, MESSAGE_ERROR, "'%s' is not a checkpoint of this version of glint",
-                    checkpoint->path);
-        return false;
-    }
+    if (!is_checkpoint)
+        return message_error(messages, "'%s' is not a checkpoint of this version of glint", checkpoint->path);
     if (size == sizeof header && (uint64_t)status.st_size >= sizeof header + header.key_length)
         return key_check(checkpoint, &header, key, messages);
     if (size < sizeof header || memcmp(&header, &expected, sizeof header) == 0)
@@ -319,9 +314,7 @@ static bool file_open(Checkpoint *checkpoint, MessageList *messages)
         close(checkpoint->descriptor);
         checkpoint->descriptor = -1;
     }
-    message_add(messages, MESSAGE_ERROR, "the checkpoint '%s' is in use by another process",
-                checkpoint->path);
-    return false;
+    return message_error(messages, "the checkpoint '%s' is in use by another process", checkpoint->path);
 }
 
 Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages)
@@ -427,7 +420,7 @@ static void file_remove(const Checkpoint *checkpoint, MessageList *messages)
 
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages)
 {
-    if (checkpoint->failure) message_add(messages, MESSAGE_ERROR, "%s", checkpoint->failure);
+    if (checkpoint->failure) message_error(messages, "%s", checkpoint->failure);
     if (is_complete) file_remove(checkpoint, messages);
     if (checkpoint->descriptor >= 0) {
         if (!is_complete) fdatasync(checkpoint->descriptor);

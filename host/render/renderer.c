@@ -13,38 +13,26 @@
 static bool settings_fit(const RenderSettings *settings, const Device *device, MessageList *messages)
 {
     uint32_t lanes = settings->lanes;
-    if (lanes != 0 && lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16) {
-        message_add(messages, MESSAGE_ERROR, "lanes must be 1, 4, 8 or 16, not %u", lanes);
-        return false;
-    }
-    if (settings->bounce_count > BOUNCES_MAX) {
-        message_add(messages, MESSAGE_ERROR, "bounces must be at most %d, not %u", BOUNCES_MAX,
-                    settings->bounce_count);
-        return false;
-    }
-    if (settings->perturb_scale > PERTURB_SCALE_MAX) {
-        message_add(messages, MESSAGE_ERROR, "errors can be at most %d times as large, not %u",
-                    PERTURB_SCALE_MAX, settings->perturb_scale);
-        return false;
-    }
-    if (settings->precision == PRECISION_DOUBLE && !device->fp64) {
-        message_add(messages, MESSAGE_ERROR,
-                    "precision double: the device \"%s\" has no 64-bit floating point", device->name);
-        return false;
-    }
-    if (settings->precision == PRECISION_CERTIFIED && settings->perturb_scale > 1) {
-        message_add(
-            messages, MESSAGE_ERROR,
+    if (lanes != 0 && lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16)
+        return message_error(messages, "lanes must be 1, 4, 8 or 16, not %u", lanes);
+    if (settings->bounce_count > BOUNCES_MAX)
+        return message_error(messages, "bounces must be at most %d, not %u", BOUNCES_MAX,
+                             settings->bounce_count);
+    if (settings->perturb_scale > PERTURB_SCALE_MAX)
+        return message_error(messages, "errors can be at most %d times as large, not %u", PERTURB_SCALE_MAX,
+                             settings->perturb_scale);
+    if (settings->precision == PRECISION_DOUBLE && !device->fp64)
+        return message_error(messages, "precision double: the device \"%s\" has no 64-bit floating point",
+                             device->name);
+    if (settings->precision == PRECISION_CERTIFIED && settings->perturb_scale > 1)
+        return message_error(
+            messages,
             "precision certified: its bounds cover errors of the size that devices have, not %u times that",
             settings->perturb_scale);
-        return false;
-    }
-    if (settings->precision == PRECISION_CERTIFIED && !device->fp64) {
-        message_add(messages, MESSAGE_ERROR,
-                    "precision certified needs 64-bit floating point, which the device \"%s\" lacks",
-                    device->name);
-        return false;
-    }
+    if (settings->precision == PRECISION_CERTIFIED && !device->fp64)
+        return message_error(messages,
+                             "precision certified needs 64-bit floating point, which the device \"%s\" lacks",
+                             device->name);
     return true;
 }
 
@@ -63,12 +51,12 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
     bool is_known = device->memory_bytes > 0 && device->largest_buffer_bytes > 0;
     if (!is_known || (sum <= device->memory_bytes && largest <= device->largest_buffer_bytes)) return true;
     const double mebi = 1024.0 * 1024.0;
-    message_add(messages, MESSAGE_ERROR,
-                "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
-                "%.1f MiB, and at most %.1f MiB in one buffer",
-                (double)sum / mebi, (double)largest / mebi, device->name, (double)device->memory_bytes / mebi,
-                (double)device->largest_buffer_bytes / mebi);
-    return false;
+    return message_error(
+        messages,
+        "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
+        "%.1f MiB, and at most %.1f MiB in one buffer",
+        (double)sum / mebi, (double)largest / mebi, device->name, (double)device->memory_bytes / mebi,
+        (double)device->largest_buffer_bytes / mebi);
 }
 
 // Whether scene_move leaves an array as it is, and does not read it.

@@ -93,10 +93,9 @@ static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera)
     for (const YamlNode *key = yaml_first(&reader->tree, file->camera), *value; key;
          key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
-        if (key->offset < copy->next || value->offset < key->offset) {
-            report_error(&reader->report, key->offset, "the camera cannot be written: it has an alias");
-            return false;
-        }
+        if (key->offset < copy->next || value->offset < key->offset)
+            return report_error(&reader->report, key->offset,
+                                "the camera cannot be written: it has an alias");
         if (lacks_up) up_insert(copy, file, key, camera->up);
         lacks_up = false;
         Vector3 changed;

@@ -148,8 +148,10 @@ static bool messages_read(MeshDraft *draft, FILE *reply, uint64_t count)
         ReplyMessage message;
         if (fread(&message, sizeof message, 1, reply) != 1) return false;
         message.text[sizeof message.text - 1] = '\0';
-        (message.is_error ? report_error : report_warning)(draft->import->report, draft->import->offset, "%s",
-                                                           message.text);
+        if (message.is_error)
+            report_error(draft->import->report, draft->import->offset, "%s", message.text);
+        else
+            report_warning(draft->import->report, draft->import->offset, "%s", message.text);
     }
     return true;
 }

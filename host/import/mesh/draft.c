@@ -11,7 +11,10 @@ static void draft_report(const MeshDraft *draft, bool is_error, const char *form
     char text[512];
     vsnprintf(text, sizeof text, format, arguments);
     const MeshImport *import = draft->import;
-    (is_error ? report_error : report_warning)(import->report, import->offset, "%s: %s", import->path, text);
+    if (is_error)
+        report_error(import->report, import->offset, "%s: %s", import->path, text);
+    else
+        report_warning(import->report, import->offset, "%s: %s", import->path, text);
 }
 
 bool draft_refuse(MeshDraft *draft, const char *format, ...)
@@ -40,8 +43,7 @@ bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
     va_end(arguments);
     if (draft->places == DRAFT_NO_PLACES) return draft_refuse(draft, "%s", text);
     if (draft->places == DRAFT_BYTES) return draft_refuse(draft, "byte %zu: %s", offset, text);
-    report_error(&draft->report, offset, "%s", text);
-    return false;
+    return report_error(&draft->report, offset, "%s", text);
 }
 
 size_t draft_part_count(const MeshDraft *draft, DraftPart part)

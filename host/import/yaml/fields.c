@@ -5,7 +5,7 @@
 
 enum { FIELDS_MAX = 32 };
 
-void expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
+bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
     char found[WORD_SHOWN + sizeof "''"];
     if (node->kind == YAML_MAPPING)
@@ -16,7 +16,7 @@ void expected_report(YamlReader *reader, const char *name, const char *expected,
         snprintf(found, sizeof found, "nothing");
     else
         snprintf(found, sizeof found, "'%.*s'", WORD_SHOWN, yaml_text(&reader->tree, node));
-    report_error(&reader->report, node->offset, "'%s' must be %s, not %s", name, expected, found);
+    return report_error(&reader->report, node->offset, "'%s' must be %s, not %s", name, expected, found);
 }
 
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
@@ -45,8 +45,7 @@ static void unknown_field_report(YamlReader *reader, const YamlNode *key, const 
 bool key_is_word(YamlReader *reader, const YamlNode *key)
 {
     if (key->kind == YAML_SCALAR) return true;
-    report_error(&reader->report, key->offset, "a key must be a word");
-    return false;
+    return report_error(&reader->report, key->offset, "a key must be a word");
 }
 
 // Index of the field named by the key, or field_count.
@@ -70,17 +69,14 @@ static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *fi
     const Field *other = fields;
     while (!seen[other - fields] || (other->forms & field->forms))
         other++;
-    report_error(&reader->report, key->offset, "'%s' cannot stand beside '%s'", field->name, other->name);
-    return false;
+    return report_error(&reader->report, key->offset, "'%s' cannot stand beside '%s'", field->name,
+                        other->name);
 }
 
 bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target, Form *form)
 {
-    if (mapping->kind != YAML_MAPPING) {
-        expected_report(reader, what, "a mapping", mapping);
-        return false;
-    }
+    if (mapping->kind != YAML_MAPPING) return expected_report(reader, what, "a mapping", mapping);
     size_t errors_before = reader->report.error_count;
     bool seen[FIELDS_MAX] = {false};
     unsigned forms = FORM_ANY;
@@ -125,10 +121,8 @@ const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, co
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value)
 {
-    if (node->kind != YAML_MAPPING || node->child_count != 2) {
-        report_error(&reader->report, node->offset, "expected %s", expected);
-        return false;
-    }
+    if (node->kind != YAML_MAPPING || node->child_count != 2)
+        return report_error(&reader->report, node->offset, "expected %s", expected);
     *key = yaml_first(&reader->tree, node);
     *value = yaml_next(&reader->tree, *key);
     return key_is_word(reader, *key);
@@ -143,10 +137,7 @@ bool read_node(YamlReader *reader, const Field *field, const YamlNode *node, voi
 
 bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    if (node->kind != YAML_SCALAR) {
-        expected_report(reader, field->name, "a number", node);
-        return false;
-    }
+    if (node->kind != YAML_SCALAR) return expected_report(reader, field->name, "a number", node);
     const char *text = yaml_text(&reader->tree, node);
     return number_read_field(&reader->report, node->offset, field->name, text, strlen(text), field->range,
                              target);
@@ -155,10 +146,8 @@ bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, v
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target)
 {
-    if (node->kind != YAML_SEQUENCE || node->child_count != count) {
-        expected_report(reader, field->name, what, node);
-        return false;
-    }
+    if (node->kind != YAML_SEQUENCE || node->child_count != count)
+        return expected_report(reader, field->name, what, node);
     bool all_read = true;
     char *place = target;
     for (const YamlNode *item = yaml_first(&reader->tree, node); item;
@@ -181,10 +170,8 @@ bool read_vector(YamlReader *reader, const Field *field, const YamlNode *node, v
 bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     if (!read_vector(reader, field, node, target)) return false;
-    if (vector_is_zero(*(const Vector3 *)target)) {
-        report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
-        return false;
-    }
+    if (vector_is_zero(*(const Vector3 *)target))
+        return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
     return true;
 }
 
@@ -210,10 +197,8 @@ bool read_boolean(YamlReader *reader, const Field *field, const YamlNode *node, 
 {
     const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
     bool is_true = !strcmp(text, "true");
-    if (!is_true && strcmp(text, "false") != 0) {
-        expected_report(reader, field->name, "true or false", node);
-        return false;
-    }
+    if (!is_true && strcmp(text, "false") != 0)
+        return expected_report(reader, field->name, "true or false", node);
     *(bool *)target = is_true;
     return true;
 }

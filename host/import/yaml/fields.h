@@ -69,8 +69,8 @@ FieldReader read_node, read_number, read_vector, read_direction, read_color, rea
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target);
 
-// Reports `must be …, not 'text'` at the node.
-void expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
+// Reports `must be …, not 'text'` at the node; returns false.
+bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
 // Reports `unknown kind 'word'`, with a suggestion if a known word is similar.
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
                     size_t known_count);

@@ -39,16 +39,12 @@ static const Field spot_fields[] = {
 static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, Light *light)
 {
     if (form == FORM_FIRST) light->direction = vector_subtract(light->direction, light->position);
-    if (vector_is_zero(light->direction)) {
-        report_error(&reader->report, field_node(reader, mapping, "look_at")->offset,
-                     "'look_at' must differ from 'position'");
-        return false;
-    }
-    if (light->penumbra > light->half_angle) {
-        report_error(&reader->report, field_node(reader, mapping, "penumbra")->offset,
-                     "'penumbra' must not exceed 'angle'");
-        return false;
-    }
+    if (vector_is_zero(light->direction))
+        return report_error(&reader->report, field_node(reader, mapping, "look_at")->offset,
+                            "'look_at' must differ from 'position'");
+    if (light->penumbra > light->half_angle)
+        return report_error(&reader->report, field_node(reader, mapping, "penumbra")->offset,
+                            "'penumbra' must not exceed 'angle'");
     return true;
 }
 

@@ -135,10 +135,8 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
         material_append(reader, node, "");
         return true;
     }
-    if (node->kind == YAML_SEQUENCE || !yaml_text(&reader->tree, node)[0]) {
-        expected_report(reader, field->name, "the name of a material or a mapping", node);
-        return false;
-    }
+    if (node->kind == YAML_SEQUENCE || !yaml_text(&reader->tree, node)[0])
+        return expected_report(reader, field->name, "the name of a material or a mapping", node);
     const MaterialName *name = reader->names.count
                                    ? bsearch(yaml_text(&reader->tree, node), reader->names.items,
                                              reader->names.count, sizeof(MaterialName), name_matches)

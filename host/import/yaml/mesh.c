@@ -23,8 +23,7 @@ static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *n
         scale->y = scale->z = scale->x;
     }
     if (scale->x != 0 && scale->y != 0 && scale->z != 0) return true;
-    report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
-    return false;
+    return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
 }
 
 static bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node, void *target)

@@ -45,9 +45,8 @@ static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, O
     (void)form;
     Vector3 min = object->as.box.min, max = object->as.box.max;
     if (min.x <= max.x && min.y <= max.y && min.z <= max.z) return true;
-    report_error(&reader->report, field_node(reader, mapping, "max")->offset,
-                 "'max' must not be below 'min'");
-    return false;
+    return report_error(&reader->report, field_node(reader, mapping, "max")->offset,
+                        "'max' must not be below 'min'");
 }
 
 // `from` and `to` share members with `point` and `axis`: until cylinder_finish the axis holds the finite
@@ -66,8 +65,8 @@ static bool axis_finish(YamlReader *reader, const YamlNode *mapping, Vector3 fro
 {
     *axis = vector_subtract(*axis, from);
     if (!vector_is_zero(*axis)) return true;
-    report_error(&reader->report, field_node(reader, mapping, "to")->offset, "'to' must differ from 'from'");
-    return false;
+    return report_error(&reader->report, field_node(reader, mapping, "to")->offset,
+                        "'to' must differ from 'from'");
 }
 
 static bool cylinder_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -103,11 +102,9 @@ static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
         object->as.cone.slope = tan(object->as.cone.slope * (M_PI / 180));
         return true;
     }
-    if (object->as.cone.radius[0] == 0 && object->as.cone.radius[1] == 0) {
-        report_error(&reader->report, field_node(reader, mapping, "radius")->offset,
-                     "'radius' must not be zero at both ends");
-        return false;
-    }
+    if (object->as.cone.radius[0] == 0 && object->as.cone.radius[1] == 0)
+        return report_error(&reader->report, field_node(reader, mapping, "radius")->offset,
+                            "'radius' must not be zero at both ends");
     return axis_finish(reader, mapping, object->as.cone.from, &object->as.cone.axis);
 }
 
@@ -164,10 +161,9 @@ static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form 
     object->as.paraboloid.finite = object->as.paraboloid.height > 0;
     object->as.paraboloid.caps &= object->as.paraboloid.finite;
     if (form == FORM_FOCAL_LENGTH) return true;
-    if (!object->as.paraboloid.finite) {
-        report_error(&reader->report, mapping->offset, "a paraboloid with a 'radius' needs a 'height'");
-        return false;
-    }
+    if (!object->as.paraboloid.finite)
+        return report_error(&reader->report, mapping->offset,
+                            "a paraboloid with a 'radius' needs a 'height'");
     const double radius = object->as.paraboloid.focal_length;
     object->as.paraboloid.focal_length = radius / object->as.paraboloid.height * radius / 4;
     return true;

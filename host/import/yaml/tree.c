@@ -68,25 +68,19 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
     Text *texts = &builder->tree->texts;
     node.kind = YAML_SCALAR;
     node.text = (uint32_t)texts->count;
-    if (token && !token_append_text(texts, token)) {
-        report_error(builder->report, node.offset, "not well-formed YAML");
-        return false;
-    }
+    if (token && !token_append_text(texts, token))
+        return report_error(builder->report, node.offset, "not well-formed YAML");
     text_append(texts, "", 1);
-    if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1)) {
-        report_error(builder->report, node.offset, "a text with a NUL character in it");
-        return false;
-    }
+    if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1))
+        return report_error(builder->report, node.offset, "a text with a NUL character in it");
     node_append(builder, node);
     return true;
 }
 
 static bool collection_open(TreeBuilder *builder, YamlNode node)
 {
-    if (builder->depth == DEPTH_MAX) {
-        report_error(builder->report, node.offset, "nested more than %d levels deep", DEPTH_MAX);
-        return false;
-    }
+    if (builder->depth == DEPTH_MAX)
+        return report_error(builder->report, node.offset, "nested more than %d levels deep", DEPTH_MAX);
     uint32_t index = (uint32_t)builder->tree->nodes.count;
     node_append(builder, node);
     builder->open[builder->depth++] = (OpenNode){.node = index};
@@ -115,16 +109,12 @@ static const Anchor *anchor_find(const TreeBuilder *builder, const char *name, s
 static bool alias_append(TreeBuilder *builder, const char *name, size_t length, size_t offset)
 {
     const Anchor *anchor = anchor_find(builder, name, length);
-    if (!anchor) {
-        report_error(builder->report, offset, "unknown alias '*%.*s'", (int)(length < 40 ? length : 40),
-                     name);
-        return false;
-    }
+    if (!anchor)
+        return report_error(builder->report, offset, "unknown alias '*%.*s'",
+                            (int)(length < 40 ? length : 40), name);
     for (size_t i = 0; i < builder->depth; i++) {
-        if (builder->open[i].node == anchor->node) {
-            report_error(builder->report, offset, "an alias inside of what it names");
-            return false;
-        }
+        if (builder->open[i].node == anchor->node)
+            return report_error(builder->report, offset, "an alias inside of what it names");
     }
     YamlNode copy = builder->tree->nodes.items[anchor->node];
     copy.next = 0;
@@ -136,10 +126,8 @@ static bool anchor_add(TreeBuilder *builder, struct fy_token *token)
 {
     size_t start = fy_token_start_mark(token)->input_pos,
            length = fy_token_end_mark(token)->input_pos - start;
-    if (builder->anchors.count == ANCHORS_MAX) {
-        report_error(builder->report, start, "more than %d anchors", ANCHORS_MAX);
-        return false;
-    }
+    if (builder->anchors.count == ANCHORS_MAX)
+        return report_error(builder->report, start, "more than %d anchors", ANCHORS_MAX);
     Anchor anchor = {.text = start, .length = length, .node = (uint32_t)builder->tree->nodes.count};
     array_push(builder->anchors, anchor);
     return true;
@@ -153,20 +141,16 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
     node.end = (uint32_t)builder->end;
     bool is_node =
         event->type == FYET_SCALAR || event->type == FYET_SEQUENCE_START || event->type == FYET_MAPPING_START;
-    if (is_node && fy_event_get_tag_token(event)) {
-        report_error(builder->report, fy_token_start_mark(fy_event_get_tag_token(event))->input_pos,
-                     "scenes have no tags");
-        return false;
-    }
+    if (is_node && fy_event_get_tag_token(event))
+        return report_error(builder->report, fy_token_start_mark(fy_event_get_tag_token(event))->input_pos,
+                            "scenes have no tags");
     if (is_node && fy_event_get_anchor_token(event) && !anchor_add(builder, fy_event_get_anchor_token(event)))
         return false;
 
     switch (event->type) {
     case FYET_DOCUMENT_START:
-        if (builder->tree->nodes.count) {
-            report_error(builder->report, node.offset, "a second document");
-            return false;
-        }
+        if (builder->tree->nodes.count)
+            return report_error(builder->report, node.offset, "a second document");
         return true;
     case FYET_SCALAR:
         builder->value_end = builder->end;
@@ -240,10 +224,7 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
         stage_set(stage, builder->end);
         if (!taken) return false;
     }
-    if (!builder->tree->nodes.count) {
-        report_error(builder->report, 0, "the scene is empty");
-        return false;
-    }
+    if (!builder->tree->nodes.count) return report_error(builder->report, 0, "the scene is empty");
     return true;
 }
 
@@ -252,20 +233,15 @@ static bool source_is_text(const Source *source, Report *report)
 {
     for (size_t at = 0, size; at < source->length; at += size) {
         size = text_character_size(source->bytes + at, source->length - at);
-        if (!size || !source->bytes[at]) {
-            report_error(report, at, "not UTF-8 text");
-            return false;
-        }
+        if (!size || !source->bytes[at]) return report_error(report, at, "not UTF-8 text");
     }
     return true;
 }
 
 bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
 {
-    if (report->source->length > source_length_max) {
-        report_error(report, 0, "a scene of more than 2 GiB");
-        return false;
-    }
+    if (report->source->length > source_length_max)
+        return report_error(report, 0, "a scene of more than 2 GiB");
     if (!source_is_text(report->source, report)) return false;
     struct fy_diag_cfg quiet;
     fy_diag_cfg_default(&quiet);
