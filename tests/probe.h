@@ -62,7 +62,7 @@ static inline cl_program probe_program(const char *text, const char *prelude, co
     EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
     memcpy(files, kernel_files, file_count * sizeof *files);
     files[file_count] = (EmbeddedFile){"probe.cl", text};
-    char *composed = kernel_compose(files, "probe.cl", prelude, NULL);
+    char *composed = kernel_compose(files, "probe.cl", prelude);
     if (composed == NULL) fault("a test's kernel cannot be composed");
     const char *source = composed;
     cl_int status;

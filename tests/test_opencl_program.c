@@ -309,7 +309,7 @@ static void build_broken(void *result)
 {
     Opened opened;
     opened_open(&opened);
-    char *text = kernel_compose(broken_files, "root.cl", "", NULL);
+    char *text = kernel_compose(broken_files, "root.cl", "");
     cl_int status;
     cl_program program =
         clCreateProgramWithSource(opened.compute.context, 1, (const char *[]){text}, NULL, &status);

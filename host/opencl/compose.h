@@ -10,6 +10,6 @@ extern const EmbeddedFile kernel_files[];
 
 // `prelude`, then `root` with each quoted include expanded the first time and replaced by an empty line after
 // that, whatever the preprocessor's branch; #line around each, so that the compiler reports files and lines
-// of kernels/. Files are found by the last part of their path; <...> includes are kept. NULL if `root` or an
-// include is not in `files`; *missing (may be NULL) is its name then, which the caller frees.
-char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude, char **missing);
+// of kernels/. Files are found by the last part of their path; <...> includes are kept. A fault if `root` or
+// an include is not in `files`. The caller frees the text.
+char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude);

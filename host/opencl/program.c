@@ -18,14 +18,6 @@ static const char *or_empty(const char *text)
     return text ? text : "";
 }
 
-static char *request_text(const ProgramRequest *request)
-{
-    char *missing = NULL;
-    char *text = kernel_compose(kernel_files, request->root, or_empty(request->prelude), &missing);
-    if (!text) fault("the kernel file %s, which %s includes, is not embedded", missing, request->root);
-    return text;
-}
-
 // All that the compiled program depends on. The native width distinguishes processors of the same name.
 static char *request_key(const Compute *compute, const ProgramRequest *request, const char *text)
 {
@@ -37,9 +29,7 @@ static char *request_key(const Compute *compute, const ProgramRequest *request, 
     text_appendf(&key, "driver %s, %s\n", device->vendor, device->driver);
     text_appendf(&key, "platform %s, %s\n", device->platform_name, device->platform_version);
     text_append(&key, text, strlen(text));
-    char *copy = memory_copy_text(text_c(&key));
-    text_free(&key);
-    return copy;
+    return key.items;
 }
 
 static char *build_log(const Compute *compute, cl_program program)
@@ -152,7 +142,7 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
     if (!compute_ok(compute)) return false;
     double start = clock_seconds();
     const char *options = or_empty(request->options);
-    char *text = request_text(request);
+    char *text = program_text(request->root, or_empty(request->prelude));
     program->text_hash = hash_bytes(HASH_START, text, strlen(text));
     if (request->no_cache) {
         program->program = build_from_source(compute, text, options, true);
@@ -199,7 +189,8 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
         free(bytes);
         return;
     }
-    char *text = request_text(request), *key = request_key(compute, request, text);
+    char *text = program_text(request->root, or_empty(request->prelude)),
+         *key = request_key(compute, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};
     cache_store(key, &binary);
     text_free(&binary);
