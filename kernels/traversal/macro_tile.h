@@ -302,11 +302,12 @@ static inline void tile_visit_node(MacroTile *tile, TraversalStack *stack, const
             if (!rays_meet_child(tile, packet, &projected, child)) met &= ~(1u << packet);
         }
         if (met == 0) continue;
+        uint index = ((global const uint *)node->child_index)[child];
         if (kind == BVH_NODE) {
-            stack_push_child(stack, bottom, scene, node, child, met, projected.w_low.each[child]);
+            stack_push_node(stack, bottom, scene, (StackEntry){index, met, projected.w_low.each[child]});
             continue;
         }
-        tile_intersect_leaf(tile, scene, kind, ((global const uint *)node->child_index)[child], met);
+        tile_intersect_leaf(tile, scene, kind, index, met);
         if (tile->active == 0) return;
     }
 }
@@ -328,7 +329,7 @@ static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scen
     if (tile.active == 0) return others;
     tile.unprepared = tile.active;
     macro_tile_bound(&tile);
-    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)tile.active, -LARGEST};
+    StackEntry entries[STACK_CAPACITY], next = {0, tile.active, -LARGEST};
     // entry distances are from the common origin: nearest the light is farthest from the surface
     TraversalStack stack = {entries, 0, false};
     for (;; next = entries[--stack.count]) {

@@ -253,14 +253,16 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
     const uint bottom = stack->count;
     for (uint left = met.children & ~leaves; left != 0; left &= left - 1) {
         uint child = lowest_bit(left), hit_by = child_lanes(group, &met, child, boxes);
-        if (hit_by != 0) stack_push_child(stack, bottom, scene, node, child, hit_by, met.entry.each[child]);
+        uint index = ((global const uint *)node->child_index)[child];
+        StackEntry entry = {index, hit_by, met.entry.each[child]};
+        if (hit_by != 0) stack_push_node(stack, bottom, scene, entry);
     }
 }
 
 // Traverses the BVH with a group; visits what any of its active lanes intersects.
 static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
 {
-    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, (ushort)group->active, -LARGEST};
+    StackEntry entries[STACK_CAPACITY], next = {0, group->active, -LARGEST};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         uint lanes = next.lanes & lanes_bits((real)(next.entry) <= group->tmax);

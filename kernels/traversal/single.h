@@ -9,15 +9,16 @@
 #if LANES == 1
 
 // Pushes the children of a node that the ray intersects.
-static inline void visit_node(TraversalStack *stack, const Scene *scene, global const BvhNode *node,
-                              const BoxRays *box_ray, Octant octant, scalar tmax)
+static inline void visit_node(TraversalStack *stack, global const BvhNode *node, const BoxRays *box_ray,
+                              Octant octant, scalar tmax)
 {
     global const scalar *boxes = (global const scalar *)node->planes;
     const uint bottom = stack->count;
     for (uint child = 0; child < BVH_WIDTH; child++) {
-        scalar entry;
-        if (box_rays_intersect_child(box_ray, octant, boxes + child, tmax, &entry))
-            stack_push_child(stack, bottom, scene, node, child, 1, entry);
+        StackEntry entry = {((global const uint *)node->child_index)[child],
+                            ((global const uint *)node->child_kind)[child], 0};
+        if (box_rays_intersect_child(box_ray, octant, boxes + child, tmax, &entry.entry))
+            stack_push(stack, bottom, entry);
     }
 }
 
@@ -30,12 +31,12 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     scalar tmax = traversal_tmax(traversal);
     if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, tmax)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
-    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, 1, box_ray.tmin};
+    StackEntry entries[STACK_CAPACITY], next = {0, BVH_NODE, box_ray.tmin};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.entry <= tmax) {
             if (next.child_kind == BVH_NODE) {
-                visit_node(&stack, scene, &scene->nodes[next.child_index], &box_ray, octant, tmax);
+                visit_node(&stack, &scene->nodes[next.child_index], &box_ray, octant, tmax);
             } else {
                 intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
                 if (!traversal->active) return;
