@@ -87,6 +87,8 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
 
 // The largest error of a bounced ray's direction that is still traced.
 #define BOUNCE_ERROR_MAX ((real)(0x1p-6f))
+// Of a bounced ray's direction and of what it is made of, in parts of them.
+#define BOUNCE_ROUNDING ((real)(32 * UNIT_ROUNDOFF))
 
 static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask inside)
 {
@@ -96,85 +98,134 @@ static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask ins
     bounce->direction_error = lanes_select(inside, error, bounce->direction_error);
 }
 
-// The bounds of a surface's reflected and refracted ray. d - 2 (d . N) N is off by the error of d and twice
-// that of N; the refracted ray's, n d + N (s - sqrt(s^2 - k)), by those of d and N and by what the difference
-// changes with s. Lanes in doubt are not traced further.
+// How a ray meets a surface.
+typedef struct {
+    mask found;
+    real turn;                // error of its direction
+    real cosine, angle_error; // of the angle of incidence
+} Incidence;
+
+static inline Incidence surface_incidence(const Surface *surface, const Ray *ray)
+{
+    real turn = ray->direction_error + BOUNCE_ROUNDING, normal_error = surface->normal_error;
+    return (Incidence){surface->found & ray->active, turn,
+                       fabs(vector_dot(ray->direction, surface->shading_normal)),
+                       real_fma(turn, normal_error, turn + normal_error)};
+}
+
+// d - 2 (d . N) N is off by the error of d and twice that of N. Returns the lanes in doubt.
+static inline mask reflected_set_error(const Surface *surface, const Ray *ray, const Incidence *incidence,
+                                       Bounce *reflected)
+{
+    const real normal_error = surface->normal_error;
+    real error = real_fma((real)(2), normal_error, incidence->turn);
+    reflected->direction_error = error;
+    if (HAS_CHORDS) {
+        const ChordEnd *end = &surface->chord_end;
+        Chord chord = chord_start(end, surface->place_error, incidence->cosine,
+                                  real_fma((real)(3), end->normal, BOUNCE_ROUNDING),
+                                  incidence->angle_error + end->normal + BOUNCE_ROUNDING);
+        bounce_set_chord(reflected, &chord, !surface->entering);
+    }
+    mask reflects = incidence->found & bounce_is_active(reflected);
+    mask doubt = reflects & !(reflected->direction_error <= BOUNCE_ERROR_MAX);
+    if (!HAS_TRIANGLES) return doubt;
+    // the shading normal's reflection may run through the surface
+    Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
+    real outward = fabs(vector_dot(by_shading, surface->normal));
+    return doubt | (reflects & (outward <= error + normal_error));
+}
+
+// Of vector_refract: n d + N (s - sqrt(s^2 - k)), s being n cos, on entering as if n were 1 and -k for k.
+typedef struct {
+    real scale; // n
+    real s, s_error;
+    real root, least_root; // the square root, 0 in total reflection; not more than the exact one, or 1
+    real squares;          // bounds s^2 and k
+    mask doubt;            // whether it is total reflection
+} Snell;
+
+static inline Snell surface_snell(const Surface *surface, const Incidence *incidence, real angle_error)
+{
+    const real zero = (real)(0), one = (real)(1);
+    Snell snell;
+    snell.scale = lanes_select(surface->entering, one, surface->ior);
+    snell.s = snell.scale * incidence->cosine;
+    real sine =
+        real_sqrt(real_max(real_fma(-incidence->cosine, incidence->cosine, one), zero) + BOUNCE_ROUNDING);
+    snell.s_error = snell.scale * (angle_error * (sine + angle_error) + BOUNCE_ROUNDING);
+    real k = lanes_select(surface->entering, one - surface->ior, surface->ior - one) * (surface->ior + one);
+    snell.squares = real_fma(snell.s, snell.s, surface->ior * surface->ior);
+    real error = snell.s_error * (snell.s + snell.s + snell.s_error) + BOUNCE_ROUNDING * snell.squares;
+    real squared = real_fma(snell.s, snell.s, -k), least_squared = squared - error;
+    snell.root = real_sqrt(real_max(squared, zero));
+    snell.least_root = real_sqrt(lanes_select(least_squared > zero, least_squared, one));
+    snell.doubt = !(fabs(squared) > error);
+    return snell;
+}
+
+// The refracted ray along a chord, or out of a sphere after one. `computed`: the error of computing it.
+static inline void refracted_set_chord(const Surface *surface, const Snell *snell, real angle_error,
+                                       real computed, Bounce *refracted)
+{
+    const ChordEnd *end = &surface->chord_end;
+    real inverse_ior = real_divide((real)(1), surface->ior);
+    Chord chord = chord_start(end, surface->place_error, snell->root * inverse_ior, NEVER,
+                              real_fma(angle_error, inverse_ior, computed + end->normal));
+    bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= (real)(1)));
+    // in the plane of incidence; across it n, which is more where n < 1
+    real steepest = real_max(real_divide(snell->s + snell->s_error, snell->least_root), snell->scale);
+    real turned = real_fma(steepest, end->turn + end->normal, end->normal);
+    real leaving = computed + (divide_or(end->place, end->radius, NEVER) + turned);
+    refracted->direction_error = lanes_select(surface->entering, refracted->direction_error,
+                                              real_min(leaving, refracted->direction_error));
+}
+
+// n d + N (s - sqrt(s^2 - k)) is off by the errors of d and N and by what the difference changes with s.
+// Returns the lanes in doubt.
+static inline mask refracted_set_error(const Surface *surface, const Incidence *incidence, mask total,
+                                       Bounce *refracted)
+{
+    const real one = (real)(1), normal_error = surface->normal_error;
+    mask transparent = incidence->found & (surface->transmission > (real)(0)),
+         refracts = transparent & !total;
+    real angle_error = incidence->angle_error;
+    if (HAS_CHORDS)
+        angle_error =
+            real_min(angle_error, surface->chord_end.turn + surface->chord_end.normal + BOUNCE_ROUNDING);
+    const Snell snell = surface_snell(surface, incidence, angle_error);
+    // s - sqrt(s^2 - k) changes most where s is least
+    real least = real_max(snell.s - snell.s_error, (real)(0));
+    real change = real_divide(real_max(fabs(least - snell.least_root), snell.root - least), snell.least_root);
+    // Over the length before it is made unit: n on entering, 1 on leaving. A vector that is off by e of its
+    // length is off by at most e / (1 - e) as a unit vector, e being 2^-6 or in doubt.
+    real inverse_length = real_divide((real)(1.02f), lanes_select(surface->entering, surface->ior, one));
+    real roundings = snell.scale + snell.s + snell.root + real_divide(snell.squares, snell.least_root);
+    real computed = real_fma(BOUNCE_ROUNDING * roundings, inverse_length, BOUNCE_ROUNDING);
+    real error =
+        snell.scale * incidence->turn + fabs(snell.s - snell.root) * normal_error + change * snell.s_error;
+    refracted->direction_error = real_fma(error, inverse_length, computed);
+    if (HAS_CHORDS) refracted_set_chord(surface, &snell, angle_error, computed, refracted);
+    mask doubt = transparent & snell.doubt;
+    doubt = doubt | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
+    if (!HAS_TRIANGLES) return doubt;
+    real inward = fabs(vector_dot(refracted->direction, surface->normal));
+    return doubt | (refracts & (inward <= refracted->direction_error + normal_error));
+}
+
+// The bounds of a surface's reflected and refracted ray. Lanes in doubt are not traced further.
 static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
                                       Bounce *refracted, mask *doubt)
 {
-    const real zero = (real)(0), one = (real)(1), rounding = (real)(32 * UNIT_ROUNDOFF);
-    const ChordEnd *end = &surface->chord_end;
-    real normal_error = surface->normal_error, turn = ray->direction_error + rounding;
-    // of the angle of incidence
-    real angle_error = real_fma(turn, normal_error, turn + normal_error);
-    real cosine = fabs(vector_dot(ray->direction, surface->shading_normal));
-    mask found = surface->found & ray->active, open = mask_none();
-    real reflected_error = real_fma((real)(2), normal_error, turn);
+    const Color3 none = {(real)(0), (real)(0), (real)(0)};
+    const Incidence incidence = surface_incidence(surface, ray);
     reflected->origin_error = refracted->origin_error = surface->place_error;
     reflected->left = refracted->left = surface->object;
-    reflected->direction_error = reflected_error;
     reflected->leaves_outward = surface->entering;
     refracted->leaves_outward = !surface->entering;
-    if (HAS_CHORDS) {
-        Chord chord =
-            chord_start(end, surface->place_error, cosine, real_fma((real)(3), end->normal, rounding),
-                        angle_error + end->normal + rounding);
-        bounce_set_chord(reflected, &chord, !surface->entering);
-        angle_error = real_min(angle_error, end->turn + end->normal + rounding);
-    }
-    mask reflects = found & bounce_is_active(reflected);
-    open = reflects & !(reflected->direction_error <= BOUNCE_ERROR_MAX);
-    if (HAS_TRIANGLES) {
-        // the shading normal's reflection may run through the surface
-        Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
-        real outward = fabs(vector_dot(by_shading, surface->normal));
-        open = open | (reflects & (outward <= reflected_error + normal_error));
-    }
-    if (HAS_TRANSMISSION) {
-        mask transparent = found & (surface->transmission > zero);
-        real scale = lanes_select(surface->entering, one, surface->ior), scaled = scale * cosine;
-        real sine = real_sqrt(real_max(real_fma(-cosine, cosine, one), zero) + rounding);
-        real scaled_error = scale * (angle_error * (sine + angle_error) + rounding);
-        real k =
-            lanes_select(surface->entering, one - surface->ior, surface->ior - one) * (surface->ior + one);
-        real squares = real_fma(scaled, scaled, surface->ior * surface->ior);
-        real squared_error = scaled_error * (scaled + scaled + scaled_error) + rounding * squares;
-        real squared = real_fma(scaled, scaled, -k), least_squared = squared - squared_error;
-        open = open | (transparent & !(fabs(squared) > squared_error));
-        // s - sqrt(s^2 - k) changes most where s is least
-        real least = real_max(scaled - scaled_error, zero), root = real_sqrt(real_max(squared, zero)),
-             least_root = real_sqrt(lanes_select(least_squared > zero, least_squared, one));
-        real change = real_divide(real_max(fabs(least - least_root), root - least), least_root);
-        // over the length before it is made unit: the index on entering, 1 on leaving
-        real inverse_length = real_divide((real)(1.02f), lanes_select(surface->entering, surface->ior, one));
-        real computed = real_fma(rounding * (scale + scaled + root + real_divide(squares, least_root)),
-                                 inverse_length, rounding);
-        real error = scale * turn + fabs(scaled - root) * normal_error + change * scaled_error;
-        refracted->direction_error = real_fma(error, inverse_length, computed);
-        if (HAS_CHORDS) {
-            real inner_cosine = real_divide(root, surface->ior);
-            Chord chord =
-                chord_start(end, surface->place_error, inner_cosine, NEVER,
-                            real_fma(angle_error, real_divide(one, surface->ior), computed + end->normal));
-            bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= one));
-            // in the plane of incidence; across it n, which is more where n < 1
-            real steepest = real_max(real_divide(scaled + scaled_error, least_root), scale);
-            real leaving =
-                computed + (real)(1.01f) * (divide_or(end->place, end->radius, NEVER) +
-                                            real_fma(steepest, end->turn + end->normal, end->normal));
-            refracted->direction_error = lanes_select(surface->entering, refracted->direction_error,
-                                                      real_min(leaving, refracted->direction_error));
-        }
-        mask refracts = transparent & !total;
-        open = open | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
-        if (HAS_TRIANGLES)
-            open = open | (refracts & (fabs(vector_dot(refracted->direction, surface->normal)) <=
-                                       refracted->direction_error + normal_error));
-    } else {
-        refracted->direction_error = zero;
-    }
-    *doubt = *doubt | open;
-    const Color3 none = {zero, zero, zero};
+    refracted->direction_error = (real)(0);
+    *doubt = *doubt | reflected_set_error(surface, ray, &incidence, reflected);
+    if (HAS_TRANSMISSION) *doubt = *doubt | refracted_set_error(surface, &incidence, total, refracted);
     reflected->weight = vector_select(*doubt, none, reflected->weight);
     refracted->weight = vector_select(*doubt, none, refracted->weight);
 }

@@ -13,7 +13,7 @@
 // At a point of a sphere.
 typedef struct {
     real radius;      // 0: no sphere, or too near to its tangent
-    real off;         // how far the computed point may be from the sphere, times 1.25
+    real off;         // over the cosine of incidence: how far along the ray the sphere is, at most
     real normal;      // error of the normal, for the place where the computed ray meets the sphere
     real place, turn; // of the chord that ends there; NEVER where none does
 } ChordEnd;
@@ -29,6 +29,17 @@ static inline ChordEnd chord_end_none(void)
     return (ChordEnd){(real)(0), (real)(0), (real)(0), NEVER, NEVER};
 }
 
+// Above this share of the radius times the cosine of incidence a ray is too near to the sphere's tangent.
+#define CHORD_MOVE_MAX ((real)(0x1p-4f))
+// With c the cosine of incidence, a point whose distance from a sphere of radius r is e has it at s along the
+// ray, s (2 c r - s) <= e (2 r + e). With s <= c r / 16, hence e <= r / 16, s is at most e / c times
+// (1 + 1/32) / (1 - 1/32), and its angle at the center s / r times 1 + 1/32: 1.1 in all, and a cosine that
+// decides is within 2 %.
+#define CHORD_OFF_FACTOR ((real)(1.125f))
+// The largest error of a chord's direction that bounds are for. An angle exceeds its sine by less than 0.0001
+// of it there, and the sine's square moves by no more.
+#define CHORD_TURN_MAX ((real)(0x1p-6f))
+
 // Where rays hit a sphere at `point`, in `lanes`.
 static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit *hit, Vector point,
                                  mask lanes)
@@ -38,14 +49,14 @@ static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit
     real inverse = real_divide((real)(1), radius);
     real rounding = vector_norm1(ray->origin) + vector_norm1(ray->direction) * fabs(hit->t);
     ChordEnd end = chord_end_none();
-    end.off = (real)(1.25f) * (fabs(radius - distance) +
-                               (real)(UNIT_ROUNDOFF) * ((real)(12) * distance + (real)(4) * radius +
-                                                        (real)(2) * center1 + (real)(6) * rounding));
+    end.off = CHORD_OFF_FACTOR * (fabs(radius - distance) +
+                                  (real)(UNIT_ROUNDOFF) * ((real)(12) * distance + (real)(4) * radius +
+                                                           (real)(2) * center1 + (real)(6) * rounding));
     real cosine = fabs(vector_dot(f, ray->direction)) * inverse * ray->inverse_length;
     real moved = divide_or(end.off, cosine, NEVER);
     end.normal = inverse * (moved + (real)(UNIT_ROUNDOFF) * ((real)(4) * center1 + (real)(2) * rounding)) +
                  (real)(16 * UNIT_ROUNDOFF);
-    mask usable = lanes & ((real)(16) * moved <= cosine * radius);
+    mask usable = lanes & (moved <= CHORD_MOVE_MAX * cosine * radius);
     end.radius = lanes_select(usable, radius, (real)(0));
     mask continues = usable & (hit->object == ray->left) & (ray->chord_turn < NEVER);
     end.place = lanes_select(continues, ray->chord_end_place + moved, NEVER);
@@ -68,18 +79,20 @@ static inline Chord chord_start(const ChordEnd *end, real place_error, real cosi
 {
     real moved = divide_or(end->off, cosine, NEVER);
     mask continues = end->turn < NEVER;
-    real sine_squared = real_min((real)(1.04f) - cosine * cosine, (real)(1));
-    // asin(s) / s: what an angle across the plane of incidence is unrolled to
-    real unrolled = (real)(1.01f) * real_fma((real)(0.571f), sine_squared, (real)(1));
+    real sine_squared = real_min((real)(1) + CHORD_TURN_MAX - cosine * cosine, (real)(1));
+    // asin(s) / s, what an angle across the plane of incidence is unrolled to: convex in s squared, from 1 to
+    // pi / 2
+    real unrolled = real_fma((real)(0.571f), sine_squared, (real)(1.0001f));
     real inverse = real_divide((real)(1), lanes_select(end->radius > (real)(0), end->radius, (real)(1)));
     real added = unrolled * (lanes_select(continues, turned, turned_first) + moved * inverse);
     real turn = lanes_select(continues, end->turn, (real)(0)) + added,
          place = lanes_select(continues, end->place, place_error) + moved;
-    real end_place = (real)(1.01f) * real_fma((real)(2) * end->radius, turn, place);
-    mask usable =
-        (end->radius > (real)(0)) & ((real)(16) * moved <= cosine * end->radius) & (turn <= (real)(0x1p-6f));
+    // roundings of these sums are below u of the radius; the ends' own bounds have more to spare
+    real end_place = real_fma((real)(2) * end->radius, turn, place);
+    mask usable = (end->radius > (real)(0)) & (moved <= CHORD_MOVE_MAX * cosine * end->radius) &
+                  (turn <= CHORD_TURN_MAX);
     return (Chord){lanes_select(usable, turn, NEVER), lanes_select(usable, end_place, NEVER),
-                   lanes_select(usable, (real)(1.01f) * real_fma(place, inverse, turn), NEVER)};
+                   lanes_select(usable, real_fma(place, inverse, turn), NEVER)};
 }
 
 #endif

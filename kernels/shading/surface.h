@@ -71,25 +71,22 @@ static inline mask shape_set_errors(const Scene *scene, uint kind, uint index, c
 }
 #endif
 
-#if IS_CERTIFIED
-// Where rays hit a sphere, in `lanes`.
-static inline void surface_set_chord_end(Surface *surface, const Scene *scene, uint index, const Ray *ray,
-                                         const Hit *hit, mask lanes, Vector position)
-{
-    Sphere sphere = scene->spheres[index];
-    ChordEnd end = chord_end(&sphere, ray, hit, position, lanes);
-    surface->place_error =
-        lanes_select(lanes, real_min(surface->place_error, end.place), surface->place_error);
-    surface->chord_end = chord_end_select(lanes, end, surface->chord_end);
-}
-#endif
-
 // The surface points of the lanes that hit the same object, or triangles of the same material.
 typedef struct {
     mask lanes;
     SurfacePoint point;
     TextureCoordinates coordinates; // of triangles only
 } LaneSurfacePoints;
+
+// Where rays hit a sphere.
+static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere, const Ray *ray,
+                                         const Hit *hit, const LaneSurfacePoints *found)
+{
+    ChordEnd end = chord_end(sphere, ray, hit, found->point.position, found->lanes);
+    surface->place_error =
+        lanes_select(found->lanes, real_min(surface->place_error, end.place), surface->place_error);
+    surface->chord_end = chord_end_select(found->lanes, end, surface->chord_end);
+}
 
 // Marks lanes that are done: larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
@@ -311,8 +308,10 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
         mask at_edge = mask_none();
 #if IS_CERTIFIED
-        if (HAS_CHORDS && entry.x == KIND_SPHERES)
-            surface_set_chord_end(&surface, scene, entry.y, ray, hit, found.lanes, found.point.position);
+        if (HAS_CHORDS && entry.x == KIND_SPHERES) {
+            Sphere sphere = scene->spheres[entry.y];
+            surface_set_chord_end(&surface, &sphere, ray, hit, &found);
+        }
         at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
 #endif
         surface_point_replace(&point, found.lanes, &found.point);

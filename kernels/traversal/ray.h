@@ -9,8 +9,8 @@
 // A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
 #define NEVER ((real)(LARGEST / 8))
 
-// Rays may run inside a sphere (shading/chords.h).
-#define HAS_CHORDS (HAS_SPHERES && (HAS_REFLECTION || HAS_TRANSMISSION))
+// Rays whose errors are bounded may run inside a sphere (shading/chords.h).
+#define HAS_CHORDS (IS_CERTIFIED && HAS_SPHERES && (HAS_REFLECTION || HAS_TRANSMISSION))
 
 typedef struct {
     Vector origin, direction; // the direction need not be unit
