@@ -263,7 +263,7 @@ static Scene scene_attacking(Family family, unsigned seed)
 }
 
 typedef struct {
-    size_t wrong, unlisted; // pixels; the latter are not listed as undecided
+    size_t wrong, wrong_decided; // pixels; the latter are not listed as undecided
     uint64_t repeated, undecided;
 } Answer;
 
@@ -280,7 +280,7 @@ static Answer answer(const Scene *scene, const CertifySample *reference, const R
     Film film;
     assert_true(renderer_render_film(renderer, AOVS, &film));
     const CertifyErrors errors = certify_compare(reference, &film);
-    const Answer counted = {errors.object + errors.shadow + errors.path, errors.unlisted,
+    const Answer counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
                             film.repeats.repeated, film.repeats.undecided};
     film_free(&film);
     renderer_close(renderer);
@@ -316,9 +316,9 @@ static void check_family(Family family)
             settings.perturb_seed = run == 2 ? 1 + seed : 0;
             if (run == 2 && !tests_are_long()) continue; // each seed takes three more kernels
             const Answer certified = answer(&scene, &reference, &settings);
-            if (certified.unlisted > 0)
+            if (certified.wrong_decided > 0)
                 fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not undecided",
-                         family_names[family], seed, run, certified.wrong, certified.unlisted);
+                         family_names[family], seed, run, certified.wrong, certified.wrong_decided);
             repeated += certified.repeated;
             undecided += certified.undecided;
         }
@@ -365,7 +365,7 @@ static void mirrors_glass_and_spots_are_decided(void **state)
 
 // What the certified images of the hard cases come to.
 typedef struct {
-    size_t images, compared, wrong, unlisted;
+    size_t images, compared, wrong, wrong_decided;
 } Pictures;
 
 static void picture_compare(void *context, const Scene *scene, const RenderSettings *settings)
@@ -377,13 +377,13 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
     RenderSettings certified = *settings;
     certified.precision = PRECISION_CERTIFIED;
     const Answer found = answer(scene, &reference, &certified);
-    if (found.unlisted > 0)
+    if (found.wrong_decided > 0)
         print_message("image %zu: %zu of %zu wrong, %zu of them not undecided\n", pictures->images,
-                      found.wrong, reference.count, found.unlisted);
+                      found.wrong, reference.count, found.wrong_decided);
     pictures->images++;
     pictures->compared += reference.count;
     pictures->wrong += found.wrong;
-    pictures->unlisted += found.unlisted;
+    pictures->wrong_decided += found.wrong_decided;
     certify_sample_close(&reference);
 }
 
@@ -403,9 +403,9 @@ static void hard_cases_are_decided(void **state)
         .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
     verify_run(&probe_compute, &settings, NULL, case_print, NULL);
     print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not undecided\n",
-                  pictures.images, pictures.compared, pictures.wrong, pictures.unlisted);
+                  pictures.images, pictures.compared, pictures.wrong, pictures.wrong_decided);
     assert_true(pictures.images > 100);
-    assert_int_equal(pictures.unlisted, 0);
+    assert_int_equal(pictures.wrong_decided, 0);
 }
 
 int main(int argc, char **argv)

@@ -31,7 +31,7 @@ static const char help_text[] =
     "usage: glint certify SCENE [OPTIONS]\n\n"
     "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
     "pixels: "
-    "objects, shadows, paths, colors.\n\n"
+    "objects, shadows, paths, colors.\nExit status 3: one is wrong that certified says it decides.\n\n"
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of fast, single, strict, double, certified (default: all that fit)\n" //
@@ -94,10 +94,8 @@ typedef struct {
     } rows[PRECISION_COUNT];
 } Certification;
 
-static void doubts_print(const CertifyErrors *errors, const CertifyDoubts *doubts)
+static void doubts_print(const CertifyDoubts *doubts)
 {
-    if (errors->unlisted > 0)
-        printf("             %zu wrong pixels are not listed as undecided\n", errors->unlisted);
     if (doubts->count == 0) return;
     printf(
         "             %zu pixels undecided; of %zu examined %zu change with errors of 2^-50, %zu are within "
@@ -112,7 +110,7 @@ static void text_print(const Certification *certification)
     const Device *device = certification->compute->device;
     size_t undecided = 0, textured = 0;
     for (size_t i = 0; i < sample->count; i++) {
-        undecided += certify_is_undecided(&sample->pixels[i]);
+        undecided += reference_is_undecided(&sample->pixels[i]);
         textured += sample->pixels[i].has_texture;
     }
     printf("%s, %s %s\n%s, %ux%u: %zu pixels, reference of %d bits in %.1f s", device->name,
@@ -133,7 +131,7 @@ static void text_print(const Certification *certification)
         if (errors->object + errors->shadow + errors->path > 0)
             printf("    %.2g of the distance", errors->margin);
         putchar('\n');
-        if (i == PRECISION_CERTIFIED) doubts_print(errors, &certification->rows[i].doubts);
+        if (i == PRECISION_CERTIFIED) doubts_print(&certification->rows[i].doubts);
     }
 }
 
@@ -157,7 +155,7 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_integer(json, "y", errors->worst[1]);
     json_end(json);
     if (precision == PRECISION_CERTIFIED) {
-        json_integer(json, "wrong_unlisted", (int64_t)errors->unlisted);
+        json_integer(json, "wrong_decided", (int64_t)errors->wrong_decided);
         json_begin_object(json, "undecided");
         json_integer(json, "pixels", (int64_t)doubts->count);
         json_integer(json, "examined", (int64_t)doubts->examined);
@@ -187,8 +185,8 @@ static void json_report(const Certification *certification)
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
     size_t undecided = 0;
     for (size_t i = 0; i < sample->count; i++)
-        undecided += certify_is_undecided(&sample->pixels[i]);
-    json_integer(json, "undecided", (int64_t)undecided);
+        undecided += reference_is_undecided(&sample->pixels[i]);
+    json_integer(json, "reference_undecided", (int64_t)undecided);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured)
@@ -236,6 +234,19 @@ static int precision_compare(Certification *certification, RenderSettings settin
                                     : EXIT_MACHINE;
 }
 
+// EXIT_CHECK, with a message, where `certified` is wrong in what it says it decides.
+static int decided_check(const CertifyErrors *certified)
+{
+    if (certified->wrong_decided == 0) return EXIT_DONE;
+    fprintf(
+        stderr,
+        "glint certify: certified is wrong at %zu pixels that it does not list as undecided, most at %u,%u: "
+        "%.2g of the distance\n",
+        certified->wrong_decided, certified->wrong_decided_place[0], certified->wrong_decided_place[1],
+        certified->wrong_decided_margin);
+    return EXIT_CHECK;
+}
+
 static int scene_certify(const CertifyOptions *options, const Scene *scene, Compute *compute)
 {
     Certification certification = {.options = options, .scene = scene, .compute = compute};
@@ -259,6 +270,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Comp
         json_report(&certification);
     else if (status == EXIT_DONE)
         text_print(&certification);
+    if (status == EXIT_DONE) status = decided_check(&certification.rows[PRECISION_CERTIFIED].errors);
     for (unsigned i = 0; i < PRECISION_COUNT; i++)
         free(certification.rows[i].failure);
     certify_sample_close(&certification.sample);

@@ -7,11 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool certify_is_undecided(const ReferencePixel *pixel)
-{
-    return pixel->margin < 0x1p-80;
-}
-
 // A pixel of a cell of the image, which is at least one pixel wide and high.
 static void place_choose(const CertifySample *sample, uint32_t columns, uint32_t rows, size_t index,
                          uint32_t place[2])
@@ -109,20 +104,26 @@ static bool is_wrong(const CertifySample *sample, size_t index, const Film *film
     return film->path[pixel] != expected->path;
 }
 
+static void wrong_decided_add(CertifyErrors *errors, const uint32_t place[2], double margin)
+{
+    errors->wrong_decided++;
+    if (errors->wrong_decided > 1 && margin <= errors->wrong_decided_margin) return;
+    errors->wrong_decided_margin = margin;
+    memcpy(errors->wrong_decided_place, place, sizeof errors->wrong_decided_place);
+}
+
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
 {
     CertifyErrors errors = {0};
     for (size_t i = 0; i < sample->count; i++) {
         const ReferencePixel *expected = &sample->pixels[i];
-        if (certify_is_undecided(expected)) {
-            errors.undecided++;
-            continue;
-        }
+        if (reference_is_undecided(expected)) continue;
         errors.compared++;
         const size_t pixel = (size_t)sample->places[i][1] * film->width + sample->places[i][0];
         const bool wrong = is_wrong(sample, i, film, pixel, &errors);
         if (wrong) errors.margin = fmax(errors.margin, expected->margin);
-        errors.unlisted += wrong && film->doubt[pixel] != DOUBT_UNDECIDED;
+        if (wrong && film->doubt[pixel] != DOUBT_UNDECIDED)
+            wrong_decided_add(&errors, sample->places[i], expected->margin);
         if (expected->has_texture) continue;
         errors.colors++;
         const double error = color_error(film->color + 3 * pixel, &expected->color);

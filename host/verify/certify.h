@@ -14,9 +14,6 @@ typedef struct {
     bool *shadows; // of each pixel, for each light
 } CertifySample;
 
-// A decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
-bool certify_is_undecided(const ReferencePixel *pixel);
-
 // One pixel of each of about `count` equal parts of the image, at a place that a hash chooses; all of it if
 // it has no more. Computes on all processors. False if `stop` returned true; there is nothing to close then.
 bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
@@ -25,7 +22,7 @@ void certify_sample_close(CertifySample *sample);
 
 // Of an image, all numbers of pixels. A pixel is wrong in one way at most, the first of these.
 typedef struct {
-    size_t compared, undecided; // those compared are decided
+    size_t compared;
     size_t object, shadow, path;
     size_t colors;      // of pixels without a texture, right or wrong
     double color;       // the largest error of a channel where nothing is wrong
@@ -34,7 +31,10 @@ typedef struct {
     // Of wrong pixels: how far the exact ray is from the curve at which its answer changes, the most, in
     // parts of the distance. What single may see wrong is at most some units of roundoff from it.
     double margin;
-    size_t unlisted; // wrong pixels that AOV_DOUBT does not list as undecided
+    // Wrong pixels that AOV_DOUBT does not list as undecided, and which of them has the largest margin.
+    size_t wrong_decided;
+    uint32_t wrong_decided_place[2];
+    double wrong_decided_margin;
 } CertifyErrors;
 
 // `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color.

@@ -302,6 +302,11 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
     if (transmission > 0) add_path(tree, &refracted, hit.object, weight * transmission, bounces_left - 1);
 }
 
+bool reference_is_undecided(const ReferencePixel *pixel)
+{
+    return pixel->margin < 0x1p-80;
+}
+
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
                                const ReferencePath *path, bool *shadows)
 {

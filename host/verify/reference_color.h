@@ -37,6 +37,9 @@ typedef struct {
     bool has_texture; // somewhere on its way, where the color is undefined: textures are filtered, not exact
 } ReferencePixel;
 
+// A decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
+bool reference_is_undecided(const ReferencePixel *pixel);
+
 // `shadows`: of each light, true where it does not reach the surface; undefined without one. Or NULL.
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
                                const ReferencePath *path, bool *shadows);
