@@ -472,6 +472,12 @@ static void test_unwritable(void **state)
     file_write_bytes(path, "in the way", 10);
     store(key);
     assert_false(loads(key));
+    CacheEntries entries;
+    MessageList messages = {0};
+    assert_false(cache_list(&entries, &messages));
+    assert_int_equal(messages.count, 1);
+    assert_non_null(strstr(messages.items[0].text, "is not used: Not a directory"));
+    message_list_free(&messages);
     free(path);
 }
 

@@ -35,7 +35,7 @@ f 1 2 3
 f 1 3 4
 f 4 2 1
 """
-# Launches fail as long as there is a file of this name; files cannot be watched if there is one of that name.
+# Launches fail as long as there is a file `fails`; files cannot be watched if there is one `unwatched`, folders if `folders`.
 FAILING_CALLS = """\
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -55,6 +55,13 @@ int inotify_init1(int flags)
     int (*init)(int) = dlsym(RTLD_NEXT, "inotify_init1");
     if (access("unwatched", F_OK) != 0) return init(flags);
     errno = EMFILE;
+    return -1;
+}
+int inotify_add_watch(int notify, const char *folder, unsigned events)
+{
+    int (*add)(int, const char *, unsigned) = dlsym(RTLD_NEXT, "inotify_add_watch");
+    if (access("folders", F_OK) != 0) return add(notify, folder, events);
+    errno = ENOSPC;
     return -1;
 }
 """
@@ -417,6 +424,17 @@ class View(TestCase):
         window.line("^glint: warning: changes of files are not seen: Too many open files")
         window.check()
         window.close()
+
+    def test_unwatched_folders(self):
+        """Once, however many files they hold."""
+        write("folders", "")
+        window = Window(self, LD_PRELOAD=self.failing_calls())
+        warning = "^glint: warning: changes of .* are not seen: No space left"
+        window.line(warning)
+        window.saved()
+        window.close()
+        window.reader.join()
+        self.assertEqual([line for line in iter(window.lines.get_nowait, "") if re.match(warning, line)], [])
 
     def test_failing_device(self):
         """Its message is shown, and the window stays; the next movement tries again."""

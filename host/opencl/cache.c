@@ -119,7 +119,7 @@ static int folder_open(bool makes, MessageList *messages)
         why = fstat(folder, &status) == 0 ? distrust(&status, S_IFDIR) : "it has no status";
     else if (lstat(path, &status) == 0 && S_ISLNK(status.st_mode))
         why = "a symbolic link";
-    else if (error != ENOENT && error != ENOTDIR)
+    else if (error != ENOENT)
         why = strerror(error);
     if (why) {
         message_add(messages, MESSAGE_WARNING, "the kernel cache '%s' is not used: %s", path, why);
@@ -295,6 +295,26 @@ void cache_entries_free(CacheEntries *entries)
     *entries = (CacheEntries){0};
 }
 
+// The next name in a folder; NULL at its end, where errno is 0, or on failure.
+static const char *folder_next(DIR *items)
+{
+    errno = 0;
+    const struct dirent *item = readdir(items);
+    return item ? item->d_name : NULL;
+}
+
+// Adds a file of the folder if its name is an entry's.
+static void entries_add(CacheEntries *entries, int folder, const char *name)
+{
+    struct stat status;
+    if (!starts_with_entry_name(name) || name[ENTRY_NAME_LENGTH] != '\0') return;
+    if (fstatat(folder, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || S_ISDIR(status.st_mode)) return;
+    const CacheEntry entry = {
+        .name = memory_copy_text(name), .size = (uint64_t)status.st_size, .used = status.st_mtim};
+    array_push(*entries, entry);
+    entries->size += entry.size;
+}
+
 // Lists the entries, the least recently used first, and removes stale temporaries; other files are not ours.
 // False, with a message and no entries, if the folder cannot be read to its end.
 static bool entries_list(CacheEntries *entries, int folder, MessageList *messages)
@@ -302,18 +322,11 @@ static bool entries_list(CacheEntries *entries, int folder, MessageList *message
     *entries = (CacheEntries){0};
     int descriptor = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *items = descriptor < 0 ? NULL : fdopendir(descriptor);
-    for (const struct dirent *item; items && (errno = 0, item = readdir(items)) != NULL;) {
-        struct stat status;
-        if (is_temporary(item->d_name)) output_remove_stale(folder, item->d_name);
-        if (!starts_with_entry_name(item->d_name) || item->d_name[ENTRY_NAME_LENGTH] != '\0') continue;
-        if (fstatat(folder, item->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue;
-        if (S_ISDIR(status.st_mode)) continue;
-        array_push(*entries, ((CacheEntry){.name = memory_copy_text(item->d_name),
-                                           .size = (uint64_t)status.st_size,
-                                           .used = status.st_mtim}));
-        entries->size += (uint64_t)status.st_size;
+    for (const char *name = items ? folder_next(items) : NULL; name; name = folder_next(items)) {
+        if (is_temporary(name)) output_remove_stale(folder, name);
+        entries_add(entries, folder, name);
     }
-    const int error = errno; // of what came last, which may be the end
+    const int error = errno; // of what came last
     if (items) closedir(items);
     if (!items && descriptor >= 0) close(descriptor);
     if (error != 0) {

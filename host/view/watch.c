@@ -26,7 +26,8 @@ struct Watch {
     void *context;
     int notify, end; // inotify; an event that ends the thread
     pthread_t thread;
-    pthread_mutex_t mutex; // of the files
+    pthread_mutex_t mutex; // of what follows
+    bool has_failed;       // a folder cannot be watched, which is reported once
     struct {
         WatchedFile *items;
         size_t count, capacity;
@@ -88,9 +89,9 @@ static void watch_free(Watch *watch)
     free(watch);
 }
 
-static void failure_print(const char *files, int error)
+static void failure_print(const char *files, const char *more, int error)
 {
-    fprintf(stderr, "glint: warning: changes of %s are not seen: %s\n", files, strerror(error));
+    fprintf(stderr, "glint: warning: changes of %s%s are not seen: %s\n", files, more, strerror(error));
 }
 
 Watch *watch_open(void (*changed)(void *context), void *context)
@@ -103,7 +104,7 @@ Watch *watch_open(void (*changed)(void *context), void *context)
     watch->end = watch->notify < 0 ? -1 : eventfd(0, EFD_CLOEXEC);
     const int error = watch->end < 0 ? errno : pthread_create(&watch->thread, NULL, watch_run, watch);
     if (error == 0) return watch;
-    failure_print("files", error);
+    failure_print("files", "", error);
     watch_free(watch);
     return NULL;
 }
@@ -127,8 +128,12 @@ static void file_add(Watch *watch, const char *path)
     int descriptor = inotify_add_watch(watch->notify, folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
     const int error = errno;
     free(folder);
-    if (descriptor < 0 && error != ENOENT) failure_print(path, error); // who reads it says that it is missing
-    if (descriptor < 0) return;
+    if (descriptor < 0) {
+        // who reads a file says that it is missing
+        if (error != ENOENT && !watch->has_failed) failure_print(path, " and perhaps of others", error);
+        watch->has_failed |= error != ENOENT;
+        return;
+    }
     WatchedFile file = {descriptor, memory_copy_text(slash ? slash + 1 : path)};
     array_push(watch->files, file);
 }
