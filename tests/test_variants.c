@@ -150,16 +150,6 @@ static const struct {
                 "  material: {image: scenes/images/globe.png, size: 0.7}}}]\n"},
 };
 
-static Scene scene_with_warnings(const char *text)
-{
-    MessageList messages = {0};
-    Source source = {"feature.yaml", text, strlen(text)};
-    Scene scene;
-    assert_true(scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages));
-    message_list_free(&messages);
-    return scene;
-}
-
 // Each build there is for one feature alone, and some for two, against the one build with all.
 static void features_alone_and_all_together_agree(void **state)
 {
@@ -168,7 +158,7 @@ static void features_alone_and_all_together_agree(void **state)
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     const size_t count = sizeof feature_scenes / sizeof *feature_scenes;
     for (size_t i = 0; i < count - (tests_are_long() ? 0 : LONG_SCENES); i++) {
-        Scene scene = scene_with_warnings(feature_scenes[i].text);
+        Scene scene = scene_of_text("feature.yaml", feature_scenes[i].text);
         assert_int_equal(features_of(&scene), feature_scenes[i].features);
         seen |= feature_scenes[i].features;
 
@@ -184,7 +174,7 @@ static void features_alone_and_all_together_agree(void **state)
     assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS, FEATURE_ALL);
 
     // No scene needs checkers alone: built in without need, on an empty scene.
-    Scene empty = scene_with_warnings(SCENE_HEAD);
+    Scene empty = scene_of_text("feature.yaml", SCENE_HEAD);
     settings.extra_features = FEATURE_CHECKERS;
     Film checkers = render(&empty, &settings);
     settings.extra_features = FEATURE_ALL;
@@ -192,20 +182,6 @@ static void features_alone_and_all_together_agree(void **state)
     same_and_freed(&checkers, &general, "checkers alone");
     film_free(&general);
     scene_free(&empty);
-}
-
-static void bvh_changes_nothing(void **state)
-{
-    (void)state;
-    for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
-        settings.bvh = BVH_OFF;
-        Film expected = render(&every_shape, &settings);
-        settings.bvh = BVH_ON;
-        Film film = render(&every_shape, &settings);
-        same_and_freed(&film, &expected, "through a BVH");
-        film_free(&expected);
-    }
 }
 
 static void bands_agree(void **state)
@@ -278,42 +254,7 @@ static void regions_are_cuts_of_the_whole(void **state)
     film_free(&whole);
 }
 
-static void runs_repeat(void **state)
-{
-    (void)state;
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_FAST);
-    Film first = render(&every_shape, &settings);
-    for (unsigned run = 0; run < 5; run++) {
-        Film film = render(&every_shape, &settings);
-        same_and_freed(&film, &first, "repeated at fast");
-    }
-    film_free(&first);
-}
-
-// Hard case R6 (docs/verify.md): nothing in the kernels has a length of its own; beyond what its squares can
-// take a scene is scaled.
-static void scale_changes_nothing(void **state)
-{
-    (void)state;
-    static const int exponents[] = {-90, -40, -20, -10, -3, 3, 10, 20, 40, 90};
-    for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
-        Film expected = render(&every_shape, &settings);
-        for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
-            Scene scene = scene_of_file("tests/scenes/every_shape.yaml");
-            scene_scale(&scene, ldexp(1, exponents[i]));
-            char what[64];
-            snprintf(what, sizeof what, "%s, scaled by 2^%d", precision_names[settings.precision],
-                     exponents[i]);
-            Film film = render(&scene, &settings);
-            same_and_freed(&film, &expected, what);
-            scene_free(&scene);
-        }
-        film_free(&expected);
-    }
-}
-
-// Hard case R7.
+// Hard case R7 (docs/verify.md).
 static void mirror_gives_the_mirrored_image(void **state)
 {
     (void)state;
@@ -334,25 +275,6 @@ static void mirror_gives_the_mirrored_image(void **state)
     scene_free(&mirrored);
 }
 
-// Objects that touch and pierce each other, in another order. (Of surfaces that coincide the earlier is
-// seen.)
-static void order_of_objects_changes_nothing(void **state)
-{
-    (void)state;
-    Scene reversed = scene_of_file("tests/scenes/every_shape.yaml");
-    for (size_t i = 0; i < reversed.objects.count / 2; i++) {
-        Object *a = &reversed.objects.items[i], *b = &reversed.objects.items[reversed.objects.count - 1 - i];
-        Object first = *a;
-        *a = *b;
-        *b = first;
-    }
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_STRICT);
-    Film expected = render(&every_shape, &settings), film = render(&reversed, &settings);
-    same_and_freed(&film, &expected, "objects in reverse");
-    film_free(&expected);
-    scene_free(&reversed);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -360,14 +282,10 @@ int main(void)
         cmocka_unit_test(lanes_agree),
         cmocka_unit_test(lanes_agree_on_aovs),
         cmocka_unit_test(features_alone_and_all_together_agree),
-        cmocka_unit_test(bvh_changes_nothing),
         cmocka_unit_test(bands_agree),
         cmocka_unit_test(launches_of_samples_agree),
         cmocka_unit_test(regions_are_cuts_of_the_whole),
-        cmocka_unit_test(runs_repeat),
-        cmocka_unit_test(scale_changes_nothing),
         cmocka_unit_test(mirror_gives_the_mirrored_image),
-        cmocka_unit_test(order_of_objects_changes_nothing),
     };
     return cmocka_run_group_tests(tests, variants_open, variants_close);
 }
