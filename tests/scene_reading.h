@@ -10,12 +10,12 @@ bool scene_read_text(Scene *scene, const char *name, const Text *text, bool leni
 // A message as tests write it: `line:column: severity: text`, without a place where it has none.
 void message_describe(Text *description, const Message *message);
 
-// All messages that a text gets, one a line. Whether the scene was read must agree with them.
+// All messages that a text gets, one per line. Whether the scene was read must agree with them.
 Text scene_messages(const char *name, const char *text, bool lenient);
 
 // A scene that must be read without any message; `name` relative to the repository.
 Scene scene_of_file(const char *path);
-// The same from a text.
+// The same from a text, which may get warnings.
 Scene scene_of_text(const char *name, const char *text);
 
 // The scene of a file that has all of its format, for the tests of a group.

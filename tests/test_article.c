@@ -1,9 +1,9 @@
 // The faults of the article's own program. Each test writes out its formula, in float as its kernel has it,
 // shows that the answer is wrong by the reference, and holds glint to the right one on the same `.cfg` scene.
 // run_tests: sanitize-long-only
-#include "host/import/load.h"
 #include "host/verify/reference_color.h"
 #include "tests/probe.h"
+#include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -65,14 +65,7 @@ static float article_cone(Float3 apex, Float3 axis, float angle, Float3 o, Float
 
 static Scene read_scene(const char *text)
 {
-    Scene scene;
-    MessageList messages = {0};
-    const Source source = {"article.cfg", text, strlen(text)};
-    bool read = scene_read_cfg(&scene, &source, &messages);
-    message_list_print(&messages, stderr);
-    message_list_free(&messages);
-    assert_true(read);
-    return scene;
+    return scene_of_text("article.cfg", text);
 }
 
 // The reference's hit, after comparing glint's with it at `single`.

@@ -194,8 +194,14 @@ static cl_program culling_program(bool is_double)
     return program;
 }
 
-static void culling_check(bool is_double, bool from_eye)
+typedef struct {
+    bool is_double, from_eye;
+} Variant;
+
+static void culling_check(void **state)
 {
+    const Variant *variant = *state;
+    const bool is_double = variant->is_double, from_eye = variant->from_eye;
     if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
     cl_program program = culling_program(is_double);
     Trial trial = {.is_double = is_double,
@@ -218,37 +224,13 @@ static void culling_check(bool is_double, bool from_eye)
     clReleaseProgram(program);
 }
 
-static void from_the_eye(void **state)
-{
-    (void)state;
-    culling_check(false, true);
-}
-
-static void from_the_eye_in_double(void **state)
-{
-    (void)state;
-    culling_check(true, true);
-}
-
-static void to_a_light(void **state)
-{
-    (void)state;
-    culling_check(false, false);
-}
-
-static void to_a_light_in_double(void **state)
-{
-    (void)state;
-    culling_check(true, false);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(from_the_eye),
-        cmocka_unit_test(from_the_eye_in_double),
-        cmocka_unit_test(to_a_light),
-        cmocka_unit_test(to_a_light_in_double),
+        {"from_the_eye", culling_check, NULL, NULL, &(Variant){false, true}},
+        {"from_the_eye_in_double", culling_check, NULL, NULL, &(Variant){true, true}},
+        {"to_a_light", culling_check, NULL, NULL, &(Variant){false, false}},
+        {"to_a_light_in_double", culling_check, NULL, NULL, &(Variant){true, false}},
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -3,7 +3,6 @@
 // run_tests: sanitize-long-only
 #include "host/base/text.h"
 #include "host/compile/camera_basis.h"
-#include "host/import/load.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
@@ -17,14 +16,7 @@
 
 static Scene scene_of(const char *text)
 {
-    MessageList messages = {0};
-    Source source = {"image.yaml", text, strlen(text)};
-    Scene scene;
-    bool read = scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages);
-    if (!read) message_list_print(&messages, stderr);
-    message_list_free(&messages); // warnings are not the point here
-    assert_true(read);
-    return scene;
+    return scene_of_text("image.yaml", text);
 }
 
 // The case that a failing check belongs to.
@@ -54,6 +46,21 @@ static void at_each_precision(void (*run)(Precision precision))
     }
 }
 
+typedef void (*Check)(Precision precision);
+
+static void run_at_each_precision(void **state)
+{
+    at_each_precision(*(const Check *)*state);
+}
+
+#define AT_EACH_PRECISION(check)                                                                             \
+    {                                                                                                        \
+#check, run_at_each_precision, NULL, NULL, &(Check)                                                  \
+        {                                                                                                    \
+            check                                                                                            \
+        }                                                                                                    \
+    }
+
 static bool near(double value, double expected, double tolerance)
 {
     return fabs(value - expected) <= tolerance;
@@ -67,7 +74,7 @@ static Vector3 film_place(const Film *film, const Scene *scene, size_t pixel)
 }
 
 // Numbers that float holds exactly: the answer is exact at every precision.
-static void background_and_ambient_at(Precision precision)
+static void background_and_ambient(Precision precision)
 {
     Scene scene =
         scene_of("camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 90}\n"
@@ -94,14 +101,8 @@ static void background_and_ambient_at(Precision precision)
     scene_free(&scene);
 }
 
-static void background_and_ambient(void **state)
-{
-    (void)state;
-    at_each_precision(background_and_ambient_at);
-}
-
 // A light straight above a plane, seen from above: kd C I N.L, and with ks the whole highlight in the middle.
-static void light_above_plane_at(Precision precision)
+static void light_above_plane(Precision precision)
 {
     Scene scene =
         scene_of("camera: {position: [0, 2, 0], look_at: [0, 0, 0], up: [0, 0, 1], fov: 90}\n"
@@ -132,15 +133,9 @@ static void light_above_plane_at(Precision precision)
     scene_free(&scene);
 }
 
-static void light_above_plane(void **state)
-{
-    (void)state;
-    at_each_precision(light_above_plane_at);
-}
-
 // R1: a sphere standing on a plane, a light above: the shadow's radius is 10 / sqrt(80), and it reaches the
 // contact.
-static void contact_shadow_at(Precision precision)
+static void contact_shadow(Precision precision)
 {
     Scene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
                            "lights: [{point: {position: [0, 10, 0]}}]\n"
@@ -170,15 +165,9 @@ static void contact_shadow_at(Precision precision)
     scene_free(&scene);
 }
 
-static void contact_shadow(void **state)
-{
-    (void)state;
-    at_each_precision(contact_shadow_at);
-}
-
 // A spot straight down on a plane from height 5: the cone of 30 degrees meets it in a circle of radius 5 tan
 // 30, full within 5 tan 20 where the penumbra is 10 degrees wide.
-static void spot_cone_at(Precision precision)
+static void spot_cone(Precision precision)
 {
     Scene scene =
         scene_of("camera: {position: [0.3, 6, -0.4], look_at: [0.2, 0, 0.1], up: [0, 0, 1], fov: 70}\n"
@@ -205,12 +194,6 @@ static void spot_cone_at(Precision precision)
     film_free(&soft);
     film_free(&hard);
     scene_free(&scene);
-}
-
-static void spot_cone(void **state)
-{
-    (void)state;
-    at_each_precision(spot_cone_at);
 }
 
 // What Phong's term is at the surface that the film says lies behind a pixel.
@@ -241,7 +224,7 @@ static long double highlight_of(const Film *film, const Scene *scene, size_t pix
 
 // R5: highlights of every sharpness on a sphere; never below 0 nor above ks, nor NaN. Light and eye are as
 // far from the center, so that the peak lies halfway between; the field of view narrows with the highlight.
-static void highlight_at(Precision precision)
+static void highlight(Precision precision)
 {
     static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
     Scene scene = scene_of(
@@ -276,15 +259,9 @@ static void highlight_at(Precision precision)
     scene_free(&scene);
 }
 
-static void highlight(void **state)
-{
-    (void)state;
-    at_each_precision(highlight_at);
-}
-
 // P2: a tilted plane of size S at distance O from the world's origin, under a low sun: not one pixel shadows
 // itself.
-static void tilted_plane_at(Precision precision)
+static void tilted_plane(Precision precision)
 {
     static const double pairs[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
     static const double elevations[] = {0.01, 1, 45};
@@ -321,14 +298,8 @@ static void tilted_plane_at(Precision precision)
     scene_free(&scene);
 }
 
-static void tilted_plane(void **state)
-{
-    (void)state;
-    at_each_precision(tilted_plane_at);
-}
-
 // The eye and a light inside a closed shape: all of it is seen and lit.
-static void inside_at(Precision precision)
+static void inside(Precision precision)
 {
     static const char *const shapes[] = {
         "sphere: {center: [0, 0, 0], radius: 2}",
@@ -358,12 +329,6 @@ static void inside_at(Precision precision)
     }
 }
 
-static void inside(void **state)
-{
-    (void)state;
-    at_each_precision(inside_at);
-}
-
 // Whether a ray from the eye at (0, 1, 0) meets the surface y = -1e6 + sqrt((1e6 + slope x)^2 - z^2).
 static bool meets_ground(const double *direction, double slope)
 {
@@ -375,7 +340,7 @@ static bool meets_ground(const double *direction, double slope)
 
 // Ground that is a cylinder or a cone: in every column the horizon is within a row of the exact one. Next to
 // the side the plain discriminant tears it (S4 has the sphere's).
-static void ground_horizon_at(Precision precision)
+static void ground_horizon(Precision precision)
 {
     static const struct {
         const char *view;
@@ -405,12 +370,6 @@ static void ground_horizon_at(Precision precision)
         film_free(&film);
         scene_free(&scene);
     }
-}
-
-static void ground_horizon(void **state)
-{
-    (void)state;
-    at_each_precision(ground_horizon_at);
 }
 
 static double basis_error(const Camera *camera)
@@ -572,14 +531,14 @@ static void distance_from_origin_changes_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(background_and_ambient),
-        cmocka_unit_test(light_above_plane),
-        cmocka_unit_test(contact_shadow),
-        cmocka_unit_test(spot_cone),
-        cmocka_unit_test(highlight),
-        cmocka_unit_test(tilted_plane),
-        cmocka_unit_test(inside),
-        cmocka_unit_test(ground_horizon),
+        AT_EACH_PRECISION(background_and_ambient),
+        AT_EACH_PRECISION(light_above_plane),
+        AT_EACH_PRECISION(contact_shadow),
+        AT_EACH_PRECISION(spot_cone),
+        AT_EACH_PRECISION(highlight),
+        AT_EACH_PRECISION(tilted_plane),
+        AT_EACH_PRECISION(inside),
+        AT_EACH_PRECISION(ground_horizon),
         cmocka_unit_test(facing_panes),
         cmocka_unit_test(degenerate_cameras),
         cmocka_unit_test(single_pixel_and_extreme_fields),

@@ -188,8 +188,10 @@ static size_t member_offset(const Member *member, const FlatLayout *layout, bool
     return member->host_offset - reals_size / 2;
 }
 
-static void layout_check(bool is_double)
+static void layout_check(void **state)
 {
+    const bool is_double = *(const bool *)*state;
+    if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, is_double);
     cl_program program = program_make(is_double);
@@ -256,8 +258,10 @@ static void member_check(cl_program program, size_t index, void *bytes, size_t s
     }
 }
 
-static void values_check(bool is_double)
+static void values_check(void **state)
 {
+    const bool is_double = *(const bool *)*state;
+    if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, is_double);
     cl_program program = program_make(is_double);
@@ -318,41 +322,15 @@ static void arrays_taken_are_arrays_written(void **state)
     }
 }
 
-static void layout_in_float(void **state)
-{
-    (void)state;
-    layout_check(false);
-}
-
-static void layout_in_double(void **state)
-{
-    (void)state;
-    if (!probe_has(PRECISION_DOUBLE)) skip();
-    layout_check(true);
-}
-
-static void values_in_float(void **state)
-{
-    (void)state;
-    values_check(false);
-}
-
-static void values_in_double(void **state)
-{
-    (void)state;
-    if (!probe_has(PRECISION_DOUBLE)) skip();
-    values_check(true);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(arrays_taken_are_arrays_written),
         cmocka_unit_test(list_is_complete),
-        cmocka_unit_test(layout_in_float),
-        cmocka_unit_test(layout_in_double),
-        cmocka_unit_test(values_in_float),
-        cmocka_unit_test(values_in_double),
+        {"layout_in_float", layout_check, NULL, NULL, &(bool){false}},
+        {"layout_in_double", layout_check, NULL, NULL, &(bool){true}},
+        {"values_in_float", values_check, NULL, NULL, &(bool){false}},
+        {"values_in_double", values_check, NULL, NULL, &(bool){true}},
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -56,8 +56,11 @@ static void check_scene(const char *folder, const char *name)
     text_free(&expected);
 }
 
-static void check_folder(const char *folder, const char *ending)
+static void check_folder(void **state)
 {
+    char folder[32], ending[8];
+    snprintf(folder, sizeof folder, "tests/broken/%s", (const char *)*state);
+    snprintf(ending, sizeof ending, ".%s", (const char *)*state);
     DIR *entries = opendir(folder);
     assert_non_null(entries);
     size_t count = 0;
@@ -68,30 +71,6 @@ static void check_folder(const char *folder, const char *ending)
     }
     closedir(entries);
     assert_in_range(count, BROKEN_SCENES_MIN, SIZE_MAX);
-}
-
-static void test_yaml(void **state)
-{
-    (void)state;
-    check_folder("tests/broken/yaml", ".yaml");
-}
-
-static void test_rt(void **state)
-{
-    (void)state;
-    check_folder("tests/broken/rt", ".rt");
-}
-
-static void test_cfg(void **state)
-{
-    (void)state;
-    check_folder("tests/broken/cfg", ".cfg");
-}
-
-static void test_nff(void **state)
-{
-    (void)state;
-    check_folder("tests/broken/nff", ".nff");
 }
 
 // The longest literal part of a format, which identifies the message.
@@ -176,12 +155,9 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_yaml),
-        cmocka_unit_test(test_rt),
-        cmocka_unit_test(test_cfg),
-        cmocka_unit_test(test_nff),
-        cmocka_unit_test(test_every_message_has_a_scene),
-        cmocka_unit_test(test_names),
+        {"test_yaml", check_folder, NULL, NULL, "yaml"},  {"test_rt", check_folder, NULL, NULL, "rt"},
+        {"test_cfg", check_folder, NULL, NULL, "cfg"},    {"test_nff", check_folder, NULL, NULL, "nff"},
+        cmocka_unit_test(test_every_message_has_a_scene), cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

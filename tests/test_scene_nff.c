@@ -135,28 +135,22 @@ static void test_polygons(void **state)
     }
 }
 
-static void check_messages(const char *text, const char *expected)
-{
-    Text messages = scene_messages("s.nff", text, false);
-    assert_string_equal(text_c(&messages), expected);
-    text_free(&messages);
-}
-
 static void test_tolerated(void **state)
 {
     (void)state;
-    check_messages(LIT MATERIAL SPHERE, "");
-    check_messages("\xEF\xBB\xBF" LIT MATERIAL SPHERE, "");
-    check_messages("v from 0 0 -5 \r\n at\t0 0 0\r\nangle 45\r\nup 0 1 0 # no hither\r\nl 0 9 0\r\n" MATERIAL
-                   "s 0 0\r\n0 1\r\n",
-                   "");
-    check_messages(LIT SPHERE SPHERE, "7:1: warning: no material stands before this: white\n");
-    check_messages(LIT MATERIAL "p 3\n0 0 0\n1 1 1\n2 2 2\n" SPHERE,
-                   "8:1: warning: a polygon without area is never hit\n");
-    check_messages(LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",
-                   "8:1: warning: the polygon crosses itself: filled as far as it can be\n");
-    check_messages(LIT, "warning: s.nff: no objects\n");
-    check_messages(VIEW MATERIAL SPHERE, "warning: s.nff: no lights\n");
+    assert_messages("s.nff", LIT MATERIAL SPHERE, "");
+    assert_messages("s.nff", "\xEF\xBB\xBF" LIT MATERIAL SPHERE, "");
+    assert_messages("s.nff",
+                    "v from 0 0 -5 \r\n at\t0 0 0\r\nangle 45\r\nup 0 1 0 # no hither\r\nl 0 9 0\r\n" MATERIAL
+                    "s 0 0\r\n0 1\r\n",
+                    "");
+    assert_messages("s.nff", LIT SPHERE SPHERE, "7:1: warning: no material stands before this: white\n");
+    assert_messages("s.nff", LIT MATERIAL "p 3\n0 0 0\n1 1 1\n2 2 2\n" SPHERE,
+                    "8:1: warning: a polygon without area is never hit\n");
+    assert_messages("s.nff", LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",
+                    "8:1: warning: the polygon crosses itself: filled as far as it can be\n");
+    assert_messages("s.nff", LIT, "warning: s.nff: no objects\n");
+    assert_messages("s.nff", VIEW MATERIAL SPHERE, "warning: s.nff: no lights\n");
 }
 
 static void check_sides(const char *shape, double reach, bool only_inside)
