@@ -1,5 +1,6 @@
 // The statistic of glint bench on synthetic times: how often it reports a difference where there is none,
 // how often it finds one, and that it says so where it cannot know. Seeded, so that each run is the same.
+#include "host/compile/random_shape.h"
 #include "host/measure/comparison.h"
 
 #include <math.h>
@@ -10,15 +11,11 @@
 
 #include <cmocka.h>
 
-static uint64_t random_state;
+static Random generator;
 
-// splitmix64 (Steele, Lea, Flood: "Fast Splittable Pseudorandom Number Generators", 2014), in [0, 1).
 static double random_unit(void)
 {
-    uint64_t z = random_state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+    return random_between(&generator, 0, 1);
 }
 
 static double random_normal(void)
@@ -122,7 +119,7 @@ typedef struct {
 static Counts against_count(Machine machine, double slowdown, int tries)
 {
     Counts counts = {{0}};
-    random_state = 1;
+    generator.state = 1;
     for (int i = 0; i < tries; i++)
         counts.of[against_simulate(machine, slowdown, 1.02)]++;
     return counts;
@@ -131,7 +128,7 @@ static Counts against_count(Machine machine, double slowdown, int tries)
 static Counts reports_count(Machine old_machine, Machine new_machine, double slowdown, int tries)
 {
     Counts counts = {{0}};
-    random_state = 1;
+    generator.state = 1;
     for (int i = 0; i < tries; i++)
         counts.of[reports_simulate(old_machine, new_machine, slowdown, 1.1)]++;
     return counts;

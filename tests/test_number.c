@@ -1,4 +1,5 @@
 // Numbers of scenes are the nearest doubles: those of the C library, however they are written.
+#include "host/compile/random_shape.h"
 #include "host/import/number.h"
 
 #include <math.h>
@@ -26,27 +27,21 @@ static void check(const char *text)
     }
 }
 
-static uint64_t random_state = 1;
-
-static uint64_t random_bits(void)
-{
-    random_state ^= random_state << 13;
-    random_state ^= random_state >> 7;
-    random_state ^= random_state << 17;
-    return random_state;
-}
-
 static void random_numbers_are_nearest(void **state)
 {
     (void)state;
+    Random random = {1};
     for (int i = 0; i < 200000; i++) {
         char text[64];
-        const int digits = (int)(random_bits() % 18);
-        const double number = ldexp((double)(int64_t)random_bits(), (int)(random_bits() % 60) - 90);
+        const int digits = (int)(random_bits(&random) % 18);
+        const double number =
+            ldexp((double)(int64_t)random_bits(&random), (int)(random_bits(&random) % 60) - 90);
         snprintf(text, sizeof text, i % 3 == 0 ? "%.*e" : i % 3 == 1 ? "%.*f" : "%.*g", digits, number);
         check(text);
-        snprintf(text, sizeof text, "%ju.%jue%d", (uintmax_t)(random_bits() >> random_bits() % 64),
-                 (uintmax_t)(random_bits() >> random_bits() % 64), (int)(random_bits() % 60) - 40);
+        snprintf(text, sizeof text, "%ju.%jue%d",
+                 (uintmax_t)(random_bits(&random) >> random_bits(&random) % 64),
+                 (uintmax_t)(random_bits(&random) >> random_bits(&random) % 64),
+                 (int)(random_bits(&random) % 60) - 40);
         check(text);
     }
 }

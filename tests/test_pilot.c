@@ -1,4 +1,5 @@
 // The sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it chooses.
+#include "host/compile/random_shape.h"
 #include "host/measure/pilot.h"
 #include "tests/film.h"
 #include "tests/probe.h"
@@ -51,12 +52,6 @@ static void sample_has_a_pixel_of_each_cell(void **state)
     scene_free(&scene);
 }
 
-static double random_unit(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) * 0x1p-53;
-}
-
 static void bound_of_zeros_and_ones(void **state)
 {
     (void)state;
@@ -78,7 +73,7 @@ static void bound_covers_the_mean(void **state)
     (void)state;
     enum { TRIALS = 2000, COUNT = 400 };
     const double risk = 0.1;
-    uint64_t seed = 3;
+    Random random = {3};
     for (int kind = 0; kind < 3; kind++) {
         unsigned missed = 0;
         double values[COUNT], mean = 0, bounds = 0;
@@ -88,7 +83,7 @@ static void bound_covers_the_mean(void **state)
         for (int trial = 0; trial < TRIALS; trial++) {
             for (size_t i = 0; i < COUNT; i++) {
                 const double share = kind == 0 ? 0.005 : kind == 1 && i % 4 == 0 ? 0.02 : 0.001;
-                values[i] = kind == 2 ? random_unit(&seed) : random_unit(&seed) < share;
+                values[i] = kind == 2 ? random_between(&random, 0, 1) : random_between(&random, 0, 1) < share;
             }
             const double bound = mean_upper_bound(values, COUNT, risk);
             missed += bound < mean;

@@ -1,6 +1,7 @@
 // Polygons cut into triangles: every point of the polygon lies in exactly one, whatever its form.
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/compile/random_shape.h"
 #include "host/scene/polygon.h"
 
 #include <setjmp.h>
@@ -58,13 +59,7 @@ static size_t triangles_holding(const Outline *outline, double x, double y)
     return count;
 }
 
-static uint64_t random_state = 1;
-
-static double random_between(double low, double high)
-{
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return low + (high - low) * (double)(random_state >> 11) * 0x1p-53;
-}
+static Random generator = {1};
 
 // Of an outline that turns left. Every corner is used, no triangle is turned over, none overlap.
 static void check_cut(const Outline *outline)
@@ -91,7 +86,7 @@ static void check_cut(const Outline *outline)
     assert_int_equal(triangles.count, outline->count - 2);
     assert_true(fabs(area - outline_area(outline)) <= 1e-12 * area);
     for (size_t i = 0; i < 300; i++) {
-        double x = random_between(low_x, high_x), y = random_between(low_y, high_y);
+        double x = random_between(&generator, low_x, high_x), y = random_between(&generator, low_y, high_y);
         assert_int_equal(triangles_holding(outline, x, y), outline_holds(outline, x, y));
     }
 }
@@ -205,8 +200,8 @@ static void test_stars(void **state)
         Outline star = {0};
         size_t count = 3 + trial;
         for (size_t i = 0; i < count; i++) {
-            double angle = 2 * M_PI * ((double)i + random_between(0.1, 0.9)) / (double)count;
-            double radius = random_between(0.05, 1);
+            double angle = 2 * M_PI * ((double)i + random_between(&generator, 0.1, 0.9)) / (double)count;
+            double radius = random_between(&generator, 0.05, 1);
             outline_add(&star, radius * cos(angle), radius * sin(angle));
         }
         // with few corners the center may lie outside, where the outline could turn either way
