@@ -1,4 +1,4 @@
-// The renderer as tests use it: one device for the whole program, taken as glint takes its own.
+// The renderer as tests use it: one device for the whole program, chosen as glint chooses its own.
 #pragma once
 
 #include "host/base/fault.h"

@@ -288,7 +288,6 @@ static void test_symbolic_links(void **state)
     unlink(path);
 }
 
-// Another process completes its image and removes the file before this one has locked it.
 static bool removal_fails;
 
 int __real_unlink(const char *name);
@@ -314,6 +313,7 @@ static void test_a_file_that_stays(void **state)
     assert_int_equal(unlink(path), 0);
 }
 
+// Another process completes its image and removes the file before this one has locked it.
 static bool file_is_removed;
 
 int __real_flock(int descriptor, int operation);

@@ -105,7 +105,7 @@ static inline mask quotient_is_bounded(real a, real b)
     return fabs(a) < fabs(b) * (real)(1 / SMALLEST_RATIO);
 }
 
-// Likewise; 0 for 0. a >= 0.
+// Correctly rounded at `strict`, as real_divide; 0 for 0. a >= 0.
 static inline real real_sqrt(real a)
 {
     real root = device_sqrt(a);

@@ -5,7 +5,7 @@
 // here adds a few u of the coordinates. Boxes are enlarged by all of that, the `slack`.
 //
 // Products are bounded: |1 / direction| is limited to 2^120 (2^1000) over the coordinates, at which a ray
-// moves by less than the slack along that axis on its way through the scene. That holds while the direction's
+// moves by less than the slack along that axis while it traverses the scene. That holds while the direction's
 // largest component is well above 2^-100 (2^-950) of the coordinates.
 #ifndef BOXES_H
 #define BOXES_H
