@@ -88,6 +88,13 @@ const Material *material_of(const Object *object)
     return &complete.materials.items[object->material];
 }
 
+void check_near(double value, double expected, double tolerance, const char *file, int line)
+{
+    if (fabs(value - expected) <= tolerance) return;
+    print_error("%.17g, expected %.17g\n", value, expected);
+    _fail(file, line);
+}
+
 void check_number(double value, double expected, const char *file, int line)
 {
     if (fabs(value - expected) <= 1e-14 * fmax(1, fabs(expected))) return;

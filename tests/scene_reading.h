@@ -26,7 +26,10 @@ int complete_close(void **state);
 const Material *material_of(const Object *object);
 
 void check_number(double value, double expected, const char *file, int line);
+void check_near(double value, double expected, double tolerance, const char *file, int line);
 void check_vector(Vector3 vector, Vector3 expected, const char *file, int line);
+
+#define assert_near(value, expected, tolerance) check_near(value, expected, tolerance, __FILE__, __LINE__)
 
 // Equal but for the rounding of a few operations.
 #define assert_number(value, expected)    check_number(value, expected, __FILE__, __LINE__)

@@ -72,16 +72,3 @@ python_with() {
 }
 is_long() { [ "${GLINT_LONG_TESTS-}" = 1 ]; }
 is_sanitized() { case ${BUILD:-$(dirname "$GLINT")} in *-sanitize) true ;; *) false ;; esac; }
-
-# npy_same A B WIDTH: both hold the same bytes, else says at which of their pixels (three floats each) they differ first.
-npy_same() {
-    local header=128
-    cmp -s "$1" "$2" && return
-    [ "$(stat -c %s "$1")" = "$(stat -c %s "$2")" ] || { echo "$1 and $2 differ in size"; return 1; }
-    cmp -l "$1" "$2" | awk -v h=$header -v w="$3" '
-        { value = int(($1 - 1 - h) / 4); pixel = int(value / 3) }
-        NR == 1 { place = pixel % w "," int(pixel / w) ", channel " value % 3 }
-        pixel != last { count++; last = pixel }
-        END { print count " pixels differ, first at " place }'
-    return 1
-}

@@ -3,6 +3,7 @@
 // implementation.
 #include "host/base/memory.h"
 #include "host/measure/accuracy.h"
+#include "tests/scene_reading.h"
 
 #include <float.h>
 #include <math.h>
@@ -14,11 +15,6 @@
 #include <cmocka.h>
 
 enum { WIDTH = 12, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, LIGHTS = 2, NOTHING_FROM = 10 };
-
-static void assert_near(double value, double expected, double tolerance)
-{
-    if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g", value, expected);
-}
 
 static size_t at(size_t x, size_t y)
 {

@@ -3,6 +3,7 @@
 #include "host/measure/baseline.h"
 #include "host/measure/bench.h"
 #include "host/measure/work.h"
+#include "tests/scene_reading.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -13,11 +14,6 @@
 #include <unistd.h>
 
 #include <cmocka.h>
-
-static void assert_near(double value, double expected, double tolerance)
-{
-    if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g", value, expected);
-}
 
 static void test_quantiles(void **state)
 {

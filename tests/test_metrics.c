@@ -3,6 +3,7 @@
 #include "host/image/heatmap.h"
 #include "host/measure/flip.h"
 #include "host/measure/image_metrics.h"
+#include "tests/scene_reading.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -12,11 +13,6 @@
 #include <cmocka.h>
 
 enum { SIDE = 64 };
-
-static void assert_near(double value, double expected, double tolerance)
-{
-    if (!(fabs(value - expected) <= tolerance)) fail_msg("%.9g, expected %.9g", value, expected);
-}
 
 // Gray display values, as a PNG holds them.
 static Image gray_image(unsigned step)

@@ -2,15 +2,15 @@
 #include "host/verify/certify.h"
 #include "host/verify/reference_color.h"
 #include "tests/random_ray.h"
+#include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 
 #include <cmocka.h>
 
-#define MISS                                    NAN
-#define assert_near(value, expected, tolerance) assert_true(fabs((value) - (expected)) <= (tolerance))
-#define COUNT(array)                            (sizeof(array) / sizeof *(array))
+#define MISS         NAN
+#define COUNT(array) (sizeof(array) / sizeof *(array))
 
 typedef struct {
     const char *name;
