@@ -48,9 +48,14 @@ Word line_peek(const Line *line)
     return line_word(&copy);
 }
 
+bool words_equal(Word a, Word b)
+{
+    return a.length == b.length && memcmp(a.text, b.text, a.length) == 0;
+}
+
 bool word_is(Word word, const char *text)
 {
-    return word.length == strlen(text) && !memcmp(word.text, text, word.length);
+    return words_equal(word, (Word){.text = text, .length = strlen(text)});
 }
 
 bool word_is_number(Word word)

@@ -25,6 +25,7 @@ bool line_next(Line *line, char comment);
 Word line_peek(const Line *line);
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
+bool words_equal(Word a, Word b);
 bool word_is_number(Word word); // also one out of range
 int word_shown(Word word);      // bytes of it that a message shows
 

@@ -16,7 +16,7 @@ typedef struct {
 
 static size_t offset_of(const ObjReader *reader)
 {
-    return (size_t)(reader->scan.at - reader->scan.start);
+    return scan_offset(&reader->scan);
 }
 
 // Numbers up to the first word that is none. Whether that is the line's end.
@@ -173,8 +173,7 @@ static bool line_read(ObjReader *reader)
 bool obj_read(MeshDraft *draft)
 {
     const Source *source = &draft->source;
-    ObjReader reader = {.draft = draft,
-                        .scan = {source->bytes, source->bytes + source->length, source->bytes}};
+    ObjReader reader = {.draft = draft, .scan = scan_open(source)};
     draft->first_index = 1;
     bool read = scan_is_text(&reader.scan, &draft->report);
     if (read) {

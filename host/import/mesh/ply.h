@@ -2,12 +2,7 @@
 #pragma once
 
 #include "host/import/mesh/draft.h"
-
-// Text of the file, without a terminating NUL: words of a header's or body's line, or binary numbers. Unlike
-// in scan.h's lines, `#` and `\` stand for themselves, and any byte may follow.
-typedef struct {
-    const char *at, *end;
-} PlySpan;
+#include "host/import/mesh/scan.h"
 
 typedef enum { PLY_SIGNED, PLY_UNSIGNED, PLY_REAL } PlyNumberKind;
 
@@ -18,12 +13,12 @@ typedef struct {
 } PlyType;
 
 typedef struct {
-    PlySpan name;
+    Word name;
     const PlyType *type, *count_type; // `count_type`: of a list's length; NULL: not a list
 } PlyProperty;
 
 typedef struct {
-    PlySpan name;
+    Word name;
     size_t count, first_property, property_count;
 } PlyElement;
 
@@ -43,32 +38,22 @@ typedef struct {
 
 typedef struct {
     MeshDraft *draft;
-    PlySpan left; // unread
+    Scan left; // unread
 } PlyReading;
 
-static inline bool ply_is_blank(char character)
+// The offset of the line's next word, or of its end. Unlike in scan.h's lines, `#` and `\` stand for
+// themselves, and any byte may follow.
+static inline size_t ply_word_offset(Scan *line)
 {
-    return character == ' ' || character == '\t';
-}
-
-// Skips blanks up to the next word of a line or its end.
-static inline const char *ply_word_start(PlySpan *line)
-{
-    while (line->at < line->end && ply_is_blank(*line->at))
+    while (line->at < line->end && scan_is_blank(*line->at))
         line->at++;
-    return line->at;
+    return scan_offset(line);
 }
 
 // The next line without its end, which is a newline, a carriage return or both. False at the end of the file.
-bool ply_line(PlyReading *reading, PlySpan *line);
+bool ply_line(PlyReading *reading, Scan *line);
 // The next word of a line, empty at its end. Words are separated by spaces and tabs.
-PlySpan ply_word(PlySpan *line);
-bool ply_span_is(PlySpan span, const char *text);
-int ply_shown(PlySpan span); // bytes of it that a message shows
-
-// Reports an error at this place of the file; always false.
-bool ply_fails(PlyReading *reading, const char *at, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
+Word ply_word(Scan *line);
 
 // Reads up to the first byte of the body. False with an error if there is no valid header.
 bool ply_header_read(PlyHeader *header, PlyReading *reading);

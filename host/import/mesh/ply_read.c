@@ -1,5 +1,4 @@
 // A PLY file's vertices and faces (Turk, The PLY Polygon File Format, 1994), in text or binary.
-#include "host/import/line.h"
 #include "host/import/mesh/ply.h"
 
 #include <stdlib.h>
@@ -30,7 +29,7 @@ typedef struct {
 typedef struct {
     PlyHeader header;
     PlyReading reading;
-    PlySpan line;              // of text: what is left of the row's line
+    Scan line;                 // of text: what is left of the row's line
     const PlyElement *element; // of the current row, and the row's index
     size_t row;
     struct {
@@ -39,7 +38,7 @@ typedef struct {
     } roles; // of the element's properties
     bool has_role[ROLE_NONE + 1];
     double numbers[ROLE_NONE + 1]; // of the current vertex
-    const char *unread;            // its first coordinate that is no number in range, or NULL
+    size_t unread;                 // the offset of its first coordinate that is no number in range, or 0
     Numbers corners, corner_uvs;   // of the current face
 } PlyReader;
 
@@ -51,7 +50,7 @@ static const PlyProperty *properties_of(const PlyReader *reader, const PlyElemen
 static bool is_wanted(const PlyElement *element)
 {
     return element->property_count > 0 &&
-           (ply_span_is(element->name, "vertex") || ply_span_is(element->name, "face"));
+           (word_is(element->name, "vertex") || word_is(element->name, "face"));
 }
 
 static PlyRole role_of(const PlyElement *element, const PlyProperty *property)
@@ -64,34 +63,28 @@ static PlyRole role_of(const PlyElement *element, const PlyProperty *property)
                    {"v", ROLE_V},   {"t", ROLE_V}, {"ty", ROLE_V}, {"texture_v", ROLE_V}},
       lists[] = {
           {"vertex_indices", ROLE_CORNERS}, {"vertex_index", ROLE_CORNERS}, {"texcoord", ROLE_CORNER_UVS}};
-    if (ply_span_is(element->name, "vertex") && !property->count_type) {
+    if (word_is(element->name, "vertex") && !property->count_type) {
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-            if (ply_span_is(property->name, numbers[i].name)) return numbers[i].role;
-    } else if (ply_span_is(element->name, "face") && property->count_type) {
+            if (word_is(property->name, numbers[i].name)) return numbers[i].role;
+    } else if (word_is(element->name, "face") && property->count_type) {
         for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
-            if (ply_span_is(property->name, lists[i].name)) return lists[i].role;
+            if (word_is(property->name, lists[i].name)) return lists[i].role;
     }
     return ROLE_NONE;
-}
-
-static bool names_agree(PlySpan a, PlySpan b)
-{
-    size_t length = (size_t)(a.end - a.at);
-    return length == (size_t)(b.end - b.at) && !memcmp(a.at, b.at, length);
 }
 
 static bool elements_are_sound(PlyReader *reader)
 {
     const PlyElement *elements = reader->header.elements.items;
     for (size_t i = 0; i < reader->header.elements.count; i++) {
-        PlySpan name = elements[i].name;
-        if (ply_span_is(name, "tristrips") && elements[i].count > 0)
-            return ply_fails(&reader->reading, name.at,
-                             "strips of triangles (tristrips) are not read, only faces");
+        Word name = elements[i].name;
+        if (word_is(name, "tristrips") && elements[i].count > 0)
+            return draft_fails(reader->reading.draft, name.offset,
+                               "strips of triangles (tristrips) are not read, only faces");
         for (size_t k = 0; k < i && is_wanted(&elements[i]); k++)
-            if (names_agree(name, elements[k].name))
-                return ply_fails(&reader->reading, name.at, "the header declares '%.*s' twice",
-                                 ply_shown(name), name.at);
+            if (words_equal(name, elements[k].name))
+                return draft_fails(reader->reading.draft, name.offset, "the header declares '%.*s' twice",
+                                   word_shown(name), name.text);
     }
     return true;
 }
@@ -104,17 +97,15 @@ static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
     for (size_t i = 0; i < element->property_count; i++) {
         const PlyProperty *property = &properties_of(reader, element)[i];
         if (reader->roles.items[i] != ROLE_NONE) continue;
-        text_appendf(&unused, "%s '%.*s'", first ? "," : "", ply_shown(property->name), property->name.at);
+        text_appendf(&unused, "%s '%.*s'", first ? "," : "", word_shown(property->name), property->name.text);
         if (!first) first = property;
     }
-    const PlySpan name = element->name;
-    const char *start = reader->reading.draft->source.bytes;
+    const Word name = element->name;
     if (!is_wanted(element))
-        report_warning(&reader->reading.draft->report, (size_t)(name.at - start),
-                       "the element '%.*s' is not used", ply_shown(name), name.at);
+        report_warning(&reader->reading.draft->report, name.offset, "the element '%.*s' is not used",
+                       word_shown(name), name.text);
     else if (first)
-        report_warning(&reader->reading.draft->report, (size_t)(first->name.at - start), "not used:%s",
-                       text_c(&unused));
+        report_warning(&reader->reading.draft->report, first->name.offset, "not used:%s", text_c(&unused));
     text_free(&unused);
 }
 
@@ -123,12 +114,18 @@ static bool is_binary(const PlyReader *reader)
     return reader->header.format != PLY_ASCII;
 }
 
+// The offset of the read position.
+static size_t place_of(const PlyReader *reader)
+{
+    return scan_offset(is_binary(reader) ? &reader->reading.left : &reader->line);
+}
+
 static bool value_missing(PlyReader *reader, const PlyProperty *property)
 {
-    PlySpan element = reader->element->name;
-    return ply_fails(&reader->reading, is_binary(reader) ? reader->reading.left.at : reader->line.at,
-                     "%.*s %zu (from 0) lacks its '%.*s'", ply_shown(element), element.at, reader->row,
-                     ply_shown(property->name), property->name.at);
+    Word element = reader->element->name;
+    return draft_fails(reader->reading.draft, place_of(reader), "%.*s %zu (from 0) lacks its '%.*s'",
+                       word_shown(element), element.text, reader->row, word_shown(property->name),
+                       property->name.text);
 }
 
 // Whole numbers have 32 bits.
@@ -168,18 +165,19 @@ static bool real_read(const char **text, const char *end, double *value)
 // The line's next word as a number of the type; `is_there` says whether there is one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
-    const char *at = ply_word_start(&reader->line), *end = reader->line.end;
+    ply_word_offset(&reader->line);
+    const char *at = reader->line.at, *end = reader->line.end;
     *is_there = at < end;
     if (at == end) return true;
     const bool read =
         type->kind == PLY_REAL ? real_read(&at, end, value) : whole_read(&at, end, type->kind, value);
-    if (read && (at == end || ply_is_blank(*at))) {
+    if (read && (at == end || scan_is_blank(*at))) {
         reader->line.at = at;
         return true;
     }
-    const PlySpan word = ply_word(&reader->line);
-    return ply_fails(&reader->reading, word.at, "'%.*s' is no number of type %s", ply_shown(word), word.at,
-                     type->name);
+    const Word word = ply_word(&reader->line);
+    return draft_fails(reader->reading.draft, word.offset, "'%.*s' is no number of type %s", word_shown(word),
+                       word.text, type->name);
 }
 
 static size_t bytes_left(const PlyReader *reader)
@@ -219,14 +217,14 @@ static bool number_next(PlyReader *reader, const PlyProperty *property, const Pl
     return word_read(reader, type, value, &is_there) && (is_there || value_missing(reader, property));
 }
 
-static bool list_fails(PlyReader *reader, const PlyProperty *property, const char *at, double promised,
+static bool list_fails(PlyReader *reader, const PlyProperty *property, size_t offset, double promised,
                        size_t held)
 {
-    PlySpan element = reader->element->name;
-    return ply_fails(&reader->reading, at,
-                     "%.*s %zu (from 0) declares %.15g numbers of '%.*s', the %s has %zu more",
-                     ply_shown(element), element.at, reader->row, promised, ply_shown(property->name),
-                     property->name.at, is_binary(reader) ? "file" : "line", held);
+    Word element = reader->element->name;
+    return draft_fails(reader->reading.draft, offset,
+                       "%.*s %zu (from 0) declares %.15g numbers of '%.*s', the %s has %zu more",
+                       word_shown(element), element.text, reader->row, promised, word_shown(property->name),
+                       property->name.text, is_binary(reader) ? "file" : "line", held);
 }
 
 static bool is_count(double number)
@@ -237,7 +235,8 @@ static bool is_count(double number)
 static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *numbers)
 {
     double count;
-    const char *start = is_binary(reader) ? reader->reading.left.at : ply_word_start(&reader->line);
+    if (!is_binary(reader)) ply_word_offset(&reader->line);
+    const size_t start = place_of(reader);
     if (!number_next(reader, property, property->count_type, &count)) return false;
     if (is_binary(reader)) {
         const size_t most = bytes_left(reader) / property->type->size;
@@ -247,7 +246,7 @@ static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *n
             return true;
         }
     } else if (!is_count(count)) {
-        return ply_fails(&reader->reading, start, "%.15g is no length of a list", count);
+        return draft_fails(reader->reading.draft, start, "%.15g is no length of a list", count);
     }
     for (size_t i = 0; (double)i < count; i++) {
         double value;
@@ -271,7 +270,7 @@ static bool property_read(PlyReader *reader, size_t index)
                          : role == ROLE_CORNER_UVS ? &reader->corner_uvs
                                                    : NULL);
     if (role <= ROLE_Z && !is_binary(reader) && !reader->unread) {
-        const char *start = ply_word_start(&reader->line);
+        const size_t start = ply_word_offset(&reader->line);
         if (!number_next(reader, property, property->type, &reader->numbers[role])) return false;
         if (isnan(reader->numbers[role])) reader->unread = start;
         return true;
@@ -282,13 +281,14 @@ static bool property_read(PlyReader *reader, size_t index)
 // A row of text is a nonempty line; what follows its last property is ignored.
 static bool row_start(PlyReader *reader)
 {
-    PlySpan name = reader->element->name;
+    Word name = reader->element->name;
     do {
         if (!ply_line(&reader->reading, &reader->line))
-            return ply_fails(&reader->reading, reader->reading.left.at,
-                             "the file ends before %.*s %zu (from 0) of %zu", ply_shown(name), name.at,
-                             reader->row, reader->element->count);
-    } while (ply_word_start(&reader->line) == reader->line.end);
+            return draft_fails(reader->reading.draft, scan_offset(&reader->reading.left),
+                               "the file ends before %.*s %zu (from 0) of %zu", word_shown(name), name.text,
+                               reader->row, reader->element->count);
+        ply_word_offset(&reader->line);
+    } while (reader->line.at == reader->line.end);
     return true;
 }
 
@@ -296,9 +296,7 @@ static bool vertex_add(PlyReader *reader)
 {
     MeshDraft *draft = reader->reading.draft;
     const double *numbers = reader->numbers;
-    if (reader->unread)
-        array_push(draft->unread,
-                   ((DraftPlace){draft->positions.count, (size_t)(reader->unread - draft->source.bytes)}));
+    if (reader->unread) array_push(draft->unread, ((DraftPlace){draft->positions.count, reader->unread}));
     if (draft->positions.count == DRAFT_NONE - 1) return draft_refuse(draft, "too many vertices");
     array_push(draft->positions, ((Vector3){numbers[ROLE_X], numbers[ROLE_Y], numbers[ROLE_Z]}));
     if (draft->is_shared[DRAFT_NORMAL])
@@ -310,17 +308,16 @@ static bool vertex_add(PlyReader *reader)
 static bool face_add(PlyReader *reader)
 {
     MeshDraft *draft = reader->reading.draft;
-    const char *at = is_binary(reader) ? reader->reading.left.at : reader->line.at;
-    const size_t offset = (size_t)(at - draft->source.bytes), count = reader->corners.count;
+    const size_t offset = place_of(reader), count = reader->corners.count;
     if (reader->corner_uvs.count > 2 * count)
-        return ply_fails(&reader->reading, at,
-                         "face %zu (from 0) has %zu corners, but %zu texture coordinates", reader->row, count,
-                         reader->corner_uvs.count / 2);
+        return draft_fails(reader->reading.draft, offset,
+                           "face %zu (from 0) has %zu corners, but %zu texture coordinates", reader->row,
+                           count, reader->corner_uvs.count / 2);
     for (size_t i = 0; i < count; i++) {
         const double index = reader->corners.items[i];
         if (!(index >= 0 && index <= UINT32_MAX && floor(index) == index))
-            return ply_fails(&reader->reading, at, "face %zu (from 0) names vertex %.15g", reader->row,
-                             index);
+            return draft_fails(reader->reading.draft, offset, "face %zu (from 0) names vertex %.15g",
+                               reader->row, index);
         draft_add_index(draft, DRAFT_POSITION, (uint32_t)index, offset);
         if (!reader->has_role[ROLE_CORNER_UVS]) continue;
         const bool has_uv = 2 * i + 1 < reader->corner_uvs.count;
@@ -332,13 +329,13 @@ static bool face_add(PlyReader *reader)
 
 static bool row_read(PlyReader *reader)
 {
-    reader->unread = NULL;
+    reader->unread = 0;
     reader->corners.count = reader->corner_uvs.count = 0;
     if (!is_binary(reader) && !row_start(reader)) return false;
     for (size_t i = 0; i < reader->element->property_count; i++)
         if (!property_read(reader, i)) return false;
     if (!is_wanted(reader->element)) return true;
-    return ply_span_is(reader->element->name, "face") ? face_add(reader) : vertex_add(reader);
+    return word_is(reader->element->name, "face") ? face_add(reader) : vertex_add(reader);
 }
 
 static void roles_find(PlyReader *reader, const PlyElement *element)
@@ -372,10 +369,11 @@ static bool element_start(PlyReader *reader, const PlyElement *element)
     roles_find(reader, element);
     if (element->property_count == 0) return true;
     element_warn_of_unused(reader, element);
-    if (!ply_span_is(element->name, "vertex")) return true;
+    if (!word_is(element->name, "vertex")) return true;
     for (PlyRole role = ROLE_X; role <= ROLE_Z; role++)
         if (!reader->has_role[role])
-            return ply_fails(&reader->reading, element->name.at, "the vertices have no '%s'", names[role]);
+            return draft_fails(reader->reading.draft, element->name.offset, "the vertices have no '%s'",
+                               names[role]);
     draft->is_shared[DRAFT_NORMAL] =
         reader->has_role[ROLE_NX] && reader->has_role[ROLE_NY] && reader->has_role[ROLE_NZ];
     draft->is_shared[DRAFT_UV] =
@@ -392,7 +390,7 @@ static bool element_read(PlyReader *reader, const PlyElement *element)
     // without properties there are no rows, whatever their number
     const size_t count = element->property_count > 0 ? element->count : 0;
     for (reader->row = 0; reader->row < count; reader->row++) {
-        stage_set(draft->stage, (size_t)(reader->reading.left.at - draft->source.bytes));
+        stage_set(draft->stage, scan_offset(&reader->reading.left));
         if (!row_read(reader)) return false;
     }
     return true;
@@ -400,8 +398,7 @@ static bool element_read(PlyReader *reader, const PlyElement *element)
 
 bool ply_read(MeshDraft *draft)
 {
-    const Source *source = &draft->source;
-    PlyReader reader = {.reading = {draft, {source->bytes, source->bytes + source->length}}};
+    PlyReader reader = {.reading = {draft, scan_open(&draft->source)}};
     bool read = ply_header_read(&reader.header, &reader.reading) && elements_are_sound(&reader);
     for (size_t i = 0; read && i < reader.header.elements.count; i++)
         read = element_read(&reader, &reader.header.elements.items[i]);

@@ -12,9 +12,7 @@ bool scan_is_text(Scan *scan, Report *report)
 void unused_note(UnusedWords *unused, Report *report, Word word, const char *what)
 {
     for (size_t i = 0; i < unused->count; i++)
-        if (unused->words[i].length == word.length &&
-            memcmp(unused->words[i].text, word.text, word.length) == 0)
-            return;
+        if (words_equal(unused->words[i], word)) return;
     if (unused->count == sizeof unused->words / sizeof *unused->words) return;
     unused->words[unused->count++] = word;
     report_warning(report, word.offset, "'%.*s' %s", word_shown(word), word.text, what);

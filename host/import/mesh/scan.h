@@ -10,6 +10,17 @@ typedef struct {
     const char *start; // of the text
 } Scan;
 
+static inline Scan scan_open(const Source *source)
+{
+    return (Scan){source->bytes, source->bytes + source->length, source->bytes};
+}
+
+// Of the position, in the text.
+static inline size_t scan_offset(const Scan *scan)
+{
+    return (size_t)(scan->at - scan->start);
+}
+
 // Or that of what counts of it: `#` begins a comment.
 static inline bool scan_is_line_end(char character)
 {

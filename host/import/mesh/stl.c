@@ -27,7 +27,7 @@ static bool vertex_read(StlReader *reader)
     while (count < 3 && scan_more(&reader->scan) &&
            scan_number(&reader->scan, &numbers[count]) == NUMBER_READ)
         count++;
-    const size_t offset = (size_t)(reader->scan.at - reader->scan.start);
+    const size_t offset = scan_offset(&reader->scan);
     if (count < 3) array_push(draft->unread, ((DraftPlace){draft->positions.count, offset}));
     if (draft->positions.count == DRAFT_NONE - 1) return draft_fails(draft, offset, "too many vertices");
     array_push(draft->corners[DRAFT_POSITION], (uint32_t)draft->positions.count);
@@ -62,11 +62,10 @@ static bool line_read(StlReader *reader)
 static bool text_read(MeshDraft *draft)
 {
     const Source *source = &draft->source;
-    StlReader reader = {.draft = draft,
-                        .scan = {source->bytes, source->bytes + source->length, source->bytes}};
+    StlReader reader = {.draft = draft, .scan = scan_open(source)};
     if (!scan_is_text(&reader.scan, &draft->report)) return false;
     do {
-        stage_set(draft->stage, (size_t)(reader.scan.at - reader.scan.start));
+        stage_set(draft->stage, scan_offset(&reader.scan));
         if (!line_read(&reader)) return false;
     } while (scan_line(&reader.scan));
     return reader.corner_count == 0 || draft_fails(draft, source->length, "the file ends within a facet");
