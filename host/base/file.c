@@ -1,6 +1,7 @@
 #include "host/base/file.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -26,8 +27,7 @@ bool file_has_name(int descriptor, int folder, const char *name)
 int file_folder_open(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    char *folder = slash ? strndup(path, (size_t)(slash + 1 - path)) : strdup(".");
-    if (!folder) fault("out of memory: file name");
+    char *folder = slash ? memory_copy_part(path, (size_t)(slash + 1 - path)) : memory_copy_text(".");
     int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (descriptor < 0 && errno == EACCES) descriptor = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
     int error = errno;

@@ -36,8 +36,15 @@ void *memory_resize(void *memory, size_t count, size_t size)
 
 char *memory_copy_text(const char *text)
 {
-    size_t size = strlen(text) + 1;
-    return memcpy(memory_allocate(size, 1), text, size);
+    return memory_copy_part(text, strlen(text));
+}
+
+char *memory_copy_part(const char *text, size_t length)
+{
+    char *copy = memory_allocate(length + 1, 1);
+    memcpy(copy, text, length);
+    copy[length] = '\0';
+    return copy;
 }
 
 // The largest type of OpenCL C has 128 bytes, and no device requires more alignment than that.

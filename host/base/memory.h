@@ -8,6 +8,7 @@ void *memory_allocate(size_t count, size_t size);
 void *memory_allocate_zeroed(size_t count, size_t size);
 void *memory_resize(void *memory, size_t count, size_t size);
 char *memory_copy_text(const char *text);
+char *memory_copy_part(const char *text, size_t length); // with a NUL behind it
 
 // From this size on memory_allocate_large uses large pages.
 enum { MEMORY_LARGE_MIN = 1 << 22 };

@@ -1,7 +1,6 @@
 #include "host/base/message.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
-#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <stdarg.h>
@@ -111,7 +110,7 @@ void message_add_at(MessageList *list, MessageSeverity severity, const Source *s
     array_push(*list, message);
 }
 
-static void message_free(Message *message)
+void message_free(Message *message)
 {
     free(message->file);
     free(message->text);

@@ -43,6 +43,7 @@ size_t message_count(const MessageList *list, MessageSeverity severity);
 
 // `file:line:column: error: text`, then the line and a caret where they are known.
 void message_list_print(const MessageList *list, FILE *stream);
+void message_free(Message *message);
 void message_list_free(MessageList *list);
 // Appends all messages of `from`, which is then empty.
 void message_list_move(MessageList *to, MessageList *from);

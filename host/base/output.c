@@ -3,6 +3,7 @@
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -66,10 +67,7 @@ static bool output_failed(OutputFile *output, const char *doing, MessageList *me
 
 static char *temporary_name(const OutputFile *output, unsigned number)
 {
-    char *temporary;
-    if (asprintf(&temporary, TEMPORARY_FORMAT "%u", output->name, number) < 0)
-        fault("out of memory: file name");
-    return temporary;
+    return text_format(TEMPORARY_FORMAT "%u", output->name, number);
 }
 
 bool output_is_temporary(const char *file_name, const char *name)
@@ -232,9 +230,7 @@ static char *link_end(const char *target)
         ssize_t length = readlink(path, aim, sizeof aim);
         if (length < 0) break;
         const char *slash = aim[0] == '/' ? NULL : strrchr(path, '/');
-        char *next;
-        if (asprintf(&next, "%.*s%.*s", slash ? (int)(slash + 1 - path) : 0, path, (int)length, aim) < 0)
-            fault("out of memory: file name");
+        char *next = text_format("%.*s%.*s", slash ? (int)(slash + 1 - path) : 0, path, (int)length, aim);
         free(path);
         path = next;
     }

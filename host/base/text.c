@@ -30,6 +30,17 @@ void text_appendf(Text *text, const char *format, ...)
     free(formatted);
 }
 
+char *text_format(const char *format, ...)
+{
+    char *formatted;
+    va_list arguments;
+    va_start(arguments, format);
+    int length = vasprintf(&formatted, format, arguments);
+    va_end(arguments);
+    if (length < 0) fault("out of memory: text");
+    return formatted;
+}
+
 const char *text_c(const Text *text)
 {
     return text->items ? text->items : "";

@@ -13,8 +13,9 @@ typedef struct {
 
 void text_append(Text *text, const char *bytes, size_t length);
 void text_appendf(Text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
-const char *text_c(const Text *text); // never NULL
-void text_free(Text *text);           // and zeroes
+char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2))); // never NULL; caller frees
+const char *text_c(const Text *text);                                             // never NULL
+void text_free(Text *text);                                                       // and zeroes
 
 // Bytes of the well-formed UTF-8 character that `text` starts with; 0 if it does not start with one.
 size_t text_character_size(const char *text, size_t length);

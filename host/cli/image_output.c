@@ -200,11 +200,8 @@ static ImageHeader layer_header(const Film *film, Layer layer)
 // image.png -> image.NAME.npy
 static char *aov_path(const ImageOutputOptions *options, const char *name)
 {
-    Text path = {0};
     const char *dot = strrchr(options->path, '.');
-    text_append(&path, options->path, (size_t)(dot - options->path));
-    text_appendf(&path, ".%s.npy", name);
-    return path.items;
+    return text_format("%.*s.%s.npy", (int)(dot - options->path), options->path, name);
 }
 
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
@@ -462,10 +459,9 @@ bool film_save(const Film *film, const char *prefix, MessageList *messages)
     bool saved = true;
     for (Layer layer = 0; layer < LAYER_COUNT && saved; layer++) {
         if (!film->layers[layer] || film_components(film, layer) == 0) continue;
-        Text path = {0};
-        text_appendf(&path, "%s.%s.npy", prefix, layer_names[layer]);
-        saved = layer_save(film, layer, text_c(&path), messages);
-        text_free(&path);
+        char *path = text_format("%s.%s.npy", prefix, layer_names[layer]);
+        saved = layer_save(film, layer, path, messages);
+        free(path);
     }
     return saved;
 }

@@ -155,9 +155,9 @@ bool option_set(const char *option, const char *value, const char *const *names,
         while (i < count && (strlen(names[i]) != length || strncmp(at, names[i], length) != 0))
             i++;
         if (i == count) {
-            char *word = strndup(at, length);
+            char *word = memory_copy_part(at, length);
             fprintf(stderr, "glint: --%s: expected names separated by commas, of ", option);
-            choices_print(names, count, word ? word : value);
+            choices_print(names, count, word);
             free(word);
             return false;
         }

@@ -209,10 +209,9 @@ static char *path_make(const RenderOptions *options, const char *scene)
     if (output && options->scene_count == 1) return memory_copy_text(output);
     char *name = image_output_default_path(scene);
     if (!output) return name;
-    Text path = {0};
-    text_appendf(&path, "%s/%s", output, name);
+    char *path = text_format("%s/%s", output, name);
     free(name);
-    return path.items;
+    return path;
 }
 
 // False with a message.

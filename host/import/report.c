@@ -65,13 +65,6 @@ static bool message_is_among(const Message *message, const MessageList *list, si
     return false;
 }
 
-static void message_drop(Message message)
-{
-    free(message.file);
-    free(message.text);
-    free(message.source_line);
-}
-
 void report_include(Report *report, Report *included)
 {
     report_close(included);
@@ -80,7 +73,7 @@ void report_include(Report *report, Report *included)
         const Message *message = &from->items[i];
         size_t *count = message->severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
         if (message_is_among(message, to, 0, to->count) || (*count)++ >= MESSAGES_MAX)
-            message_drop(*message);
+            message_free(&from->items[i]);
         else
             array_push(*to, *message);
     }
@@ -95,7 +88,7 @@ bool report_close(Report *report)
     for (size_t i = report->first; i < list->count; i++) {
         Message message = list->items[i];
         if (message_is_among(&message, list, report->first, kept)) {
-            message_drop(message); // a repeat
+            message_free(&message); // a repeat
             continue;
         }
         size_t place = kept++;

@@ -34,11 +34,7 @@ static char *text_of(struct fy_node *node)
 {
     size_t length = 0;
     const char *text = node && fy_node_is_scalar(node) ? fy_node_get_scalar(node, &length) : NULL;
-    Text copy = {0};
-    text_append(&copy, text ? text : "", length);
-    char *result = memory_copy_text(text_c(&copy));
-    text_free(&copy);
-    return result;
+    return memory_copy_part(text ? text : "", length);
 }
 
 // 0 where there is no number.

@@ -367,7 +367,7 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
     size_t count = 0;
     for (const char *at = selector, *end;; at = end + 1) {
         end = is_single ? NULL : strchr(at, ',');
-        char *part = at ? strndup(at, end ? (size_t)(end - at) : strlen(at)) : NULL;
+        char *part = at ? memory_copy_part(at, end ? (size_t)(end - at) : strlen(at)) : NULL;
         const Device *device = NULL;
         if (part && part[0] == '\0')
             report_no_match(list, part, messages);

@@ -7,6 +7,7 @@
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -193,9 +194,7 @@ static void damage_report(const char *path, MessageList *messages)
 // A value of a key as messages have it.
 static char *value_text(const char *value, size_t length)
 {
-    char *text = length > 0 ? strndup(value, length) : strdup("none");
-    if (!text) fault("out of memory: message");
-    return text;
+    return length > 0 ? memory_copy_part(value, length) : memory_copy_text("none");
 }
 
 // Says which is the first line in which the keys differ.
@@ -342,9 +341,9 @@ const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count)
 
 static bool checkpoint_failed(Checkpoint *checkpoint, const char *doing)
 {
-    if (!checkpoint->failure && asprintf(&checkpoint->failure, "cannot %s the checkpoint '%s': %s", doing,
-                                         checkpoint->path, strerror(errno)) < 0)
-        fault("out of memory: message");
+    if (!checkpoint->failure)
+        checkpoint->failure =
+            text_format("cannot %s the checkpoint '%s': %s", doing, checkpoint->path, strerror(errno));
     return false;
 }
 

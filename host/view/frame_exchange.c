@@ -37,7 +37,7 @@ void message_publish(FrameLoop *loop, char *message)
     char *waiting = loop->message;
     loop->message = message;
     if (waiting && *waiting && *message) {
-        if (asprintf(&loop->message, "%s%s", waiting, message) < 0) fault("out of memory");
+        loop->message = text_format("%s%s", waiting, message);
         free(message);
     }
     free(waiting);
@@ -61,11 +61,10 @@ void messages_publish(FrameLoop *loop, MessageList *messages)
         free(text);
 }
 
-void frame_publish(FrameLoop *loop, uint32_t samples, bool complete)
+void frame_publish(FrameLoop *loop, uint32_t samples)
 {
     loop->frame.number = loop->current_number;
     loop->frame.samples = samples;
-    loop->frame.complete = complete;
     pthread_mutex_lock(&loop->mutex);
     Frame taken = loop->ready;
     loop->ready = loop->frame;
@@ -200,13 +199,19 @@ void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
     pthread_mutex_unlock(&loop->mutex);
 }
 
-char *frame_loop_take_facts(FrameLoop *loop)
+// The text, one of the loop's; NULL takes its place.
+static char *text_take(FrameLoop *loop, char **text)
 {
     pthread_mutex_lock(&loop->mutex);
-    char *facts = loop->facts;
-    loop->facts = NULL;
+    char *taken = *text;
+    *text = NULL;
     pthread_mutex_unlock(&loop->mutex);
-    return facts;
+    return taken;
+}
+
+char *frame_loop_take_facts(FrameLoop *loop)
+{
+    return text_take(loop, &loop->facts);
 }
 
 bool frame_loop_take(FrameLoop *loop, Frame *frame)
@@ -235,11 +240,7 @@ bool frame_loop_take_camera(FrameLoop *loop, Camera *camera)
 
 char *frame_loop_take_message(FrameLoop *loop)
 {
-    pthread_mutex_lock(&loop->mutex);
-    char *message = loop->message;
-    loop->message = NULL;
-    pthread_mutex_unlock(&loop->mutex);
-    return message;
+    return text_take(loop, &loop->message);
 }
 
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds)

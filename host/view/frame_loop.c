@@ -20,9 +20,7 @@ static void image_save(FrameLoop *loop, char *path)
     messages_publish(loop, &messages);
     free(narrow);
     if (saved) {
-        Text text = {0};
-        text_appendf(&text, "saved %s\n", path);
-        message_publish(loop, text.items);
+        message_publish(loop, text_format("saved %s\n", path));
     }
     free(path);
 }

@@ -32,8 +32,7 @@ typedef struct {
     uint8_t *pixels; // display values, RGB, from the top left
     // Distance from the eye to each pixel's hit point, infinite where nothing is hit; NULL: not known yet.
     float *distances;
-    uint32_t samples; // per pixel; 0: a coarse frame
-    bool complete;
+    uint32_t samples;     // per pixel; 0: a coarse frame
     double largest_error; // of a heat map of errors; of other frames negative
     char *summary;        // lines of text: device, precision, samples, times
 } Frame;

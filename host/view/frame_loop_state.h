@@ -71,7 +71,7 @@ void facts_publish(FrameLoop *loop, char *facts);
 void message_publish(FrameLoop *loop, char *message);
 // Takes ownership of the messages.
 void messages_publish(FrameLoop *loop, MessageList *messages);
-void frame_publish(FrameLoop *loop, uint32_t samples, bool complete);
+void frame_publish(FrameLoop *loop, uint32_t samples);
 // A camera that was changed in the file becomes the view's: the window asks for its image.
 void scene_publish(FrameLoop *loop);
 // The scene cannot be read or rendered.

@@ -49,8 +49,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     if (is_first && view_aovs[loop->current.view]) return true; // its AOVs follow the first pass
     frame_fill(loop, samples);
     if (!is_first) distances_fill(loop);
-    bool complete = !is_first && samples == loop->settings.sample_count && loop->current.view != VIEW_ERROR;
-    frame_publish(loop, samples, complete);
+    frame_publish(loop, samples);
     first_frame_set_due(false);
     return true;
 }
@@ -150,7 +149,7 @@ static bool preview_render(FrameLoop *loop)
     preview_note(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
                  (double)film_pixel_count(&loop->film));
     frame_fill(loop, 1);
-    frame_publish(loop, 0, false);
+    frame_publish(loop, 0);
     first_frame_set_due(false);
     return camera_rests(loop);
 }
@@ -190,7 +189,7 @@ static bool errors_render(FrameLoop *loop)
         frame_fill(loop, 1);
         loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &reference.film);
         distances_fill(loop);
-        frame_publish(loop, 1, true);
+        frame_publish(loop, 1);
     }
     film_free(&reference.film);
     return done;

@@ -56,11 +56,9 @@ static void name_read(MtlReader *reader, MtlMaterial *previous)
 {
     (void)previous;
     const Word name = scan_rest(&reader->scan);
-    MtlMaterial material = {.name = memory_allocate(name.length + 1, 1),
+    MtlMaterial material = {.name = memory_copy_part(name.text, name.length),
                             .material = material_default(),
                             .scene_index = DRAFT_NONE};
-    memcpy(material.name, name.text, name.length);
-    material.name[name.length] = '\0';
     material.material.ior = 1;
     array_push(reader->materials, material);
 }
@@ -74,8 +72,8 @@ static bool number_of_line(MtlReader *reader, double *value)
     if (status == NUMBER_READ)
         *value = number;
     else
-        report_warning(&reader->report, (size_t)(reader->scan.at - reader->scan.start),
-                       "no number up to %g: the default is used", NUMBER_MAX);
+        report_warning(&reader->report, scan_offset(&reader->scan), "no number up to %g: the default is used",
+                       NUMBER_MAX);
     return status == NUMBER_READ;
 }
 
@@ -149,7 +147,7 @@ static bool texture_option_skip(Scan *scan)
 static void texture_read(MtlReader *reader, MtlMaterial *material)
 {
     scan_more(&reader->scan);
-    const size_t offset = (size_t)(reader->scan.at - reader->scan.start);
+    const size_t offset = scan_offset(&reader->scan);
     bool has_options = false;
     while (texture_option_skip(&reader->scan))
         has_options = true;
@@ -278,11 +276,9 @@ static bool libraries_of_line_read(MtlReader *reader, Word line)
 static bool fallback_read(MtlReader *reader)
 {
     const char *obj_path = reader->draft->import->path;
-    Text path = {0};
-    text_append(&path, obj_path, strlen(obj_path) - strlen("obj"));
-    text_appendf(&path, "mtl");
-    const bool read = library_read(reader, text_c(&path));
-    text_free(&path);
+    char *path = text_format("%.*smtl", (int)(strlen(obj_path) - strlen("obj")), obj_path);
+    const bool read = library_read(reader, path);
+    free(path);
     return read;
 }
 

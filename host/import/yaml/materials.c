@@ -42,11 +42,10 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     const char *scene_file = reader->report.source->file, *file = yaml_text(&reader->tree, node);
     const char *slash = strrchr(scene_file, '/');
     int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - scene_file) : 0;
-    Text path = {0};
-    text_appendf(&path, "%.*s%s", folder_length, scene_file, file);
+    char *path = text_format("%.*s%s", folder_length, scene_file, file);
     const SceneOptions *options = reader->options;
-    if (options->file_named) options->file_named(options->context, path.items);
-    return path.items;
+    if (options->file_named) options->file_named(options->context, path);
+    return path;
 }
 
 static bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
