@@ -13,7 +13,7 @@
 // compared with one another.
 enum { DECADES = 7, STEPS = 2 * DECADES, STEP_NOT_FINITE, STEP_COUNT };
 
-typedef uint8_t Color[3];
+typedef uint8_t Rgb8[3];
 
 static uint8_t difference_step(float difference)
 {
@@ -24,7 +24,7 @@ static uint8_t difference_step(float difference)
 
 // Black, then the heatmap from a color that differs visibly from black; red, which the heatmap lacks, for not
 // finite.
-static void step_colors(Color colors[STEP_COUNT])
+static void step_colors(Rgb8 colors[STEP_COUNT])
 {
     for (int step = 0; step <= STEPS; step++) {
         float color[3];
@@ -32,11 +32,11 @@ static void step_colors(Color colors[STEP_COUNT])
         for (int i = 0; i < 3; i++)
             colors[step][i] = (uint8_t)lrintf(255 * color[i]);
     }
-    memcpy(colors[STEP_NOT_FINITE], (Color){255, 0, 0}, sizeof(Color));
+    memcpy(colors[STEP_NOT_FINITE], (Rgb8){255, 0, 0}, sizeof(Rgb8));
 }
 
 static void png_json(Json *json, const char *key, const AccuracyScene *scene, const uint8_t *pixels,
-                     const Color *palette)
+                     const Rgb8 *palette)
 {
     Text png = {0}, uri = {0};
     png_bytes_append(&png, pixels, scene->width, scene->height, palette, palette ? STEP_COUNT : 0);
@@ -64,9 +64,9 @@ static void difference_json(Json *json, const AccuracyScene *scene, float *value
     uint8_t *steps = memory_allocate(pixels, 1);
     for (size_t i = 0; i < pixels; i++)
         steps[i] = difference_step(differences[i]);
-    Color colors[STEP_COUNT];
+    Rgb8 colors[STEP_COUNT];
     step_colors(colors);
-    png_json(json, "difference", scene, steps, (const Color *)colors);
+    png_json(json, "difference", scene, steps, (const Rgb8 *)colors);
     free(steps);
     free(differences);
 }
@@ -122,7 +122,7 @@ Json *accuracy_page_extras(const AccuracyReport *report)
     Json *json = json_open();
     json_integer(json, "difference_decades", DECADES);
     json_begin_array(json, "difference_colors");
-    Color colors[STEP_COUNT];
+    Rgb8 colors[STEP_COUNT];
     step_colors(colors);
     for (int step = 0; step < STEP_COUNT; step++) {
         char color[8];

@@ -3,7 +3,6 @@
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <inttypes.h>
-#include <math.h>
 #include <string.h>
 
 static const char is_reference[] =

@@ -138,9 +138,9 @@ static void reasons_print(const BenchReport *report, FILE *stream)
 static void rays_print(const BenchRow *row, FILE *stream)
 {
     fprintf(stream, "  rays:");
-    for (int kind = 0; kind < BENCH_RAY_KINDS; kind++)
+    for (int kind = 0; kind < RAYS_COUNT; kind++)
         fprintf(stream, "%s %" PRIu64 " %s", kind ? "," : "", row->rays[kind],
-                kind == BENCH_CAMERA_HITS ? "of them hit" : bench_ray_names[kind]);
+                kind == RAYS_CAMERA_HITS ? "of them hit" : bench_ray_names[kind]);
     fputc('\n', stream);
 }
 

@@ -54,8 +54,6 @@ static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *r
     return true;
 }
 
-_Static_assert(sizeof((BenchRow){0}.rays) == sizeof((RenderReport){0}.rays), "in the same order");
-
 static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, MessageList *messages)
 {
     RenderSettings settings = variant->settings;
@@ -63,7 +61,6 @@ static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, 
     Renderer *renderer = renderer_open(compute, variant->scene, &settings, messages);
     if (!renderer) return false;
     renderer_render(renderer, 0, band_skip, NULL);
-    // both in the order of RAYS_… (kernels/types.h)
     memcpy(row->rays, renderer_report(renderer)->rays, sizeof row->rays);
     renderer_close(renderer);
     return true;

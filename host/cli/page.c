@@ -2,7 +2,6 @@
 
 #include "host/base/embedded.h"
 #include "host/base/fault.h"
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 

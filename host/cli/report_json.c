@@ -78,7 +78,7 @@ void times_json(Json *json, const BenchRow *row)
 void rays_json(Json *json, const BenchRow *row)
 {
     json_begin_object(json, "rays");
-    for (int kind = 0; kind < BENCH_RAY_KINDS; kind++)
+    for (int kind = 0; kind < RAYS_COUNT; kind++)
         json_integer(json, bench_ray_names[kind], (int64_t)row->rays[kind]);
     json_end(json);
     json_number(json, "mrays_per_s", bench_rays_per_second(row) / 1e6);

@@ -4,7 +4,6 @@
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <stdio.h>
-#include <string.h>
 
 bool timing_style_read(const char *value, TimingStyle *style)
 {

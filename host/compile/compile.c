@@ -13,6 +13,12 @@ static Vector3 eye_of(const Scene *scene, const CompileSettings *settings)
     return settings->shift_to_eye ? scene->camera.position : (Vector3){0};
 }
 
+static Rounding rounding_from(Vector3 eye, const CompileSettings *settings)
+{
+    return (Rounding){eye, settings->precision == PRECISION_DOUBLE, settings->shift_to_eye,
+                      settings->certifies};
+}
+
 // The stages of a scene in the device's unit.
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
@@ -20,9 +26,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     if (!lights_fit(compiled, scene, settings, messages) ||
         !textures_load(compiled, scene, settings, messages))
         return false;
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye,
-                               settings->certifies};
+    const Rounding rounding = rounding_from(eye_of(scene, settings), settings);
     compiled->eye = rounding.eye;
     stage_begin(settings->stage, "flattening the scene", NULL, 0);
     objects_flatten(compiled, scene, &rounding);
@@ -59,9 +63,7 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
 static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                      MessageList *messages)
 {
-    const bool is_double = settings->precision == PRECISION_DOUBLE;
-    const Rounding rounding = {eye_of(scene, settings), is_double, settings->shift_to_eye,
-                               settings->certifies};
+    const Rounding rounding = rounding_from(eye_of(scene, settings), settings);
     compiled->eye = (Vector3){NAN, NAN, NAN}; // equal to no eye, so that the next move sets all
     compiled->eye_offset = (Vector3){0};
     stage_begin(settings->stage, "flattening the scene", NULL, 0);
@@ -82,8 +84,7 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
 // Sets the eye's offset from that of the arrays: of a preview any, else 0. False if they must move.
 static bool eye_shift(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
-    const Rounding rounding = {compiled->eye, settings->precision == PRECISION_DOUBLE, settings->shift_to_eye,
-                               settings->certifies};
+    const Rounding rounding = rounding_from(compiled->eye, settings);
     const Vector3 offset = point_from_eye(&rounding, eye_of(scene, settings));
     const bool is_same = vector_is_zero(offset) && vectors_equal(compiled->eye, eye_of(scene, settings));
     const bool fits = isfinite(offset.x) && isfinite(offset.y) && isfinite(offset.z);

@@ -1,5 +1,9 @@
 #include "host/compile/stages.h"
 
+_Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL == LIGHT_KIND_DIRECTIONAL &&
+                   (int)LIGHT_SPOT == LIGHT_KIND_SPOT,
+               "kinds of lights have the kernels' numbers");
+
 // 1 - cos of an angle in degrees, without cancellation.
 static double versine(double degrees)
 {
@@ -9,16 +13,11 @@ static double versine(double degrees)
 
 void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
-    static const uint32_t kinds[] = {
-        [LIGHT_POINT] = LIGHT_KIND_POINT,
-        [LIGHT_DIRECTIONAL] = LIGHT_KIND_DIRECTIONAL,
-        [LIGHT_SPOT] = LIGHT_KIND_SPOT,
-    };
     flat_array_renew(compiled, FLAT_LIGHTS, scene->lights.count);
     FlatLight *lights = compiled->arrays[FLAT_LIGHTS].items;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
-        lights[i] = (FlatLight){.color = scalar4_of(light->color, 0), .kind.x = kinds[light->kind]};
+        lights[i] = (FlatLight){.color = scalar4_of(light->color, 0), .kind.x = (uint32_t)light->kind};
         if (light->kind != LIGHT_DIRECTIONAL)
             lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
         if (light->kind != LIGHT_POINT)

@@ -11,8 +11,8 @@
 // 3).
 void heatmap_color(double fraction, float color[3])
 {
-    const double tau = 6.28318530717958647692, start = 0.5, rotations = -1.5, hue = 1;
-    double angle = tau * (start / 3 + 1 + rotations * fraction);
+    const double start = 0.5, rotations = -1.5, hue = 1;
+    double angle = 2 * M_PI * (start / 3 + 1 + rotations * fraction);
     double amplitude = hue * fraction * (1 - fraction) / 2;
     double c = amplitude * cos(angle), s = amplitude * sin(angle);
     color[0] = (float)fmax(0, fmin(fraction - 0.14861 * c + 1.78277 * s, 1));

@@ -12,34 +12,29 @@
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "NPY rows are written as they lie in memory");
 
+static const struct {
+    const char *ending;
+    const Encoder *encoder;
+} formats[IMAGE_UNKNOWN] = {
+    [IMAGE_PNG] = {".png", &png_encoder},
+    [IMAGE_PPM] = {".ppm", &ppm_encoder},
+    [IMAGE_EXR] = {".exr", &exr_encoder},
+    [IMAGE_NPY] = {".npy", &npy_encoder},
+};
+
 ImageFormat image_format_of(const char *path)
 {
-    static const struct {
-        const char *ending;
-        ImageFormat format;
-    } known[] = {{".png", IMAGE_PNG}, {".ppm", IMAGE_PPM}, {".exr", IMAGE_EXR}, {".npy", IMAGE_NPY}};
     const char *ending = strrchr(path, '.');
-    for (size_t i = 0; ending && i < sizeof known / sizeof *known; i++) {
-        if (strcasecmp(ending, known[i].ending) == 0) return known[i].format;
-    }
-    return IMAGE_UNKNOWN;
+    ImageFormat format = 0;
+    while (format < IMAGE_UNKNOWN && !(ending && strcasecmp(ending, formats[format].ending) == 0))
+        format++;
+    return format;
 }
 
 static const Encoder *encoder_of(ImageFormat format)
 {
-    switch (format) {
-    case IMAGE_PNG:
-        return &png_encoder;
-    case IMAGE_PPM:
-        return &ppm_encoder;
-    case IMAGE_EXR:
-        return &exr_encoder;
-    case IMAGE_NPY:
-        return &npy_encoder;
-    case IMAGE_UNKNOWN:
-        break;
-    }
-    fault("an image of unknown format");
+    if (format >= IMAGE_UNKNOWN) fault("an image of unknown format");
+    return formats[format].encoder;
 }
 
 // Deflate, in PNG and EXR, makes 1032 bytes of one at most (zlib's technical details).
@@ -48,16 +43,8 @@ enum { DEFLATE_RATIO_MAX = 1032 };
 static uint64_t bytes_min(const ImageHeader *header)
 {
     uint64_t values = (uint64_t)header->width * header->height * header->channels;
-    switch (header->format) {
-    case IMAGE_PPM:
-        return values * (header->bits / 8);
-    case IMAGE_NPY:
-        return values * (header->npy_type == 'd' ? 8 : 4);
-    case IMAGE_PNG:
-    case IMAGE_EXR:
-    case IMAGE_UNKNOWN:
-        break;
-    }
+    if (header->format == IMAGE_PPM) return values * (header->bits / 8);
+    if (header->format == IMAGE_NPY) return values * (header->npy_type == 'd' ? 8 : 4);
     return values / DEFLATE_RATIO_MAX;
 }
 

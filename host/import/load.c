@@ -2,7 +2,6 @@
 
 #include "host/base/hash.h"
 #include "host/base/text.h"
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 

@@ -3,8 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-const char *const bench_ray_names[BENCH_RAY_KINDS] = {"camera", "camera_hits", "reflected", "refracted",
-                                                      "shadow"};
+const char *const bench_ray_names[RAYS_COUNT] = {"camera", "camera_hits", "reflected", "refracted", "shadow"};
 
 static const double converged_spread = 0.02, largest_drift = 0.01;
 // Over a shorter time the wait before a launch would pass for a drift.
@@ -71,15 +70,15 @@ void bench_row_free(BenchRow *row)
 double bench_rays_per_second(const BenchRow *row)
 {
     uint64_t sum = 0;
-    for (int kind = 0; kind < BENCH_RAY_KINDS; kind++)
-        if (kind != BENCH_CAMERA_HITS) sum += row->rays[kind]; // these are camera rays
+    for (int kind = 0; kind < RAYS_COUNT; kind++)
+        if (kind != RAYS_CAMERA_HITS) sum += row->rays[kind]; // these are camera rays
     return (double)sum / bench_kernel(&row->times).median;
 }
 
 Figure bench_peak_fraction(const BenchRow *row, const Peak *peak)
 {
     if (row->traverses_bvh) return (Figure){.why_not = "unknown with a BVH"};
-    uint64_t rays = row->rays[BENCH_CAMERA] + row->rays[BENCH_REFLECTED] + row->rays[BENCH_REFRACTED];
+    uint64_t rays = row->rays[RAYS_CAMERA] + row->rays[RAYS_REFLECTED] + row->rays[RAYS_REFRACTED];
     double rate = row->flops_per_ray * (double)rays / bench_kernel(&row->times).median;
     return (Figure){.value = rate / peak->flops_per_second[row->is_double]};
 }

@@ -3,6 +3,7 @@
 
 #include "host/measure/peak.h"
 #include "host/measure/series.h"
+#include "host/render/renderer.h"
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -44,8 +45,7 @@ typedef struct {
     uint64_t scene_hash;
 } BenchKey;
 
-enum { BENCH_CAMERA, BENCH_CAMERA_HITS, BENCH_REFLECTED, BENCH_REFRACTED, BENCH_SHADOW, BENCH_RAY_KINDS };
-extern const char *const bench_ray_names[BENCH_RAY_KINDS];
+extern const char *const bench_ray_names[RAYS_COUNT];
 
 typedef struct {
     BenchKey key;
@@ -53,7 +53,7 @@ typedef struct {
     BenchTimes times;
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
-    uint64_t rays[BENCH_RAY_KINDS];
+    uint64_t rays[RAYS_COUNT];
     bool is_double, traverses_bvh; // computes in double; rays traversed a BVH
     double flops_per_ray;          // as work.h counts
     double image_bytes;

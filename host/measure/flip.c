@@ -3,6 +3,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/image/srgb.h"
+#include "host/scene/vector.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,12 +25,6 @@ static const struct {
 };
 static const double widest_sensitivity = 0.04;
 
-static const double pi = 3.14159265358979323846;
-
-typedef struct {
-    double x, y, z;
-} Triple;
-
 // sRGB's primaries (IEC 61966-2-1:1999) and the white x 0.31271, y 0.32902 (D65, CIE 15:2004), and back.
 static const double xyz_from_rgb[3][3] = {{0.41238656, 0.35759149, 0.18045049},
                                           {0.21263682, 0.71518298, 0.0721802},
@@ -37,28 +32,28 @@ static const double xyz_from_rgb[3][3] = {{0.41238656, 0.35759149, 0.18045049},
 static const double rgb_from_xyz[3][3] = {{3.24100323, -1.53739897, -0.49861588},
                                           {-0.96922425, 1.87592998, 0.04155423},
                                           {0.05563942, -0.20401121, 1.05714898}};
-static const Triple white = {0.95042854, 1, 1.0889004};
+static const Vector3 white = {0.95042854, 1, 1.0889004};
 
-static Triple transform(const double matrix[3][3], Triple v)
+static Vector3 transform(const double matrix[3][3], Vector3 v)
 {
-    return (Triple){matrix[0][0] * v.x + matrix[0][1] * v.y + matrix[0][2] * v.z,
-                    matrix[1][0] * v.x + matrix[1][1] * v.y + matrix[1][2] * v.z,
-                    matrix[2][0] * v.x + matrix[2][1] * v.y + matrix[2][2] * v.z};
+    return (Vector3){matrix[0][0] * v.x + matrix[0][1] * v.y + matrix[0][2] * v.z,
+                     matrix[1][0] * v.x + matrix[1][1] * v.y + matrix[1][2] * v.z,
+                     matrix[2][0] * v.x + matrix[2][1] * v.y + matrix[2][2] * v.z};
 }
 
 // Linear RGB to YCxCz, a linear relative of L*a*b* (section 4.1.1), and back.
-static Triple ycc_from_rgb(Triple rgb)
+static Vector3 ycc_from_rgb(Vector3 rgb)
 {
-    Triple xyz = transform(xyz_from_rgb, rgb);
-    Triple ratio = {xyz.x / white.x, xyz.y / white.y, xyz.z / white.z};
-    return (Triple){116 * ratio.y - 16, 500 * (ratio.x - ratio.y), 200 * (ratio.y - ratio.z)};
+    Vector3 xyz = transform(xyz_from_rgb, rgb);
+    Vector3 ratio = {xyz.x / white.x, xyz.y / white.y, xyz.z / white.z};
+    return (Vector3){116 * ratio.y - 16, 500 * (ratio.x - ratio.y), 200 * (ratio.y - ratio.z)};
 }
 
-static Triple rgb_from_ycc(Triple ycc)
+static Vector3 rgb_from_ycc(Vector3 ycc)
 {
     double y = (ycc.x + 16) / 116;
     return transform(rgb_from_xyz,
-                     (Triple){white.x * (y + ycc.y / 500), white.y * y, white.z * (y - ycc.z / 200)});
+                     (Vector3){white.x * (y + ycc.y / 500), white.y * y, white.z * (y - ycc.z / 200)});
 }
 
 static double lab_root(double ratio)
@@ -68,16 +63,16 @@ static double lab_root(double ratio)
 }
 
 // Linear RGB to L*a*b* (CIE 15:2004), with colors fading in the dark (Hunt; section 4.1.3).
-static Triple hunt_lab(Triple rgb)
+static Vector3 hunt_lab(Vector3 rgb)
 {
-    Triple xyz = transform(xyz_from_rgb, rgb);
+    Vector3 xyz = transform(xyz_from_rgb, rgb);
     double x = lab_root(xyz.x / white.x), y = lab_root(xyz.y / white.y), z = lab_root(xyz.z / white.z);
     double lightness = 116 * y - 16;
-    return (Triple){lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
+    return (Vector3){lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
 }
 
 // The distance HyAB (Abasi, Tehran, Fairchild 2020; section 4.1.3).
-static double color_distance(Triple p, Triple q)
+static double color_distance(Vector3 p, Vector3 q)
 {
     return pow(fabs(p.x - q.x) + hypot(p.y - q.y, p.z - q.z), color_exponent);
 }
@@ -190,7 +185,7 @@ static double gaussian_second_derivative(double x, double deviation)
 // In pixels, of exp(-pi^2 x^2 / b).
 static double sensitivity_deviation(double b)
 {
-    return sqrt(b / (2 * pi * pi)) * FLIP_PIXELS_PER_DEGREE;
+    return sqrt(b / (2 * M_PI * M_PI)) * FLIP_PIXELS_PER_DEGREE;
 }
 
 // What the eye resolves of one of YCxCz (section 4.1.2). Each Gaussian is a product of one across and one
@@ -206,7 +201,7 @@ static void channel_blur(Channel *channel, int component)
         double deviation = sensitivity_deviation(b), length = 0;
         for (int x = -radius; x <= radius; x++)
             length += gaussian(x, deviation);
-        volumes[i] = a * sqrt(pi / b) * length * length;
+        volumes[i] = a * sqrt(M_PI / b) * length * length;
         Filter filter = filter_make(gaussian, deviation, radius);
         parts[i] = channel_filter(channel, &filter, &filter);
     }
@@ -236,10 +231,10 @@ static Channel feature_strength(const Channel *gray, double (*shape)(double x, d
     return across;
 }
 
-static Triple ycc_from_display(const float color[3])
+static Vector3 ycc_from_display(const float color[3])
 {
-    return ycc_from_rgb((Triple){srgb_decode((double)color[0]), srgb_decode((double)color[1]),
-                                 srgb_decode((double)color[2])});
+    return ycc_from_rgb((Vector3){srgb_decode((double)color[0]), srgb_decode((double)color[1]),
+                                  srgb_decode((double)color[2])});
 }
 
 // An image as the eye has it.
@@ -255,7 +250,7 @@ static Seen seen_open(const float *image, uint32_t width, uint32_t height)
     for (int i = 0; i < 3; i++)
         seen.ycc[i] = channel_open(width, height);
     for (size_t i = 0; i < (size_t)width * height; i++) {
-        Triple ycc = ycc_from_display(image + 3 * i);
+        Vector3 ycc = ycc_from_display(image + 3 * i);
         seen.ycc[0].values[i] = (float)ycc.x;
         seen.ycc[1].values[i] = (float)ycc.y;
         seen.ycc[2].values[i] = (float)ycc.z;
@@ -282,16 +277,16 @@ static double clipped(double value)
     return fmax(0, fmin(value, 1));
 }
 
-static Triple seen_color(Triple ycc)
+static Vector3 seen_color(Vector3 ycc)
 {
-    Triple rgb = rgb_from_ycc(ycc);
-    return hunt_lab((Triple){clipped(rgb.x), clipped(rgb.y), clipped(rgb.z)});
+    Vector3 rgb = rgb_from_ycc(ycc);
+    return hunt_lab((Vector3){clipped(rgb.x), clipped(rgb.y), clipped(rgb.z)});
 }
 
-static Triple seen_color_at(const Seen *seen, size_t i)
+static Vector3 seen_color_at(const Seen *seen, size_t i)
 {
-    return seen_color((Triple){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
-                               (double)seen->ycc[2].values[i]});
+    return seen_color((Vector3){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
+                                (double)seen->ycc[2].values[i]});
 }
 
 // The part of 0..1 up to compressed_to is for the smaller distances, the rest for those up to the largest.
@@ -303,9 +298,9 @@ static double compressed(double distance, double largest)
 }
 
 // Of the colors as seen (section 4.1.3).
-static double color_difference(Triple reference, Triple test)
+static double color_difference(Vector3 reference, Vector3 test)
 {
-    double largest = color_distance(hunt_lab((Triple){0, 1, 0}), hunt_lab((Triple){0, 0, 1}));
+    double largest = color_distance(hunt_lab((Vector3){0, 1, 0}), hunt_lab((Vector3){0, 0, 1}));
     return compressed(color_distance(reference, test), largest);
 }
 

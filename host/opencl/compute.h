@@ -99,17 +99,16 @@ cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
 
 // One command's time by its event and by the host's clock.
 typedef struct {
-    double queued_seconds, start_seconds, end_seconds; // device clock, from an arbitrary moment
-    double event_seconds;                              // end - start; 0 where the runtime reports zeros
-    double host_seconds;                               // from enqueue until the host sees it complete
-    double host_start_seconds;                         // clock_seconds() before the enqueue
+    double start_seconds, end_seconds; // device clock, from an arbitrary moment
+    double event_seconds;              // end - start; 0 where the runtime reports zeros
+    double host_seconds;               // from enqueue until the host sees it complete
+    double host_start_seconds;         // clock_seconds() before the enqueue
     bool trusted; // false: zeros, a mere counter, end before start, or event longer than host_seconds
 } LaunchTime;
 
 // Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. An event may
 // exceed those by the timer's resolution and 1 %.
-LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, double host_seconds,
-                             double resolution_seconds);
+LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
 
 // Why the event's times are not trusted, or NULL where they are.
 const char *launch_time_doubt(const LaunchTime *time);

@@ -2,11 +2,9 @@
 #include "host/base/clock.h"
 #include "host/opencl/compute.h"
 
-LaunchTime launch_time_judge(cl_ulong queued, cl_ulong start, cl_ulong end, double host_seconds,
-                             double resolution_seconds)
+LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds)
 {
     LaunchTime time = {
-        .queued_seconds = 1e-9 * (double)queued,
         .start_seconds = 1e-9 * (double)start,
         .end_seconds = 1e-9 * (double)end,
         .host_seconds = host_seconds,
@@ -47,8 +45,7 @@ LaunchTime event_time(Compute *compute, cl_event event, const char *command, dou
                 clGetEventInfo(event, CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof state, &state, NULL));
     if (state < 0) compute_fail(compute, command, state, "the command failed on the device");
     if (compute_check(compute, waited, "clWaitForEvents")) {
-        time = launch_time_judge(event_timestamp(event, CL_PROFILING_COMMAND_QUEUED),
-                                 event_timestamp(event, CL_PROFILING_COMMAND_START),
+        time = launch_time_judge(event_timestamp(event, CL_PROFILING_COMMAND_START),
                                  event_timestamp(event, CL_PROFILING_COMMAND_END), host_seconds,
                                  compute->device->timer_resolution_seconds);
         time.host_start_seconds = host_start;

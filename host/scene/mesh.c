@@ -129,8 +129,7 @@ static void parts_make(void *context, size_t begin, size_t end)
         Vector3 corners[3];
         corners_of(parts->mesh, parts->first + i, corners);
         NormalPart *part = &parts->parts[i];
-        part->unit = vector_normalize(
-            vector_cross(vector_subtract(corners[1], corners[0]), vector_subtract(corners[2], corners[0])));
+        part->unit = vector_normalize(triangle_normal(corners[0], corners[1], corners[2]));
         for (int corner = 0; corner < 3; corner++)
             part->angles[corner] = angle_between(vector_subtract(corners[(corner + 1) % 3], corners[corner]),
                                                  vector_subtract(corners[(corner + 2) % 3], corners[corner]));
@@ -167,8 +166,7 @@ size_t mesh_degenerate_count(const Mesh *mesh)
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         Vector3 corners[3];
         corners_of(mesh, i, corners);
-        count += vector_is_zero(
-            vector_cross(vector_subtract(corners[1], corners[0]), vector_subtract(corners[2], corners[0])));
+        count += vector_is_zero(triangle_normal(corners[0], corners[1], corners[2]));
     }
     return count;
 }

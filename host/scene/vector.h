@@ -55,6 +55,12 @@ static inline Vector3 vector_cross(Vector3 a, Vector3 b)
     return (Vector3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+// Twice as long as the triangle's area.
+static inline Vector3 triangle_normal(Vector3 a, Vector3 b, Vector3 c)
+{
+    return vector_cross(vector_subtract(b, a), vector_subtract(c, a));
+}
+
 static inline double vector_length(Vector3 a)
 {
     return hypot(hypot(a.x, a.y), a.z);

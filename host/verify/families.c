@@ -1,7 +1,6 @@
 #include "host/verify/families.h"
 
 #include "host/base/array.h"
-#include "host/import/load.h"
 #include <math.h>
 #include <string.h>
 
@@ -45,11 +44,16 @@ static Vector3 unit(Vector3 a)
     return (Vector3){a.x / length, a.y / length, a.z / length};
 }
 
+Vector3 random_in_cube(unsigned seed, uint64_t index, unsigned first_dimension)
+{
+    return (Vector3){random_symmetric(seed, index, first_dimension),
+                     random_symmetric(seed, index, first_dimension + 1),
+                     random_symmetric(seed, index, first_dimension + 2)};
+}
+
 Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension)
 {
-    return unit((Vector3){random_symmetric(seed, index, first_dimension),
-                          random_symmetric(seed, index, first_dimension + 1),
-                          random_symmetric(seed, index, first_dimension + 2)});
+    return unit(random_in_cube(seed, index, first_dimension));
 }
 
 // a x + b y + c z + d
@@ -257,8 +261,7 @@ void scene_icosphere(Scene *scene)
 TraceRay family_from_within(uint64_t i)
 {
     unsigned point = random_choice(31, i, 0, 100);
-    Vector3 origin = {0.17 * random_symmetric(32, point, 0), 0.17 * random_symmetric(32, point, 1),
-                      0.17 * random_symmetric(32, point, 2)};
+    Vector3 origin = vector_scale(random_in_cube(32, point, 0), 0.17);
     Corners triangle = icosphere_triangle(random_choice(31, i, 1, ICOSPHERE_COUNT));
     unsigned first = random_choice(31, i, 2, 3);
     Vector3 a = triangle.corners[first], b = triangle.corners[(first + 1) % 3],

@@ -10,9 +10,10 @@
 typedef TraceRay (*RayFamily)(uint64_t index);
 
 // Counter-based random numbers: dimension `dimension`, 0 to 31, of sample `index` of sequence `seed`. From 0
-// to 1; from -1 to 1; and a unit vector of three dimensions.
+// to 1; from -1 to 1; of three dimensions a point of the cube from -1 to 1, and a unit vector.
 double random_at(unsigned seed, uint64_t index, unsigned dimension);
 double random_symmetric(unsigned seed, uint64_t index, unsigned dimension);
+Vector3 random_in_cube(unsigned seed, uint64_t index, unsigned first_dimension);
 Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension);
 
 TraceRay family_disc_rim(uint64_t index);         // P3

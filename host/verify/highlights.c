@@ -2,7 +2,6 @@
 #include "host/verify/checks.h"
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 // Where on the unit sphere the highlight is seen.
 static Vector3 highlight_middle(Vector3 eye, Vector3 to_light)

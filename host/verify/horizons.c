@@ -1,7 +1,6 @@
 // Images of ground up to its horizon.
 #include "host/verify/checks.h"
 #include <math.h>
-#include <stdlib.h>
 
 // The first row, from the bottom, whose pixel of the column hits nothing; counts what is hit above it.
 static uint32_t column_horizon(VerifyRun *run, const Film *image, uint32_t column)

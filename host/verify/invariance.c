@@ -2,8 +2,6 @@
 #include "host/compile/transform.h"
 #include "host/verify/run.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 // The eye is the origin, so that rays can be given to the scene as it is.
 static const char every_shape[] =

@@ -8,13 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static TraceRay ray_of(const VerifyRun *run, Vector3 origin, Vector3 direction)
-{
-    TraceRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
-    verify_round_ray(run, &ray);
-    return ray;
-}
-
 // From inside a mesh where neighboring floats are 1/64 apart no ray gets out.
 void verify_far_mesh(VerifyRun *run)
 {
@@ -27,9 +20,8 @@ void verify_far_mesh(VerifyRun *run)
     for (uint64_t batch = 0; batch < BATCHES; batch++) {
         for (uint64_t i = 0; i < COUNT; i++) {
             uint64_t index = batch * COUNT + i;
-            Vector3 off = {random_symmetric(65, index, 0), random_symmetric(65, index, 1),
-                           random_symmetric(65, index, 2)};
-            rays[i] = ray_of(run, vector_add(far_sphere_center, off), random_unit(65, index, 3));
+            Vector3 origin = vector_add(far_sphere_center, random_in_cube(65, index, 0));
+            rays[i] = verify_ray(run, origin, random_unit(65, index, 3));
         }
         verify_trace_opened(run, opened, rays, COUNT, hits);
         for (size_t i = 0; i < COUNT; i++)
@@ -53,7 +45,7 @@ void verify_scale_ladder(VerifyRun *run)
     for (int k = SMALLEST; k <= LARGEST; k++) {
         double s = ldexp(1, k), across = ldexp(third, k);
         scene_add_triangle(&scene, (Vector3[]){{0, 0, 0}, {s, 0, 0}, {0, s, 0}});
-        rays[k - SMALLEST] = ray_of(run, (Vector3){across, across, -s}, (Vector3){0, 0, 1});
+        rays[k - SMALLEST] = verify_ray(run, (Vector3){across, across, -s}, (Vector3){0, 0, 1});
     }
     verify_trace(run, &scene, false, rays, COUNT, hits);
     scene_free(&scene);
@@ -111,10 +103,8 @@ void verify_facing_triangle(VerifyRun *run)
     static const Vector3 corners[] = {{2001, 1002, -1998}, {2001, -1998, 1002}, {-3999, 1002, 1002}};
     TraceRay rays[COUNT];
     TraceHit hits[COUNT];
-    for (uint64_t i = 0; i < COUNT; i++) {
-        Vector3 start = {random_symmetric(72, i, 0), random_symmetric(72, i, 1), random_symmetric(72, i, 2)};
-        rays[i] = ray_of(run, start, (Vector3){1, 2, 2});
-    }
+    for (uint64_t i = 0; i < COUNT; i++)
+        rays[i] = verify_ray(run, random_in_cube(72, i, 0), (Vector3){1, 2, 2});
     Scene scene = scene_empty();
     scene_add_triangle(&scene, corners);
     verify_trace(run, &scene, false, rays, COUNT, hits);
@@ -128,18 +118,12 @@ void verify_facing_triangle(VerifyRun *run)
     }
 }
 
-static Vector3 random_point(unsigned seed, uint64_t index, unsigned dimension)
-{
-    return (Vector3){random_symmetric(seed, index, dimension), random_symmetric(seed, index, dimension + 1),
-                     random_symmetric(seed, index, dimension + 2)};
-}
-
 static void add_random_triangles(Scene *scene, unsigned count, double size)
 {
     for (uint64_t i = 0; i < count; i++) {
-        Vector3 a = random_point(66, i, 0);
-        scene_add_triangle(scene, (Vector3[]){a, vector_add(a, vector_scale(random_point(66, i, 3), size)),
-                                              vector_add(a, vector_scale(random_point(66, i, 6), size))});
+        Vector3 a = random_in_cube(66, i, 0);
+        scene_add_triangle(scene, (Vector3[]){a, vector_add(a, vector_scale(random_in_cube(66, i, 3), size)),
+                                              vector_add(a, vector_scale(random_in_cube(66, i, 6), size))});
     }
 }
 
@@ -168,13 +152,13 @@ void verify_degenerate_meshes(VerifyRun *run)
     TraceHit *hits = memory_allocate(count, sizeof *hits), *clean = memory_allocate(count, sizeof *clean);
     for (uint64_t i = 0; i < count; i++) {
         Vector3 origin = vector_scale(random_unit(67, i, 0), 4);
-        Vector3 target = random_point(67, i, 3);
+        Vector3 target = random_in_cube(67, i, 3);
         if (i % 2) {
             const Vector3 *corners = degenerate[i / 2 % 4];
             Vector3 along = vector_subtract(corners[2], corners[0]);
             target = vector_add(corners[0], vector_scale(along, i % 4 == 1 ? 0.5 : random_at(67, i, 6)));
         }
-        rays[i] = ray_of(run, origin, vector_subtract(target, origin));
+        rays[i] = verify_ray(run, origin, vector_subtract(target, origin));
     }
     Scene scene = scene_empty();
     add_random_triangles(&scene, SOUND, 0.5);
@@ -206,7 +190,7 @@ static Scene m6_scene(void)
     add_random_triangles(&scene, M6_TRIANGLES, 0.05);
     Random random = {68};
     for (size_t i = 0; i < form_count * M6_OTHERS; i++) {
-        Vector3 center = random_point(68, i, 0);
+        Vector3 center = random_in_cube(68, i, 0);
         RandomShape shape =
             random_shape_at(&forms[i % form_count], center, random_between(&random, 0.02, 0.1), &random);
         if (forms[i % form_count].bounded) array_push(scene.objects, shape.object);
@@ -231,7 +215,7 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
     for (uint64_t i = first; i < first + M6_RAYS; i++) {
         uint64_t triangle = (uint64_t)(random_at(69, i, 0) * M6_TRIANGLES);
         Vector3 corner = scene->objects.items[triangle].as.triangle.vertices[i % 3];
-        Vector3 origin = vector_scale(random_unit(69, i, 1), 3), direction = random_point(69, i, 4);
+        Vector3 origin = vector_scale(random_unit(69, i, 1), 3), direction = random_in_cube(69, i, 4);
         if (i % 4 == 0) direction = vector_subtract(direction, origin);
         if (i % 4 == 1) {
             double parts[] = {0, 0, 0};
@@ -248,7 +232,7 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
             direction = (Vector3){hit->reflected_direction[0], hit->reflected_direction[1],
                                   hit->reflected_direction[2]};
         }
-        rays[i - first] = ray_of(run, origin, direction);
+        rays[i - first] = verify_ray(run, origin, direction);
     }
 }
 

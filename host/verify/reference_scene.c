@@ -12,8 +12,7 @@ static Object mesh_triangle(const Mesh *mesh, size_t part, uint32_t material)
     Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
     for (int i = 0; i < 3; i++)
         vertices[i] = mesh->vertices[corners[i]];
-    const Vector3 flat =
-        vector_cross(vector_subtract(vertices[1], vertices[0]), vector_subtract(vertices[2], vertices[0]));
+    const Vector3 flat = triangle_normal(vertices[0], vertices[1], vertices[2]);
     for (int i = 0; i < 3; i++) {
         normals[i] = mesh->normals ? mesh->normals[corners[i]] : flat;
         if (vector_dot(normals[i], normals[i]) == 0) normals[i] = flat;

@@ -61,6 +61,7 @@ double verify_rounded(const VerifyRun *run, double value); // to the precision a
 // Rounds the ray's numbers as the renderer will, so that exact answers are of the same ray; a tmax beyond the
 // precision's range becomes the largest number in it.
 void verify_round_ray(const VerifyRun *run, TraceRay *ray);
+TraceRay verify_ray(const VerifyRun *run, Vector3 origin, Vector3 direction); // of that, without a tmax
 
 static inline bool verify_is_hit(const TraceHit *hit)
 {

@@ -1,8 +1,6 @@
 // Images of shadows: none where nothing stands in the light, and none missing.
-#include "host/base/array.h"
 #include "host/verify/checks.h"
 #include <math.h>
-#include <stdlib.h>
 
 // A plane alone in light from just above it to steeply above it, near and far from the origin, small and
 // large: no pixel lies in shadow, and all have one color, the light's cosine with the normal.

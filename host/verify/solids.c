@@ -8,13 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static TraceRay ray_of(const VerifyRun *run, Vector3 origin, Vector3 direction)
-{
-    TraceRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
-    verify_round_ray(run, &ray);
-    return ray;
-}
-
 // A direction 2^20 times as long, or as short, gives the same hits at distances exactly as many times
 // shorter, or longer.
 void verify_scaled_directions(VerifyRun *run)
@@ -26,7 +19,7 @@ void verify_scaled_directions(VerifyRun *run)
     for (uint64_t i = 0; i < COUNT; i++) {
         Vector3 origin = vector_scale(random_unit(61, i, 0), i % 2 ? 0.7 : 3);
         Vector3 target = vector_scale(random_unit(61, i, 3), 0.9);
-        rays[0][i] = ray_of(run, origin, vector_subtract(target, origin));
+        rays[0][i] = verify_ray(run, origin, vector_subtract(target, origin));
         for (size_t k = 1; k < 3; k++) {
             rays[k][i] = rays[0][i];
             for (size_t axis = 0; axis < 3; axis++)
@@ -84,7 +77,7 @@ static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned g
         Vector3 origin = vector_add(center, vector_scale(random_unit(63, index, 1), away));
         double off = 0.9 * radius * random_at(63, index, 4);
         Vector3 target = vector_add(center, vector_scale(random_unit(63, index, 5), off));
-        rays[i] = ray_of(run, origin, vector_subtract(target, origin));
+        rays[i] = verify_ray(run, origin, vector_subtract(target, origin));
     }
 }
 
@@ -98,9 +91,9 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, s
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         Vector3 direction = random_unit(64, sphere * DIRECTIONS + i, 0);
         if (vector_dot(direction, verify_vector(first->normal)) < 0) direction = vector_scale(direction, -1);
-        rays[i] = ray_of(run, verify_vector(first->reflected_origin), direction);
+        rays[i] = verify_ray(run, verify_vector(first->reflected_origin), direction);
         rays[DIRECTIONS + i] =
-            ray_of(run, verify_vector(first->refracted_origin), vector_scale(direction, -1));
+            verify_ray(run, verify_vector(first->refracted_origin), vector_scale(direction, -1));
     }
     verify_trace_opened(run, opened, rays, 2 * (size_t)DIRECTIONS, hits);
     for (size_t i = 0; i < DIRECTIONS; i++) {
@@ -179,7 +172,7 @@ void verify_coincident_faces(VerifyRun *run)
         Vector3 origin = {0.5, random_at(7, i, 0), random_at(7, i, 1)}, direction = {1, 0, 0};
         if (i % 2)
             direction = vector_subtract((Vector3){2 * random_at(7, i, 2), 0, random_at(7, i, 3)}, origin);
-        rays[i] = ray_of(run, origin, direction);
+        rays[i] = verify_ray(run, origin, direction);
     }
     for (size_t k = 0; k < COINCIDENT; k++) {
         char text[128];

@@ -1,14 +1,11 @@
 #include "host/verify/verify.h"
 #include "host/import/load.h"
 
-#include "host/base/array.h"
 #include "host/base/fault.h"
-#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/verify/rays.h"
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { CHECKS_MAX = 3 };
@@ -103,6 +100,13 @@ void verify_round_ray(const VerifyRun *run, TraceRay *ray)
     }
     ray->tmin = verify_rounded(run, ray->tmin);
     ray->tmax = fmin(ray->tmax, verify_is_double(run) ? DBL_MAX : (double)FLT_MAX);
+}
+
+TraceRay verify_ray(const VerifyRun *run, Vector3 origin, Vector3 direction)
+{
+    TraceRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    verify_round_ray(run, &ray);
+    return ray;
 }
 
 static bool is_finite(const double vector[3])

@@ -1,7 +1,6 @@
 // Images by cameras whose numbers are extreme or say too little.
 #include "host/verify/run.h"
 #include <math.h>
-#include <stdlib.h>
 
 enum { SIDE = 65 };
 

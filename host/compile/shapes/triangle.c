@@ -23,7 +23,7 @@ static inline __attribute__((always_inline)) Vector3 cross_product(Vector3 a, Ve
 
 static inline bool has_area(Vector3 a, Vector3 b, Vector3 c)
 {
-    return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
+    return !vector_is_zero(triangle_normal(a, b, c));
 }
 
 // One without area shrinks to a point, which no ray meets: the kernels rotate vertices, and what was a line

@@ -135,7 +135,7 @@ static bool face_has_area(const struct aiMesh *mesh, const struct aiFace *face)
     const Vector3 a = vector_of(&mesh->mVertices[face->mIndices[0]]),
                   b = vector_of(&mesh->mVertices[face->mIndices[1]]),
                   c = vector_of(&mesh->mVertices[face->mIndices[2]]);
-    return !vector_is_zero(vector_cross(vector_subtract(b, a), vector_subtract(c, a)));
+    return !vector_is_zero(triangle_normal(a, b, c));
 }
 
 static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct aiFace *face, size_t first,

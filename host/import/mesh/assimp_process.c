@@ -1,6 +1,5 @@
 #include "host/import/mesh/assimp_process.h"
 #include "host/base/fault.h"
-#include "host/base/memory.h"
 #include "host/import/number.h"
 
 #include <errno.h>

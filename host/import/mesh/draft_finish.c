@@ -176,9 +176,8 @@ static void polygons_cut(MeshDraft *draft)
 static bool triangle_has_area(const MeshDraft *draft, const uint32_t *corners)
 {
     const Vector3 *positions = draft->positions.items;
-    const Vector3 a = positions[corners[0]];
     return !vector_is_zero(
-        vector_cross(vector_subtract(positions[corners[1]], a), vector_subtract(positions[corners[2]], a)));
+        triangle_normal(positions[corners[0]], positions[corners[1]], positions[corners[2]]));
 }
 
 // A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side. Degenerate
