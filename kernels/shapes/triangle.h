@@ -29,9 +29,10 @@ static inline Corners corners_select(mask condition, Corners yes, Corners no)
 }
 
 typedef struct {
-    real u, v, w;     // edge functions opposite a, b, c; all of one sign inside, edges included
-    real determinant; // their sum
-    Vector a, b, c;   // the vertices, from the ray's start
+    real u, v, w;                // edge functions opposite a, b, c; all of one sign inside, edges included
+    real determinant;            // their sum
+    Vector a, b, c;              // the vertices, from the ray's start
+    real ax, ay, bx, by, cx, cy; // and across it
 } TriangleEdges;
 
 static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
@@ -50,6 +51,12 @@ static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
     edges.a = a;
     edges.b = b;
     edges.c = c;
+    edges.ax = ax;
+    edges.ay = ay;
+    edges.bx = bx;
+    edges.by = by;
+    edges.cx = cx;
+    edges.cy = cy;
     return edges;
 }
 
@@ -258,62 +265,78 @@ static inline void triangle_smooth(Corners normals, TriangleWeights weights, Sur
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
-// No vertex is farther from the origin.
-static inline scalar triangle_size(const Triangle *triangle)
+// Upper bounds: `size` of the vertices' distances from the eye, `longest` of the edges' lengths.
+typedef struct {
+    scalar size, longest;
+} TriangleSizes;
+
+// An upper bound of the length of xyz >= 0: a root would make packets wait.
+static inline scalar norm_above(scalar4 a)
 {
-    scalar4 largest = fmax(fmax(fabs(triangle->a), fabs(triangle->b)), fabs(triangle->c));
-    scalar squared = largest.x * largest.x + largest.y * largest.y + largest.z * largest.z;
-    return uniform_sqrt(squared) * (1 + 16 * UNIT_ROUNDOFF);
+    scalar xy = a.x > a.y ? a.x : a.y, largest = xy > a.z ? xy : a.z;
+    return (scalar)(0.5f + 16 * UNIT_ROUNDOFF) * (largest + (a.x + a.y + a.z));
 }
 
-// In the ray's frame a vertex is off by `error` along each axis, and so an edge function by twice that times
-// the coordinates it is made of. t is between those of the vertices, weighted by the edge functions.
-static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
+static inline TriangleSizes triangle_sizes(const Triangle *triangle)
 {
-    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, triangle->id.x, true);
-    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
-    TriangleEdges edges = triangle_edges(corners, ray);
-    Vector u = ray->across_u, v = ray->across_v;
-    real size = (real)(triangle_size(triangle)),
-         error = real_fma(ray->across_error1, size, ray->across_error0);
-    real ax = vector_dot(edges.a, u), ay = vector_dot(edges.a, v);
-    real bx = vector_dot(edges.b, u), by = vector_dot(edges.b, v);
-    real cx = vector_dot(edges.c, u), cy = vector_dot(edges.c, v);
-    real a_sum = fabs(ax) + fabs(ay) + error, b_sum = fabs(bx) + fabs(by) + error,
-         c_sum = fabs(cx) + fabs(cy) + error;
-    // first by what all three are off by together
-    real edge_error = (error + error) * (a_sum + b_sum + c_sum);
-    real highest = real_max(real_max(edges.u, edges.v), edges.w),
-         lowest = real_min(real_min(edges.u, edges.v), edges.w);
-    mask perhaps = lanes & !((highest > edge_error) & (lowest < -edge_error));
-    if (!lanes_any(perhaps)) return certain_miss();
-    // then by each one's own errors, by its distance from the ray's start
-    real distance = vector_norm(corners_max_abs((Corners){edges.a, edges.b, edges.c}));
-    real place = ray_place_error(ray, distance) +
-                 (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, size);
-    error = real_min(error, place * ray->across_length);
+    scalar4 a = triangle->a, b = triangle->b, c = triangle->c;
+    scalar4 high = a > b ? a : b, low = a < b ? a : b;
+    high = high > c ? high : c;
+    low = low < c ? low : c;
+    scalar4 largest = high > -low ? high : -low;
+    return (TriangleSizes){norm_above(largest), norm_above(high - low)};
+}
+
+// The signs of the edge functions: where a vertex is off by `error` along each axis of the ray's frame, they
+// are off by that times the coordinates that they are made of.
+typedef struct {
+    mask perhaps, certain;
+    real coordinates; // times the error that of all three together
+} TriangleSigns;
+
+static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real error)
+{
+    const real zero = (real)(0);
+    real a_sum = fabs(edges->ax) + fabs(edges->ay) + error, b_sum = fabs(edges->bx) + fabs(edges->by) + error,
+         c_sum = fabs(edges->cx) + fabs(edges->cy) + error;
     real u_error = error * (b_sum + c_sum), v_error = error * (c_sum + a_sum),
          w_error = error * (a_sum + b_sum);
-    edge_error = u_error + v_error + w_error;
-    highest = real_max(real_max(edges.u - u_error, edges.v - v_error), edges.w - w_error);
-    lowest = real_min(real_min(edges.u + u_error, edges.v + v_error), edges.w + w_error);
-    mask misses = ((highest > (real)(0)) & (lowest < (real)(0))) | (real_min(real_min(ax, bx), cx) > error) |
-                  (real_max(real_max(ax, bx), cx) < -error) | (real_min(real_min(ay, by), cy) > error) |
-                  (real_max(real_max(ay, by), cy) < -error);
-    perhaps = perhaps & !misses;
-    if (!lanes_any(perhaps)) return certain_miss();
-    mask all_above = (edges.u > u_error) & (edges.v > v_error) & (edges.w > w_error);
-    mask all_below = (edges.u < -u_error) & (edges.v < -v_error) & (edges.w < -w_error);
-    mask certain = perhaps & (all_above | all_below);
+    real u_low = edges->u - u_error, v_low = edges->v - v_error, w_low = edges->w - w_error;
+    real u_high = edges->u + u_error, v_high = edges->v + v_error, w_high = edges->w + w_error;
+    mask misses = (real_max(real_max(u_low, v_low), w_low) > zero) &
+                  (real_min(real_min(u_high, v_high), w_high) < zero);
+    TriangleSigns signs;
+    signs.perhaps = !misses;
+    signs.certain = ((u_low > zero) & (v_low > zero) & (w_low > zero)) |
+                    ((u_high < zero) & (v_high < zero) & (w_high < zero));
+    signs.coordinates = (real)(2) * (a_sum + b_sum + c_sum);
+    return signs;
+}
 
-    real a_t = vector_dot(edges.a, ray->along), b_t = vector_dot(edges.b, ray->along),
-         c_t = vector_dot(edges.c, ray->along);
+// The error across the ray of a vertex up to a distance from the ray's start.
+static inline real triangle_place_error(const Ray *ray, real distance, TriangleSizes sizes)
+{
+    return ray_place_error(ray, distance) +
+           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, (real)(sizes.size));
+}
+
+// t is between those of the vertices, weighted by the edge functions. The vertices of a triangle that is hit
+// are no farther across the ray than its longest edge and the error.
+static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, const Ray *ray, mask lanes,
+                                                   TriangleSigns signs, TriangleSizes sizes, real error)
+{
+    mask perhaps = lanes & signs.perhaps, certain = perhaps & signs.certain;
+    real a_t = vector_dot(edges->a, ray->along), b_t = vector_dot(edges->b, ray->along),
+         c_t = vector_dot(edges->c, ray->along);
     real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
+    real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
+    real place = triangle_place_error(ray, distance, sizes);
     real vertex_error = ray->inverse_length * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
+    real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
     // in doubt as well: if it is hit, then where the weights say
-    mask narrows = perhaps & (fabs(edges.determinant) > (real)(8) * edge_error);
-    real inverse = real_divide((real)(1), lanes_select(narrows, edges.determinant, (real)(1)));
-    real t = c_t + real_fma(a_t - c_t, edges.u * inverse, (b_t - c_t) * (edges.v * inverse));
+    mask narrows = perhaps & (fabs(edges->determinant) > (real)(8) * edge_error);
+    real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
+    real t = c_t + real_fma(a_t - c_t, edges->u * inverse, (b_t - c_t) * (edges->v * inverse));
     // of all weights: the edge functions' errors and as much of the determinant's, over 7/8 of it: 16/7
     real part = (real)(2.5f) * edge_error * fabs(inverse);
     real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
@@ -323,6 +346,38 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     low = lanes_select(narrows, real_max(low, t - t_error), low);
     high = lanes_select(narrows, real_min(high, t + t_error), high);
     return certain_crossing(ray, certain, perhaps, low, high);
+}
+
+// By the vertices' distances from the ray's start, which may be much less than those from the eye.
+static OUT_OF_LINE CertainHit triangle_certain_hit_near(const TriangleEdges *edges, const Ray *ray,
+                                                        mask lanes, TriangleSizes sizes, real error)
+{
+    real ax = edges->ax, ay = edges->ay, bx = edges->bx, by = edges->by, cx = edges->cx, cy = edges->cy;
+    real distance = vector_norm(corners_max_abs((Corners){edges->a, edges->b, edges->c}));
+    error = real_min(error, triangle_place_error(ray, distance, sizes) * ray->across_length);
+    mask misses = (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
+                  (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
+    TriangleSigns signs = triangle_signs(edges, error);
+    return triangle_certain_crossing(edges, ray, lanes & !misses, signs, sizes, error);
+}
+
+// First by one error for all edge functions of triangles that are hit: docs/numerics.md.
+static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
+{
+    TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
+    TriangleSizes sizes = triangle_sizes(triangle);
+    real error = real_fma(ray->across_error1, (real)(sizes.size), ray->across_error0);
+    real edge_error = error * real_fma(error, (real)(24), ray->across_length * (real)(3.5f * sizes.longest));
+    real highest = real_max(real_max(edges.u, edges.v), edges.w),
+         lowest = real_min(real_min(edges.u, edges.v), edges.w);
+    mask lanes = RAY_ACTIVE(ray) & !((highest > edge_error) & (lowest < -edge_error));
+    if (!lanes_any(lanes)) return certain_miss();
+    TriangleSigns signs = triangle_signs(&edges, error);
+    lanes = lanes & signs.perhaps & !ray_left_for_good(ray, triangle->id.x, true);
+    if (!lanes_any(lanes)) return certain_miss();
+    CertainHit hit = triangle_certain_crossing(&edges, ray, lanes, signs, sizes, error);
+    if (RARELY(lanes_any(hit.doubt))) hit = triangle_certain_hit_near(&edges, ray, lanes, sizes, error);
+    return hit;
 }
 
 // How much longer than high a triangle is at least, over its length: a vertex that moves by e turns the

@@ -157,7 +157,11 @@ static inline void ray_prepare(Ray *ray)
     ray->along = vector_scale(d, ray->inverse_squared);
     if (IS_CERTIFIED) {
         shear_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
-        ray->across_length = (real)(1.42f) * (largest * scale);
+        // sqrt(1 + x^2) <= 1 + 0.42 x for x <= 1
+        real least = real_min(real_min(fabs(d.x), fabs(d.y)), fabs(d.z)),
+             second = vector_norm1(d) - largest - least;
+        ray->across_length =
+            (real)(1 + 16 * UNIT_ROUNDOFF) * scale * real_fma((real)(0.42f), second, largest);
         real per_distance = ray->direction_error + (real)(TRIANGLE_ERROR * UNIT_ROUNDOFF);
         ray->across_error1 = (per_distance + (real)(UNIT_ROUNDOFF)) * ray->across_length;
         ray->across_error0 =
