@@ -71,6 +71,13 @@ def run(command, wrapper=(), env=None, **options):
     return subprocess.run([*wrapper, PROGRAM, *shlex.split(command)], env=environment | (env or {}), **options)
 
 
+def shim_build(name, source, *flags):
+    """Builds a library that a test preloads from C; returns its path."""
+    command = [*shlex.split(os.environ.get("CC", "cc")), "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", name, *flags]
+    subprocess.run(command, input=source, text=True, check=True)
+    return os.path.abspath(name)
+
+
 def need_device():
     """Skips the whole test where there is no OpenCL device; returns the default device."""
     process = run("devices --json")

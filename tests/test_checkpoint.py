@@ -9,7 +9,7 @@ import time
 import unittest
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, shim_build, skip_all, write
 
 # one compute unit: bands are short
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
@@ -92,9 +92,9 @@ class Checkpoints(TestCase):
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_devices(self):
         """With none left the checkpoint stays, and only what it lacks is rendered."""
-        subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "failing.so"], input=FAILING, text=True, check=True)
+        failing = shim_build("failing.so", FAILING)
         for devices, env in ("", POCL), ("--device all", TWO):
-            preloaded = env | {"LD_PRELOAD": os.path.abspath("failing.so")}
+            preloaded = env | {"LD_PRELOAD": failing}
             process = self.glint(f"{RENDER} {devices} -o image.npy --checkpoint saved", 2, env=preloaded)
             self.assertRegex(process.stderr, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
             self.assertIn("run the same command again to continue", process.stderr)

@@ -13,7 +13,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, shim_build, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
@@ -147,7 +147,7 @@ class Mpi(TestCase):
 
     def faults_build(self):
         flags = subprocess.run(["pkg-config", "--cflags", "ompi-c"], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
-        subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "faults.so", *flags], input=FAULTS, text=True, check=True)
+        shim_build("faults.so", FAULTS, *flags)
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
     def write_frames(self, more=(), status=0):

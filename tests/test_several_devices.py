@@ -8,11 +8,10 @@ import os
 import random
 import re
 import shutil
-import subprocess
 import unittest
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, has_device, main, png_read, run, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, has_device, main, png_read, read, run, shim_build, skip_all, write
 
 POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
 TWO = {"env": POCL["env"] | {"POCL_DEVICES": "pthread pthread"}}
@@ -74,8 +73,8 @@ class SeveralDevices(TestCase):
         """Renders by all devices into all.npy, each of which has a band. The report, unless sanitizers forbid the barrier."""
         count = len(self.json("devices --json", **options)["devices"])
         if not IS_SANITIZED:
-            subprocess.run(["cc", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", "barrier.so"], input=BARRIER, text=True, check=True)
-            options = {"env": options["env"] | {"LD_PRELOAD": os.path.abspath("barrier.so"), "BARRIER_QUEUES": str(count)}}
+            barrier = shim_build("barrier.so", BARRIER)
+            options = {"env": options["env"] | {"LD_PRELOAD": barrier, "BARRIER_QUEUES": str(count)}}
         report = self.json(f"{command} -o all.npy --device all --timing=json", **options)
         self.assertEqual(len(report["by_device"]), count)
         if not IS_SANITIZED:
@@ -98,10 +97,10 @@ class SeveralDevices(TestCase):
     @unittest.skipIf(IS_SANITIZED, "sanitizers have handlers of their own")
     def test_failing_calls(self):
         """Any OpenCL call fails, of whichever device: the right image, or an error and none."""
-        subprocess.run(["cc", "-w", "-shared", "-fPIC", "-o", "chaos.so", str(ROOT / "tools/chaos.c"), "-ldl"], check=True)
+        shim = shim_build("chaos.so", read(ROOT / "tools/chaos.c"), "-ldl")
         command = f"render sphere.yaml {LARGE} --samples 20 --precision strict"
         self.glint(f"{command} -o one.npy", **POCL)
-        chaos = {"LD_PRELOAD": os.path.abspath("chaos.so"), "GLINT_CHAOS_LOG": os.path.abspath("calls")}
+        chaos = {"LD_PRELOAD": shim, "GLINT_CHAOS_LOG": os.path.abspath("calls")}
         self.glint(f"{command} --device all -o all.npy", env=TWO["env"] | chaos)
         count = int(re.search(r"^cl (\d+)", Path("calls").read_text(encoding="utf-8"), re.MULTILINE)[1])
         draw, images, dropped = random.Random(20), 0, 0

@@ -17,7 +17,7 @@ import threading
 import time
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, ROOT, TestCase, main, need_device, npy_read, png_read, run, skip_all, write
+from glint import IS_LONG, PROGRAM, ROOT, TestCase, main, need_device, npy_read, png_read, run, shim_build, skip_all, write
 
 SCENE = """\
 camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
@@ -104,6 +104,15 @@ def windows_shown(process):
     """The windows that the process shows."""
     command = ["xdotool", "search", "--onlyvisible", "--pid", str(process)]
     return subprocess.run(command, check=False, capture_output=True, text=True).stdout.split()
+
+
+def wait_until(condition, otherwise):
+    """Leaves the machine to glint between its looks."""
+    end = time.monotonic() + DEADLINE
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(otherwise)
+        time.sleep(0.01)
 
 
 def png_rows(path):
@@ -228,15 +237,10 @@ class Window:
         return max(len({pixels[y * stride + 4 * x : y * stride + 4 * x + 3] for y in rows}) for x in columns)
 
     def title_at_last(self, text):
-        end = time.monotonic() + DEADLINE
-        while text not in xdotool("getwindowname", self.id):
-            self.test.assertLess(time.monotonic(), end, f"the title has no '{text}'")
+        wait_until(lambda: text in xdotool("getwindowname", self.id), f"the title has no '{text}'")
 
     def shows_at_last(self, rows):
-        end = time.monotonic() + DEADLINE
-        while not self.shows(rows):
-            self.test.assertLess(time.monotonic(), end, "the display does not show the image")
-            time.sleep(0.01)  # lets glint work
+        wait_until(lambda: self.shows(rows), "the display does not show the image")
 
     def shows(self, rows):
         stride, pixels = screen()
@@ -248,16 +252,10 @@ class Window:
 
     def says_at_last(self):
         """Anything, in white."""
-        end = time.monotonic() + DEADLINE
-        while b"\xff\xff\xff" not in screen()[1]:
-            self.test.assertLess(time.monotonic(), end, "nothing is said")
-            time.sleep(0.01)
+        wait_until(lambda: b"\xff\xff\xff" in screen()[1], "nothing is said")
 
     def changes_at_last(self, before):
-        end = time.monotonic() + DEADLINE
-        while screen() == before:
-            self.test.assertLess(time.monotonic(), end, "the display does not change")
-            time.sleep(0.01)
+        wait_until(lambda: screen() != before, "the display does not change")
 
     def close(self, status=0):
         self.key("Escape")
@@ -413,9 +411,7 @@ class View(TestCase):
 
     @staticmethod
     def failing_calls():
-        write("calls.c", FAILING_CALLS)
-        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-fPIC", "calls.c", "-o", "calls.so", "-ldl"], check=True)
-        return f"{os.getcwd()}/calls.so"
+        return shim_build("calls.so", FAILING_CALLS, "-ldl")
 
     def test_unwatched_files(self):
         """Whoever uses up what the system has for watching files learns that changes are not seen."""
@@ -464,9 +460,7 @@ class View(TestCase):
                 window.says_at_last()  # what is read
                 if closes:
                     window.key("Escape")
-                    end = time.monotonic() + DEADLINE
-                    while windows_shown(window.process.pid):
-                        self.assertLess(time.monotonic(), end, "the window is still shown")
+                    wait_until(lambda: not windows_shown(window.process.pid), "the window is still shown")
                 with open("slow.yaml", "w") as pipe:
                     self.write_by_rename("slow.yaml", later)  # while the pipe is read
                     pipe.write(SCENE)
@@ -511,10 +505,7 @@ class View(TestCase):
         xdotool("windowsize", "--sync", window.id, 320, 360)
         window.key("shift+v")
         window.title_at_last(", error against double, ")
-        end = time.monotonic() + DEADLINE
-        while window.most_colors_of_a_column(range(160, 320), range(180, 360)) < 64:
-            self.assertLess(time.monotonic(), end, "there is no legend")
-            time.sleep(0.01)
+        wait_until(lambda: window.most_colors_of_a_column(range(160, 320), range(180, 360)) >= 64, "there is no legend")
         window.close()
 
     def test_help(self):
