@@ -33,8 +33,8 @@ ImageFormat image_format_of(const char *path)
 
 static const Encoder *encoder_of(ImageFormat format)
 {
-    if (format >= IMAGE_UNKNOWN) fault("an image of unknown format");
-    return formats[format].encoder;
+    if (format < IMAGE_UNKNOWN) return formats[format].encoder;
+    fault("an image of unknown format");
 }
 
 // Deflate, in PNG and EXR, makes 1032 bytes of one at most (zlib's technical details).
