@@ -174,8 +174,9 @@ typedef struct {
 
 // The enlargement of cull spheres, in units of roundoff: of |v|^2, and of the ray's direction squared.
 enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
-// At `certified` the exact shadow ray may be off by SHADOW_ERROR_MAX u of the way (kernels/shading/phong.h),
-// and near misses count: the lights' spheres, of a radius below |v|, are enlarged by that, too.
+// At `certified` the exact shadow ray may be off by SHADOW_ERROR_MAX u of the distance
+// (kernels/shading/phong.h), and near misses count: the lights' spheres, of a radius below |v|, are enlarged
+// by that, too.
 enum { CERTIFIED_CULL_SPHERE_SLACK = 1 << 10, CERTIFIED_CULL_DIRECTION_SLACK = 1 << 10 };
 
 enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };

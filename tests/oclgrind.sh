@@ -6,7 +6,7 @@
 command -v oclgrind >/dev/null || skip_all 'Oclgrind is not here'
 is_sanitized && skip_all 'a sanitized program does not run under Oclgrind'
 
-# optimised, LLVM leaves in calls that Oclgrind 21.10 does not know
+# optimized, LLVM leaves in calls that Oclgrind 21.10 does not know
 uninitialized=--uninitialized
 oclgrind_run() {
     oclgrind --build-options -cl-opt-disable --check-api --data-races $uninitialized --log "$scratch/log" \

@@ -1,6 +1,6 @@
 // The faults of the article's own program. Each test writes out its formula, in float as its kernel has it,
-// shows that the answer is wrong by the reference, and holds glint to the right one on the same `.cfg` scene.
-// run_tests: sanitize-long-only
+// shows that the answer is wrong by the reference, and compares glint with the right one on the same `.cfg`
+// scene. run_tests: sanitize-long-only
 #include "host/verify/reference_color.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

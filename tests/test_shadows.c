@@ -95,7 +95,7 @@ static void compare_with_reference(const Scene *scene, const RenderSettings *set
 // Ground whose coordinates are a million times the size of the objects on it: floats there are 0.5 apart.
 typedef struct {
     const char *name, *shape;
-    Precision from; // held from this precision on
+    Precision from; // expected from this precision on
     double error;   // of a color
 } Ground;
 

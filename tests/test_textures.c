@@ -283,7 +283,7 @@ static void between_levels_it_blends(void **state)
     check_seen(camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", (finer + coarser) / 2, 0, 0);
 }
 
-// A mirror's texture of a texture is filtered for the whole way to the eye.
+// A mirror's texture of a texture is filtered for the whole path to the eye.
 static void mirrors_filter_it_too(void **state)
 {
     (void)state;

@@ -29,7 +29,7 @@ void render_command_note(RenderCommand *command, int status);
 // Renders the scenes from `first` on, as far as the command goes on, and notes their statuses: its last work.
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks);
 
-// Warns of the devices that failed that others do their work: no failure of the command.
+// Warns of each device that failed, whose work the others do: the command has not failed.
 void render_command_drop_devices(RenderCommand *command);
 // Returns the command's exit status.
 int render_command_close(RenderCommand *command);

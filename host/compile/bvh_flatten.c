@@ -15,7 +15,7 @@ enum { BVH_WORTHWHILE = 24 };
 // their common bounds, would be as large as the town. Two of one size both stay in.
 enum { HUGE_RATIO = 16 };
 
-// The bounded primitives on their way into the tree.
+// The bounded primitives that the BVH is built of.
 typedef struct {
     Bounds *boxes;
     uint8_t *kinds;

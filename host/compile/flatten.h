@@ -1,4 +1,4 @@
-// The scene's objects on their way into the flat arrays.
+// The scene's objects while they become flat arrays.
 #pragma once
 
 #include "host/compile/compiled_scene.h"

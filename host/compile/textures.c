@@ -58,8 +58,8 @@ static double span_covers(const Span *span, uint32_t texel)
     return fmin(span->end, texel + 1.0) - fmax(span->start, texel);
 }
 
-// Half as many texels each way, rounded up; each is the mean of what it covers, so that the texture's mean
-// stays.
+// Half as many texels in each dimension, rounded up; each is the mean of what it covers, so that the
+// texture's mean stays.
 static Level level_halved(const Level *fine)
 {
     Level coarse = level_open((fine->width + 1) / 2, (fine->height + 1) / 2);

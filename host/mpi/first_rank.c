@@ -92,7 +92,8 @@ static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
     return fits;
 }
 
-// False also for a rank that still owes rows, or an answer to whose last request it did not wait for.
+// False also for a rank that has not sent all its rows, or an answer to whose last request it did not wait
+// for.
 static bool request_receive(RankState *state, const MPI_Status *status)
 {
     const bool is_due = !state->wants_rows && state->rows.row_count == 0;

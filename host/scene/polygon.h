@@ -16,7 +16,7 @@ typedef struct {
     size_t count, capacity;
 } PolygonTriangles;
 
-// Fills `triangles`, whose room it uses again. The time grows with the square of the number of corners.
+// Fills `triangles`, whose storage it reuses. The time grows with the square of the number of corners.
 // Corners may repeat and lie on a line with their neighbors; a corner on an edge stays a corner of triangles,
 // so that a neighboring polygon which has it too leaves no gap.
 PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonTriangles *triangles);

@@ -26,7 +26,7 @@ typedef struct {
     LightKind kind;
     Color color;       // times intensity
     Vector3 position;  // point, spot
-    Vector3 direction; // directional: the way the light travels; spot: look_at - position; not unit
+    Vector3 direction; // directional: where the light travels; spot: look_at - position; not unit
     // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
     double half_angle, penumbra;
 } Light;

@@ -117,7 +117,7 @@ void verify_scaled_scenes(VerifyRun *run)
 static bool meets_nearby(VerifyRun *run, Renderer *opened, const double direction[3], uint32_t object)
 {
     enum { COUNT = 27 };
-    // A tier leaves open 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 (exact_is_open): as
+    // A tier leaves open 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 (is_open): as
     // an angle 2 u whatever the distance, or up to 8 u. Either scene may be off by that, and each by as much
     // for the rounding of its pixels' rays.
     const double turn = 4 * 8 * verify_roundoff(run);

@@ -22,7 +22,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
 //
 // Where `blur` is not 0, the start and direction of each ray are changed at random by up to this part of the
 // size of the numbers there. How far colors differ from those without blur shows what errors of that size
-// come to on their way.
+// come to along the path.
 typedef struct {
     unsigned bounce_count;
     double blur;
@@ -34,7 +34,8 @@ typedef struct {
     uint32_t object, path;
     Color color;
     double margin;    // the least of all decisions, in parts of the distance from the eye
-    bool has_texture; // somewhere on its way, where the color is undefined: textures are filtered, not exact
+    bool has_texture; // somewhere along the path, where the color is undefined: textures are filtered, not
+                      // exact
 } ReferencePixel;
 
 // A decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
