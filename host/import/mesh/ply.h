@@ -41,9 +41,9 @@ typedef struct {
     Scan left; // unread
 } PlyReading;
 
-// The offset of the line's next word, or of its end. Unlike in scan.h's lines, `#` and `\` stand for
+// Returns the offset of the line's next word, or of its end. Unlike in scan.h's lines, `#` and `\` stand for
 // themselves, and any byte may follow.
-static inline size_t ply_word_offset(Scan *line)
+static inline size_t ply_blanks_skip(Scan *line)
 {
     while (line->at < line->end && scan_is_blank(*line->at))
         line->at++;

@@ -22,7 +22,7 @@ bool ply_line(PlyReading *reading, Scan *line)
 
 Word ply_word(Scan *line)
 {
-    Word word = {.offset = ply_word_offset(line)};
+    Word word = {.offset = ply_blanks_skip(line)};
     word.text = line->at;
     while (line->at < line->end && !scan_is_blank(*line->at))
         line->at++;

@@ -165,7 +165,7 @@ static bool real_read(const char **text, const char *end, double *value)
 // The line's next word as a number of the type; `is_there` says whether there is one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
-    ply_word_offset(&reader->line);
+    ply_blanks_skip(&reader->line);
     const char *at = reader->line.at, *end = reader->line.end;
     *is_there = at < end;
     if (at == end) return true;
@@ -235,7 +235,7 @@ static bool is_count(double number)
 static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *numbers)
 {
     double count;
-    if (!is_binary(reader)) ply_word_offset(&reader->line);
+    if (!is_binary(reader)) ply_blanks_skip(&reader->line);
     const size_t start = place_of(reader);
     if (!number_next(reader, property, property->count_type, &count)) return false;
     if (is_binary(reader)) {
@@ -270,7 +270,7 @@ static bool property_read(PlyReader *reader, size_t index)
                          : role == ROLE_CORNER_UVS ? &reader->corner_uvs
                                                    : NULL);
     if (role <= ROLE_Z && !is_binary(reader) && !reader->unread) {
-        const size_t start = ply_word_offset(&reader->line);
+        const size_t start = ply_blanks_skip(&reader->line);
         if (!number_next(reader, property, property->type, &reader->numbers[role])) return false;
         if (isnan(reader->numbers[role])) reader->unread = start;
         return true;
@@ -287,7 +287,7 @@ static bool row_start(PlyReader *reader)
             return draft_fails(reader->reading.draft, scan_offset(&reader->reading.left),
                                "the file ends before %.*s %zu (from 0) of %zu", word_shown(name), name.text,
                                reader->row, reader->element->count);
-        ply_word_offset(&reader->line);
+        ply_blanks_skip(&reader->line);
     } while (reader->line.at == reader->line.end);
     return true;
 }
