@@ -84,8 +84,8 @@ static void test_message_without_place(void **state)
 {
     (void)state;
     MessageList messages = {0};
-    message_add(&messages, MESSAGE_WARNING, "one\n%d\x1B", 2);
-    message_add(&messages, MESSAGE_ERROR, "three");
+    message_warning(&messages, "one\n%d\x1B", 2);
+    message_error(&messages, "three");
     assert_int_equal(message_count(&messages, MESSAGE_WARNING), 1);
     assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
     char *text = printed(&messages);

@@ -1,6 +1,5 @@
 #include "host/base/file.h"
 
-#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include <errno.h>
 #include <fcntl.h>

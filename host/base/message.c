@@ -54,22 +54,26 @@ static char *message_format(const char *format, va_list arguments)
     return text;
 }
 
-void message_add(MessageList *list, MessageSeverity severity, const char *format, ...)
+static void message_add(MessageList *list, MessageSeverity severity, const char *format, va_list arguments)
+{
+    Message message = {.severity = severity, .text = message_format(format, arguments)};
+    array_push(*list, message);
+}
+
+void message_warning(MessageList *list, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    Message message = {.severity = severity, .text = message_format(format, arguments)};
+    message_add(list, MESSAGE_WARNING, format, arguments);
     va_end(arguments);
-    array_push(*list, message);
 }
 
 bool message_error(MessageList *list, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    Message message = {.severity = MESSAGE_ERROR, .text = message_format(format, arguments)};
+    message_add(list, MESSAGE_ERROR, format, arguments);
     va_end(arguments);
-    array_push(*list, message);
     return false;
 }
 

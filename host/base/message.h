@@ -27,11 +27,8 @@ typedef struct {
     size_t length;
 } Source;
 
-// Adds a message without a file.
-void message_add(MessageList *list, MessageSeverity severity, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-
-// Adds an error without a file. Returns false, as what found the error does.
+// Add a message without a file. The error's returns false, as what found the error does.
+void message_warning(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool message_error(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 // Adds a message at a byte offset of a source, which determines its line, column and source line. An offset

@@ -3,6 +3,7 @@
 #include "host/base/hash.h"
 #include "host/cli/version.h"
 #include "host/opencl/compose.h"
+#include <stdlib.h>
 #include <string.h>
 
 static unsigned long long kernels_hash(void)
@@ -14,27 +15,23 @@ static unsigned long long kernels_hash(void)
 }
 
 // Each model once.
-static void model_append(Text *key, const char *name, const char *driver, uint32_t lanes)
+static void model_append(Text *key, const Rank *rank, uint32_t lanes)
 {
-    Text model = {0};
-    text_appendf(&model, "device: %s, %s, %u lanes\n", name, driver, lanes);
-    if (!strstr(text_c(key), text_c(&model))) text_append(key, model.items, model.count);
-    text_free(&model);
+    char *model = text_format("device: %s, %s, %u lanes\n", rank->device, rank->driver, lanes);
+    if (!strstr(text_c(key), model)) text_appendf(key, "%s", model);
+    free(model);
 }
 
 static void devices_append(Text *key, Renderer *const *renderers, size_t count, const Ranks *ranks)
 {
     for (size_t i = 0; i < count; i++) {
-        const Device *device = renderer_report(renderers[i])->device;
-        Text driver = {0};
-        text_appendf(&driver, "%s, %s", device->platform_name, device->driver);
-        model_append(key, device->name, text_c(&driver), renderer_report(renderers[i])->lanes);
-        text_free(&driver);
+        Rank own = {0};
+        rank_set_device(&own, renderer_report(renderers[i])->device);
+        model_append(key, &own, renderer_report(renderers[i])->lanes);
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
         if (ranks->items[i].lanes[PASS_ALL] > 0) // else it cannot render
-            model_append(key, ranks->items[i].device, ranks->items[i].driver,
-                         ranks->items[i].lanes[PASS_ALL]);
+            model_append(key, &ranks->items[i], ranks->items[i].lanes[PASS_ALL]);
 }
 
 void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,

@@ -166,7 +166,7 @@ int command_devices(int argument_count, char **arguments)
     else if (list.count > 0)
         devices_print_table(&list, chosen);
     char *failure = device_list_failure_text(&list);
-    if (chosen && failure) message_add(&messages, MESSAGE_WARNING, "%s", failure);
+    if (chosen && failure) message_warning(&messages, "%s", failure);
     message_list_print(&messages, stderr);
     message_list_free(&messages);
     int status = chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;

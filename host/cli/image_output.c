@@ -99,8 +99,8 @@ static void notes_add(Notes *notes, const char *key, const char *value)
 static bool is_mixed(const ImageOutput *output)
 {
     const Device *first = renderer_report(output->renderers[0])->device;
-    char driver[sizeof((Rank *)NULL)->driver]; // as a rank writes it
-    snprintf(driver, sizeof driver, "%s, %s", first->platform_name, first->driver);
+    Rank own = {0};
+    rank_set_device(&own, first);
     bool differs = false;
     for (size_t i = 1; i < output->renderer_count; i++) {
         const Device *device = renderer_report(output->renderers[i])->device;
@@ -109,7 +109,7 @@ static bool is_mixed(const ImageOutput *output)
     }
     for (size_t i = 0; output->ranks && i < output->ranks->count; i++) {
         const Rank *rank = &output->ranks->items[i];
-        differs = differs || strcmp(rank->device, first->name) != 0 || strcmp(rank->driver, driver) != 0;
+        differs = differs || strcmp(rank->device, own.device) != 0 || strcmp(rank->driver, own.driver) != 0;
     }
     return differs && output->settings->precision != PRECISION_STRICT;
 }
@@ -241,7 +241,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
         header = layer_header(&film, layer);
         if (layer == LAYER_POSITION) header.npy_type = 'd';
         if (header.channels == 0) {
-            message_add(messages, MESSAGE_WARNING, "no shadow masks are written: the scene has no lights");
+            message_warning(messages, "no shadow masks are written: the scene has no lights");
             continue;
         }
         char *path = aov_path(output->options, layer_names[layer]);

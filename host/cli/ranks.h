@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/render/renderer.h"
+#include <stdio.h>
 
 // One process, and the device that it renders on.
 typedef struct {
@@ -9,6 +10,13 @@ typedef struct {
     char device[128], driver[128], host[64];
     char failure[256]; // why it has no device; empty: it has one
 } Rank;
+
+// Names its device. Texts too long for it are cut.
+static inline void rank_set_device(Rank *rank, const Device *device)
+{
+    snprintf(rank->device, sizeof rank->device, "%s", device->name);
+    snprintf(rank->driver, sizeof rank->driver, "%s, %s", device->platform_name, device->driver);
+}
 
 // They are called in this order.
 typedef struct Ranks {

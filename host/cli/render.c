@@ -118,8 +118,8 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     progress_close(&progress);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
     if (whole && times->repeats.undecided > 0)
-        message_add(messages, MESSAGE_WARNING, "%llu samples are undecided, and are as at precision double",
-                    (unsigned long long)times->repeats.undecided);
+        message_warning(messages, "%llu samples are undecided, and are as at precision double",
+                        (unsigned long long)times->repeats.undecided);
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
     messages_print(messages, NULL);
     int status = whole                    ? EXIT_DONE

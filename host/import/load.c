@@ -11,10 +11,8 @@ bool scene_finish(Scene *scene, Report *report)
         scene_free(scene);
         return false;
     }
-    if (!scene->objects.count)
-        message_add(report->messages, MESSAGE_WARNING, "%s: no objects", report->source->file);
-    if (!scene->lights.count)
-        message_add(report->messages, MESSAGE_WARNING, "%s: no lights", report->source->file);
+    if (!scene->objects.count) message_warning(report->messages, "%s: no objects", report->source->file);
+    if (!scene->lights.count) message_warning(report->messages, "%s: no lights", report->source->file);
     return true;
 }
 

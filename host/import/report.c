@@ -100,7 +100,7 @@ bool report_close(Report *report)
     message_list_move(list, &report->included);
     if (report_is_full(report)) message_error(list, "%s: many errors: reading stopped", report->source->file);
     if (report->warning_count > MESSAGES_MAX)
-        message_add(list, MESSAGE_WARNING, "%s: %zu more warnings", report->source->file,
-                    report->warning_count - MESSAGES_MAX);
+        message_warning(list, "%s: %zu more warnings", report->source->file,
+                        report->warning_count - MESSAGES_MAX);
     return report->error_count == 0;
 }

@@ -77,9 +77,7 @@ static void worker_begin(Worker *worker, const Job *job, const char *selector)
     }
     Compute *compute = worker->devices.items[0].compute;
     worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
-    snprintf(own->device, sizeof own->device, "%s", compute->device->name);
-    snprintf(own->driver, sizeof own->driver, "%s, %s", compute->device->platform_name,
-             compute->device->driver);
+    rank_set_device(own, compute->device);
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
         own->lanes[pass] = renderer_lanes(worker->renderer, pass);
 }

@@ -122,7 +122,7 @@ static int folder_open(bool makes, MessageList *messages)
     else if (error != ENOENT)
         why = strerror(error);
     if (why) {
-        message_add(messages, MESSAGE_WARNING, "the kernel cache '%s' is not used: %s", path, why);
+        message_warning(messages, "the kernel cache '%s' is not used: %s", path, why);
         if (folder >= 0) close(folder);
         folder = -1;
     }
@@ -249,7 +249,7 @@ bool cache_load(const char *key, Text *binary)
             utimensat(folder, name.text, NULL, 0); // most recently used
         } else if (why && why != absent) {
             char *path = cache_entry_path(key);
-            message_add(&messages, MESSAGE_WARNING, "the cached kernel '%s' is not used: %s", path, why);
+            message_warning(&messages, "the cached kernel '%s' is not used: %s", path, why);
             free(path);
         }
         text_free(&entry.content);
@@ -330,9 +330,8 @@ static bool entries_list(CacheEntries *entries, int folder, MessageList *message
     if (items) closedir(items);
     if (!items && descriptor >= 0) close(descriptor);
     if (error != 0) {
-        message_add(messages, MESSAGE_ERROR, "cannot list the kernel cache: %s", strerror(error));
         cache_entries_free(entries);
-        return false;
+        return message_error(messages, "cannot list the kernel cache: %s", strerror(error));
     }
     if (entries->count > 0) qsort(entries->items, entries->count, sizeof *entries->items, entries_compare);
     return true;
@@ -342,8 +341,7 @@ static bool entries_list(CacheEntries *entries, int folder, MessageList *message
 static bool file_remove(int folder, const char *name, MessageList *messages)
 {
     if (unlinkat(folder, name, 0) == 0 || errno == ENOENT) return true;
-    message_add(messages, MESSAGE_ERROR, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
-    return false;
+    return message_error(messages, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
 }
 
 // Removes, too, what is too large to be loaded. False, with messages, if something remains.

@@ -413,8 +413,7 @@ static void file_remove(const Checkpoint *checkpoint, MessageList *messages)
     }
     free(name);
     if (error != 0 && error != ENOENT)
-        message_add(messages, MESSAGE_WARNING, "cannot remove the checkpoint '%s': %s", checkpoint->path,
-                    strerror(error));
+        message_warning(messages, "cannot remove the checkpoint '%s': %s", checkpoint->path, strerror(error));
 }
 
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages)

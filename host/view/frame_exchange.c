@@ -1,7 +1,6 @@
 // What the thread of the window and that of the loop pass to each other, all of it under the mutex.
 #include "host/view/frame_loop_state.h"
 
-#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include <stdatomic.h>
 #include <stdlib.h>

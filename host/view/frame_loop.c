@@ -19,9 +19,7 @@ static void image_save(FrameLoop *loop, char *path)
                                     loop->renderer, &film, &messages);
     messages_publish(loop, &messages);
     free(narrow);
-    if (saved) {
-        message_publish(loop, text_format("saved %s\n", path));
-    }
+    if (saved) message_publish(loop, text_format("saved %s\n", path));
     free(path);
 }
 

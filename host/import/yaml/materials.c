@@ -1,5 +1,4 @@
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/import/yaml/yaml.h"
 
 #include <stdlib.h>
