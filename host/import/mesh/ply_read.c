@@ -188,14 +188,11 @@ static size_t bytes_left(const PlyReader *reader)
 static double binary_number(const PlyReader *reader, const PlyType *type)
 {
     const unsigned char *bytes = (const unsigned char *)reader->reading.left.at;
-    uint64_t bits = 0;
-    for (size_t i = 0; i < type->size; i++)
+    uint64_t bits = 0, end = 1; // of whole numbers' bits
+    for (size_t i = 0; i < type->size; i++, end <<= 8)
         bits = bits << 8 | bytes[reader->header.format == PLY_BIG_ENDIAN ? i : type->size - 1 - i];
     if (type->kind == PLY_UNSIGNED) return (double)bits;
-    if (type->kind == PLY_SIGNED) {
-        const uint64_t sign = (uint64_t)1 << (8 * type->size - 1);
-        return (double)(bits & (sign - 1)) - (double)(bits & sign);
-    }
+    if (type->kind == PLY_SIGNED) return (double)bits - (bits >= end / 2 ? (double)end : 0);
     double number;
     float single;
     uint32_t single_bits = (uint32_t)bits;
