@@ -27,6 +27,7 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
     const uint32_t items_of_row = (width + columns * tile_width - 1) / (columns * tile_width);
     PixelList list = {0};
     for (size_t i = 0; i < tile_count; i++) {
+        if (doubts[i] == 0) continue;
         const uint32_t item = (uint32_t)(i / lanes), which = (uint32_t)(i % lanes);
         const uint32_t left = (item % items_of_row * columns + which % columns) * tile_width,
                        top =
