@@ -6,7 +6,8 @@
 // Infinity on a miss, from bits, since `fast` assumes there are none.
 static inline real hit_distance(const Hit *hit)
 {
-    return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
+    return real_from_bits(
+        lanes_select(hit_found(hit->object), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
 }
 
 #define LAYER_REAL                                         scalar
@@ -27,18 +28,19 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
     Surface surface = visible_surface(scene, &ray, &hit);
+    const mask found = hit_found(hit.object);
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     film_store_color(layers->ray, tile, ray.direction);
     film_store(layers->t, tile, 1, 0, hit_distance(&hit));
-    film_store_color(layers->normal, tile, vector_select(surface.found, surface.shading_normal, zero));
-    film_store_color(layers->position, tile, vector_select(surface.found, surface.position, zero));
+    film_store_color(layers->normal, tile, vector_select(found, surface.shading_normal, zero));
+    film_store_color(layers->position, tile, vector_select(found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
     mask doubt = mask_none();
-    if (IS_CERTIFIED) doubt = hit.doubt | (surface.found & surface.doubt);
+    if (IS_CERTIFIED) doubt = hit.doubt | (found & surface.doubt);
     for (uint i = 0; i < light_count; i++) {
         LightVisibility light = light_visibility(scene, &surface, i);
-        if (IS_CERTIFIED) doubt = doubt | (surface.found & (light.doubt | light.facing_doubt));
-        mask shadowed = surface.found & !light.lit;
+        if (IS_CERTIFIED) doubt = doubt | (found & (light.doubt | light.facing_doubt));
+        mask shadowed = found & !light.lit;
         film_store_integer(layers->shadow, tile, light_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }

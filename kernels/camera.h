@@ -21,7 +21,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
                                   vector_fma(vector_of(header->up), y, vector_of(header->forward)));
     Ray ray = ray_make_unit(vector_of(header->eye), vector_normalize(direction), active);
     if (IS_CERTIFIED) ray.direction_error = (real)(CAMERA_DIRECTION_ERROR * UNIT_ROUNDOFF);
-    ray_set_common_origin(&ray, COMMON_ORIGIN_EYE);
+    ray_set_common_origin(&ray, COMMON_ORIGIN_EYE, mask_none());
     return ray;
 }
 

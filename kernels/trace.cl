@@ -35,7 +35,7 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
 
     RealLanes result[RESULT_SCALARS];
     result[RESULT_T].all = hit.t;
-    vector_store(surface.normal, result + RESULT_NORMAL);
+    vector_store(surface_normal(&surface), result + RESULT_NORMAL);
     vector_store(surface.position, result + RESULT_POSITION);
     vector_store(reflected.origin, result + RESULT_REFLECTED_ORIGIN);
     vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);

@@ -26,7 +26,7 @@ static inline mask bounce_is_active(const Bounce *bounce)
 static inline Ray bounce_ray(const Bounce *bounce)
 {
     Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_is_active(bounce));
-    ray.travelled = bounce->travelled;
+    if (HAS_IMAGES) ray.travelled = bounce->travelled;
     if (IS_CERTIFIED) {
         ray.origin_error = bounce->origin_error;
         ray.direction_error = bounce->direction_error;
@@ -67,8 +67,8 @@ static inline Vector surface_reflect(const Surface *surface, Vector direction)
 {
     Vector reflected = vector_reflect(direction, surface->shading_normal);
     if (!HAS_TRIANGLES) return reflected;
-    mask inward = vector_dot(reflected, surface->normal) <= (real)(0);
-    return vector_select(inward, vector_reflect(direction, surface->normal), reflected);
+    mask inward = vector_dot(reflected, surface_normal(surface)) <= (real)(0);
+    return vector_select(inward, vector_reflect(direction, surface_normal(surface)), reflected);
 }
 
 // Likewise; returns the lanes of total internal reflection.
@@ -77,10 +77,11 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
     mask total =
         vector_refract(direction, surface->shading_normal, surface->entering, surface->ior, refracted);
     if (!HAS_TRIANGLES) return total;
-    mask outward = !total & (vector_dot(*refracted, surface->normal) >= (real)(0));
+    mask outward = !total & (vector_dot(*refracted, surface_normal(surface)) >= (real)(0));
     if (!lanes_any(outward)) return total;
     Vector plain;
-    mask plain_total = vector_refract(direction, surface->normal, surface->entering, surface->ior, &plain);
+    mask plain_total =
+        vector_refract(direction, surface_normal(surface), surface->entering, surface->ior, &plain);
     *refracted = vector_select(outward, plain, *refracted);
     return lanes_select(outward, plain_total, total);
 }
@@ -108,7 +109,7 @@ typedef struct {
 static inline Incidence surface_incidence(const Surface *surface, const Ray *ray)
 {
     real turn = ray->direction_error + BOUNCE_ROUNDING, normal_error = surface->normal_error;
-    return (Incidence){surface->found & ray->active, turn,
+    return (Incidence){hit_found(surface->object) & ray->active, turn,
                        fabs(vector_dot(ray->direction, surface->shading_normal)),
                        real_fma(turn, normal_error, turn + normal_error)};
 }
@@ -132,7 +133,7 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
     if (!HAS_TRIANGLES) return doubt;
     // the shading normal's reflection may run through the surface
     Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
-    real outward = fabs(vector_dot(by_shading, surface->normal));
+    real outward = fabs(vector_dot(by_shading, surface_normal(surface)));
     return doubt | (reflects & (outward <= error + normal_error));
 }
 
@@ -209,7 +210,7 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     mask doubt = transparent & snell.doubt;
     doubt = doubt | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
     if (!HAS_TRIANGLES) return doubt;
-    real inward = fabs(vector_dot(refracted->direction, surface->normal));
+    real inward = fabs(vector_dot(refracted->direction, surface_normal(surface)));
     return doubt | (refracts & (inward <= refracted->direction_error + normal_error));
 }
 

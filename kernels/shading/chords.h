@@ -52,7 +52,7 @@ static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit
     end.off = CHORD_OFF_FACTOR * (fabs(radius - distance) +
                                   (real)(UNIT_ROUNDOFF) * ((real)(12) * distance + (real)(4) * radius +
                                                            (real)(2) * center1 + (real)(6) * rounding));
-    real cosine = fabs(vector_dot(f, ray->direction)) * inverse * ray->inverse_length;
+    real cosine = fabs(vector_dot(f, ray->direction)) * inverse * ray_inverse_length(ray);
     real moved = divide_or(end.off, cosine, NEVER);
     end.normal = inverse * (moved + (real)(UNIT_ROUNDOFF) * ((real)(4) * center1 + (real)(2) * rounding)) +
                  (real)(16 * UNIT_ROUNDOFF);

@@ -8,8 +8,7 @@
 
 // The hits of a packet of rays, shaded.
 typedef struct {
-    Hit hit;
-    Surface surface; // undefined if no lane hit any
+    Surface surface; // if no lane hit any, only surface.object
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
     mask doubt;      // at `certified`: lanes in doubt about any of this
 } ShadedHit;
@@ -18,16 +17,14 @@ typedef struct {
 static inline void hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
     if (IS_CERTIFIED) traversal_judge(traversal);
-    hit->hit = traversal->hit;
+    hit->surface.object = traversal->hit.object;
     hit->color = vector_of(scene->header->background);
-    if (IS_CERTIFIED) hit->doubt = hit->hit.doubt;
-    mask found = hit_found(&hit->hit);
+    if (IS_CERTIFIED) hit->doubt = traversal->hit.doubt;
+    mask found = hit_found(hit->surface.object);
     if (!lanes_any(found)) return;
-    hit->surface = visible_surface(scene, ray, &hit->hit);
-    const Surface *surface = &hit->surface;
-    if (IS_CERTIFIED) hit->doubt = hit->doubt | (found & surface->doubt);
-    Color3 ambient = vector_scale(vector_of(scene->header->ambient), surface->ambient);
-    hit->color = vector_select(found, color_multiply(ambient, surface->color), hit->color);
+    hit->surface = visible_surface(scene, ray, &traversal->hit);
+    if (IS_CERTIFIED) hit->doubt = hit->doubt | (found & hit->surface.doubt);
+    hit->color = vector_select(found, hit->surface.ambient, hit->color);
 }
 
 // A packet's shadow rays to a light.
@@ -36,7 +33,8 @@ static inline void shadow_rays_make(const Scene *scene, const ShadedHit *hit, ui
 {
     shadow_ray->active = light->lit = mask_none();
     shadow_ray->tmax = (real)(0);
-    if (lanes_any(hit_found(&hit->hit))) *light = light_reach(scene, &hit->surface, index, shadow_ray);
+    if (lanes_any(hit_found(hit->surface.object)))
+        *light = light_reach(scene, &hit->surface, index, shadow_ray);
 }
 
 // Adds a light that a packet's shadow rays have been traced to.
@@ -44,7 +42,7 @@ static inline void hit_light(const Scene *scene, uint index, LightVisibility *li
                              ShadedHit *hit)
 {
     if (IS_CERTIFIED) traversal_judge(traversal);
-    if (IS_CERTIFIED && lanes_any(hit_found(&hit->hit))) {
+    if (IS_CERTIFIED && lanes_any(hit_found(hit->surface.object))) {
         mask glossy = hit->surface.specular > (real)(0);
         light_add_doubt(light, &traversal->hit);
         mask matters = glossy | !light->facing_doubt;
@@ -86,15 +84,14 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
 }
 
 // Adds a ray's hit and its bounces to the signature.
-static inline unsigned_integer path_signature_add(unsigned_integer path, const Ray *ray, const Hit *hit,
+static inline unsigned_integer path_signature_add(unsigned_integer path, const Ray *ray, integer object,
                                                   mask reflected, mask refracted, mask total)
 {
     const integer none = (integer)(0);
     integer events = lanes_select(reflected, (integer)(PATH_REFLECTED), none) |
                      lanes_select(refracted, (integer)(PATH_REFRACTED), none) |
                      lanes_select(reflected & total, (integer)(PATH_TOTAL_REFLECTION), none);
-    unsigned_integer word =
-        unsigned_from_integer((hit->object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
+    unsigned_integer word = unsigned_from_integer((object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
     unsigned_integer longer =
         ((path ^ word) * (unsigned_integer)(PATH_FACTOR)) & (unsigned_integer)(0xffffffffu);
     return lanes_select(ray->active, longer, path);
@@ -116,25 +113,27 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     for (;;) {
         if (depth > 0 || !is_shaded) rays_shade(scene, &ray, 1, shaded);
         if (IS_CERTIFIED) *doubt = *doubt | (ray.active & shaded->doubt);
-        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(&shaded->hit));
+        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(shaded->surface.object));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE)
-                *path = path_signature_add(*path, &ray, &shaded->hit, mask_none(), mask_none(), mask_none());
+                *path = path_signature_add(*path, &ray, shaded->surface.object, mask_none(), mask_none(),
+                                           mask_none());
             return shaded->color;
         }
         color = color_add_weighted(color, weight, vector_select(ray.active, shaded->color, black));
 
-        Bounce reflected = {ray.origin, ray.direction, black, depth + 1, ray.travelled};
+        Bounce reflected = {ray.origin, ray.direction, black, depth + 1,
+                            HAS_IMAGES ? ray.travelled : (real)(0)};
         Bounce refracted = reflected;
         mask total = mask_none();
-        if (lanes_any(hit_found(&shaded->hit)) && depth < scene->header->bounces.x)
+        if (lanes_any(hit_found(shaded->surface.object)) && depth < scene->header->bounces.x)
             total = surface_bounce(&shaded->surface, vector_renormalize(ray.direction), weight, false,
                                    &reflected, &refracted);
-        if (IS_CERTIFIED && lanes_any(hit_found(&shaded->hit)) && depth < scene->header->bounces.x)
+        if (IS_CERTIFIED && lanes_any(hit_found(shaded->surface.object)) && depth < scene->header->bounces.x)
             bounces_set_errors(&shaded->surface, &ray, total, &reflected, &refracted, doubt);
         if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, &ray, &shaded->hit, bounce_is_active(&reflected),
+            *path = path_signature_add(*path, &ray, shaded->surface.object, bounce_is_active(&reflected),
                                        bounce_is_active(&refracted), total);
         ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&reflected));
         ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&refracted));

@@ -33,7 +33,8 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
-        to_light.shadow_ray = ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface->found);
+        to_light.shadow_ray =
+            ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), hit_found(surface->object));
         return to_light;
     }
     Vector position = vector_of(light->position);
@@ -41,7 +42,7 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
     to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),
-                                   (real)(1 - 32 * UNIT_ROUNDOFF), surface->found);
+                                   (real)(1 - 32 * UNIT_ROUNDOFF), hit_found(surface->object));
     return to_light;
 }
 
@@ -78,8 +79,9 @@ enum { SHADOW_ERROR_MAX = 1 << 9 };
 // Where the facing is open by no more than this, what the light adds is too faint to matter.
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
 
-// Sets the shadow ray's bounds, and what is in doubt before it is traced.
-static inline void light_set_errors(const Light *light, const Surface *surface, LightVisibility *visibility,
+// Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes too far off to be
+// culled.
+static inline mask light_set_errors(const Light *light, const Surface *surface, LightVisibility *visibility,
                                     Ray *shadow_ray)
 {
     const real zero = (real)(0);
@@ -88,7 +90,10 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
-        real relative = place_error * shadow_ray->inverse_length;
+        // a unit vector is off by 2.5 u, a dot product by 3 u
+        shadow_ray->length =
+            vector_dot(visibility->direction, shadow_ray->direction) * (real)(1 + 16 * UNIT_ROUNDOFF);
+        real relative = place_error * ray_inverse_length(shadow_ray);
         far_off = !(relative <= SHADOW_DOUBT_MAX) | !(shadow_ray->squared > zero);
         is_loose = relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF);
         angle_error = angle_error + relative + relative;
@@ -96,11 +101,12 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     }
     shadow_ray->origin_error = place_error;
     shadow_ray->left = surface->object;
-    real geometric = vector_dot(surface->normal, visibility->direction);
+    // without triangles there is one normal
+    real geometric = HAS_TRIANGLES ? vector_dot(surface->normal, visibility->direction) : visibility->facing;
     real facing_error = surface->normal_error + angle_error;
-    real geometric_error = surface->geometric_error + angle_error;
+    real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
     shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
-    mask turned = (visibility->facing < -facing_error) | !surface->found;
+    mask turned = (visibility->facing < -facing_error) | !hit_found(surface->object);
     mask open = !turned & (visibility->facing <= facing_error);
     mask faint = facing_error <= FACING_ERROR_MAX;
     visibility->facing_doubt = open & faint;
@@ -124,7 +130,7 @@ static inline void light_set_errors(const Light *light, const Surface *surface, 
     visibility->lit = visibility->lit & !behind;
     visibility->doubt = self_doubt | (visibility->lit & far_off);
     shadow_ray->active = shadow_ray->active & !visibility->doubt;
-    shadow_ray->is_loose = is_loose;
+    return is_loose;
 }
 
 // Lanes in which what the light does is in doubt, once the shadow ray has been traced.
@@ -143,12 +149,14 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     visibility.direction = to_light.direction;
     visibility.facing = vector_dot(surface->shading_normal, to_light.direction);
     visibility.fraction = to_light.strength;
-    visibility.lit = surface->found & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
+    visibility.lit =
+        hit_found(surface->object) & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
     *shadow_ray = to_light.shadow_ray;
     shadow_ray->active = shadow_ray->active & visibility.lit;
-    if (IS_CERTIFIED) light_set_errors(&light, surface, &visibility, shadow_ray);
+    mask is_loose = mask_none();
+    if (IS_CERTIFIED) is_loose = light_set_errors(&light, surface, &visibility, shadow_ray);
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
-        ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index);
+        ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index, is_loose);
     ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
     return visibility;
 }
@@ -180,7 +188,7 @@ static inline Color3 phong_shade(const Scene *scene, const Surface *surface, con
 {
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
     Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light->fraction);
-    Color3 color = vector_scale(color_multiply(surface->diffuse, surface->color), light->facing);
+    Color3 color = vector_scale(surface->diffuse, light->facing);
     mask glossy = light->lit & (surface->specular > (real)(0));
     if (lanes_any(glossy)) {
         Vector reflected = vector_fma(surface->shading_normal, light->facing + light->facing,

@@ -24,22 +24,22 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
 // Color and `travelled` presume that the ray's direction is unit; of an explicit ray, which may have any
 // length, neither is used.
 typedef struct {
-    mask found;
+    integer object; // its id; -1: nothing hit
     Vector position;
-    Vector normal;         // geometric, unit, facing the ray
+    Vector normal;         // geometric, unit, facing the ray; only triangles have another shading normal
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
     real error;            // bound on the position's distance from the true surface
     real refracted_offset; // how far behind the surface a refracted ray starts
-    Color3 color, diffuse;
-    real ambient, specular, shininess;
+    Color3 ambient;        // its color in ambient light
+    Color3 diffuse;        // and of a light that it faces
+    real specular, shininess;
     real reflection, transmission, ior;
     mask entering;  // the ray runs into the solid, against its outward normal
     real travelled; // distance from the eye along the path
     // At `certified`: bounds on the distance of the position from the exact one and of the shading normal
-    // and of the geometric normal from the exact ones; the object; what is in doubt.
+    // and, with HAS_TRIANGLES, of the geometric normal from the exact ones; what is in doubt.
     real place_error, normal_error, geometric_error;
-    integer object;
     mask doubt;
     ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
@@ -144,10 +144,10 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
 // by the roundings of ray_point, with the shapes' own.
 static inline real hit_place_error(const Ray *ray, const Hit *hit)
 {
-    real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
-    real rounding =
-        (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
-    real across = ray_place_error(ray, length * t),
+    real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), path = length * fabs(hit->t);
+    // a 1-norm is at most sqrt 3 times the length
+    real rounding = (real)(2 * UNIT_ROUNDOFF) * real_fma((real)(1.75f), path, vector_norm1(ray->origin));
+    real across = ray_place_error(ray, path),
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
     // not less than the root of the sum of squares
     real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
@@ -221,12 +221,14 @@ static inline Color3 object_color(const Scene *scene, uint4 entry, const Materia
     return color;
 }
 
-static inline void surface_set_material(Surface *surface, mask lanes, const Material *material, Color3 color)
+static inline void surface_set_material(Surface *surface, const Scene *scene, mask lanes,
+                                        const Material *material, Color3 color)
 {
     scalar4 bounces = material->reflection_transmission_ior;
-    surface->color = vector_select(lanes, color, surface->color);
-    surface->diffuse = vector_select(lanes, vector_of(material->diffuse), surface->diffuse);
-    surface->ambient = lanes_select(lanes, (real)(material->color.w), surface->ambient);
+    Color3 ambient = vector_scale(vector_of(scene->header->ambient), (real)(material->color.w));
+    surface->ambient = vector_select(lanes, color_multiply(ambient, color), surface->ambient);
+    Color3 diffuse = color_multiply(vector_of(material->diffuse), color);
+    surface->diffuse = vector_select(lanes, diffuse, surface->diffuse);
     surface->specular = lanes_select(lanes, (real)(material->diffuse.w), surface->specular);
     surface->shininess = lanes_select(lanes, (real)(material->other_color.w), surface->shininess);
     if (HAS_REFLECTION) surface->reflection = lanes_select(lanes, (real)(bounces.x), surface->reflection);
@@ -240,15 +242,20 @@ static inline void surface_set_material(Surface *surface, mask lanes, const Mate
 static inline void surface_set_errors(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
     surface->normal_error = point_normal_error(point, surface->place_error);
-    real geometric_error = point->normal_error + (real)(16 * UNIT_ROUNDOFF);
-    mask flat = vector_dot(point->shading_normal, point->normal) == vector_dot(point->normal, point->normal);
-    geometric_error = lanes_select(flat, surface->normal_error, geometric_error);
-    real cosine = vector_dot(point->normal, ray->direction) * ray->inverse_length;
-    real shading_cosine = vector_dot(point->shading_normal, point->normal);
-    mask is_open = fabs(cosine) <= geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
-    is_open = is_open | (fabs(shading_cosine) <= geometric_error + surface->normal_error);
-    surface->doubt = surface->doubt | (surface->found & is_open);
-    surface->geometric_error = geometric_error;
+    real geometric_error = surface->normal_error;
+    mask is_open = mask_none();
+    if (HAS_TRIANGLES) { // those with smooth normals
+        real shading_cosine = vector_dot(point->shading_normal, point->normal);
+        mask flat = shading_cosine == vector_dot(point->normal, point->normal);
+        geometric_error =
+            lanes_select(flat, surface->normal_error, point->normal_error + (real)(16 * UNIT_ROUNDOFF));
+        is_open = fabs(shading_cosine) <= geometric_error + surface->normal_error;
+        surface->geometric_error = geometric_error;
+    }
+    real cosine = vector_dot(point->normal, ray->direction) * ray_inverse_length(ray);
+    real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+    is_open = is_open | (fabs(cosine) <= cosine_error);
+    surface->doubt = surface->doubt | (hit_found(surface->object) & is_open);
 }
 
 // Turns both normals to the side that the ray comes from.
@@ -258,10 +265,12 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     surface->position = point->position;
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
     if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
-    surface->normal = vector_select(along, vector_negate(point->normal), point->normal);
-    mask opposite = vector_dot(point->shading_normal, surface->normal) < (real)(0);
+    Vector normal = vector_select(along, vector_negate(point->normal), point->normal);
+    if (HAS_TRIANGLES) surface->normal = normal;
+    mask opposite = vector_dot(point->shading_normal, normal) < (real)(0);
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
+    if (IS_CERTIFIED) return; // no ray starts off a surface
     surface->error =
         (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
                                        (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
@@ -273,9 +282,9 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
 static inline Surface surface_interaction(const Scene *scene, const Ray *ray, const Hit *hit)
 {
     Surface surface;
-    surface.found = hit_found(hit);
-    surface.color = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
-    surface.ambient = surface.specular = surface.shininess = (real)(0);
+    surface.object = hit->object;
+    surface.ambient = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
+    surface.specular = surface.shininess = (real)(0);
     if (HAS_REFLECTION) surface.reflection = (real)(0);
     if (HAS_TRANSMISSION) {
         surface.transmission = (real)(0);
@@ -286,12 +295,11 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
     if (IS_CERTIFIED) {
-        surface.object = hit->object;
         surface.doubt = hit->doubt;
         if (HAS_CHORDS) surface.chord_end = chord_end_none();
     }
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
-    integer pending = lanes_select(surface.found, hit->object, NO_OBJECT);
+    integer pending = lanes_select(hit_found(hit->object), hit->object, NO_OBJECT);
     for (;;) {
         scalar_integer object = lanes_smallest(pending);
         if (object == INT_MAX) break;
@@ -322,10 +330,16 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
             object_color(scene, entry, &material, &found, ray, HAS_IMAGES ? surface.travelled : (real)(0),
                          IS_CERTIFIED ? surface.place_error : (real)(0), &doubt);
         if (IS_CERTIFIED) surface.doubt = surface.doubt | (found.lanes & (doubt | at_edge));
-        surface_set_material(&surface, found.lanes, &material, color);
+        surface_set_material(&surface, scene, found.lanes, &material, color);
     }
     surface_set_point(&surface, &point, ray);
     return surface;
+}
+
+// Facing the ray.
+static inline Vector surface_normal(const Surface *surface)
+{
+    return HAS_TRIANGLES ? surface->normal : surface->shading_normal;
 }
 
 // The origin of a secondary ray, on the side the ray came from or, if `through`, on the other. It lies off
@@ -334,7 +348,8 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
 static inline Vector secondary_ray_origin(const Surface *surface, bool through)
 {
     if (IS_CERTIFIED) return surface->position; // the ray knows which object it leaves
-    return vector_fma(surface->normal, through ? -surface->refracted_offset : surface->error + surface->error,
+    return vector_fma(surface_normal(surface),
+                      through ? -surface->refracted_offset : surface->error + surface->error,
                       surface->position);
 }
 
@@ -350,19 +365,19 @@ static inline mask may_be_in_contact(const Scene *scene, Vector position)
 // short line along the normal.
 static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
 {
-    mask transparent = surface->found & (surface->transmission > (real)(0));
+    mask transparent = hit_found(surface->object) & (surface->transmission > (real)(0));
     real reach = (real)(16) * surface->place_error;
     Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
     Vector p = surface->position;
     transparent = transparent & (p.x >= low.x - reach) & (p.x <= high.x + reach) & (p.y >= low.y - reach) &
                   (p.y <= high.y + reach) & (p.z >= low.z - reach) & (p.z <= high.z + reach);
     if (!lanes_any(transparent)) return mask_none();
-    Ray inward =
-        ray_make_unit(vector_fma(surface->normal, reach, p), vector_negate(surface->normal), transparent);
+    Ray inward = ray_make_unit(vector_fma(surface_normal(surface), reach, p),
+                               vector_negate(surface_normal(surface)), transparent);
     inward.tmax = reach + reach;
     inward.origin_error = surface->place_error * (real)(1.5f);
     Hit opaque = closest_opaque_hit(scene, &inward);
-    return transparent & (hit_found(&opaque) | opaque.doubt);
+    return transparent & (hit_found(opaque.object) | opaque.doubt);
 }
 
 // Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
@@ -371,16 +386,16 @@ static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *s
 // refracted ray starts halfway to it.
 static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
 {
-    mask transparent = surface->found & (surface->transmission > (real)(0));
+    mask transparent = hit_found(surface->object) & (surface->transmission > (real)(0));
     transparent = transparent & may_be_in_contact(scene, surface->position);
     if (!lanes_any(transparent)) return mask_none();
     real error = surface->error, offset = error + error;
-    Ray inward =
-        ray_make_unit(secondary_ray_origin(surface, false), vector_negate(surface->normal), transparent);
+    Ray inward = ray_make_unit(secondary_ray_origin(surface, false), vector_negate(surface_normal(surface)),
+                               transparent);
     inward.tmin = error;
     inward.tmax = offset + (real)(3) * error;
     Hit opaque = closest_opaque_hit(scene, &inward);
-    mask found = hit_found(&opaque);
+    mask found = hit_found(opaque.object);
     real gap = opaque.t - offset;
     mask touches = found & (gap <= error);
     surface->refracted_offset = lanes_select(found & !touches, (real)(0.5f) * gap, surface->refracted_offset);
@@ -396,7 +411,7 @@ static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *h
     real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);
     for (bool replaced = false;; replaced = true) {
         Surface surface = surface_interaction(scene, ray, hit);
-        if (HAS_TRANSMISSION) {
+        if (HAS_TRANSMISSION & !IS_CERTIFIED) {
             surface.error = real_max(surface.error, transparent_error);
             surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
         }

@@ -87,66 +87,81 @@ static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
 
 // A sphere: with l the line's closest point to the center, r^2 - l^2 is half the chord squared.
 typedef struct {
+    Vector start; // the ray's, seen from the center
+    real radius;
     mask certain, perhaps;       // the line crosses it, not behind the ray's start or beyond its end
-    real near_t, far_t, t_error; // its crossings
     real middle_t, middle_error; // the closest point
+    real half_chord, t_error;    // in t; t_error is that of sphere_near and sphere_far
+    mask refines;                // one step of Newton's method makes these exact
+    real half_inverse_slope;     // for it: of |x|^2 / 2 at the far crossing, x seen from the center
 } CertainSphere;
 
-// A crossing of the sphere after one step of Newton's method; the slope is half of that of |x|^2 there, x
-// being seen from the center.
-static inline real sphere_crossing_refine(Vector f, real radius, const Ray *ray, real t, real inverse_slope)
+static inline real sphere_refine(const CertainSphere *sphere, const Ray *ray, real t, real half_inverse_slope)
 {
-    Vector x = vector_fma(ray->direction, t, f);
-    return real_fma(real_fma(radius, radius, -vector_dot(x, x)), (real)(0.5f) * inverse_slope, t);
+    Vector x = vector_fma(ray->direction, t, sphere->start);
+    real excess = real_fma(sphere->radius, sphere->radius, -vector_dot(x, x));
+    return lanes_select(sphere->refines, real_fma(excess, half_inverse_slope, t), t);
+}
+
+// The crossings.
+static inline real sphere_near(const CertainSphere *sphere, const Ray *ray)
+{
+    return sphere_refine(sphere, ray, sphere->middle_t - sphere->half_chord, -sphere->half_inverse_slope);
+}
+
+static inline real sphere_far(const CertainSphere *sphere, const Ray *ray)
+{
+    return sphere_refine(sphere, ray, sphere->middle_t + sphere->half_chord, sphere->half_inverse_slope);
 }
 
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
 {
-    Vector f = vector_subtract(ray->origin, center);
     CertainSphere crossed;
+    Vector f = vector_subtract(ray->origin, center);
+    crossed.start = f;
+    crossed.radius = radius;
     crossed.middle_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
     Vector l = vector_fma(ray->direction, crossed.middle_t, f);
     real squared = real_fma(radius, radius, -vector_dot(l, l));
     // not less than |f| where |l| is up to twice the radius: beyond, errors in proportion to |l| do not count
     real distance = real_fma(fabs(crossed.middle_t), ray->length, radius + radius);
-    real rounding = (real)(UNIT_ROUNDOFF)*real_fma((real)(3), distance,
-                                                   real_fma((real)(6), radius, vector_norm1(ray->origin)));
-    // crossings are no farther than this and the place; so is the closest point
-    real farthest = distance - radius;
-    real place = ray_place_error(ray, farthest) * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
-    place = real_fma(ray->direction_error, place, place);
+    real at_start = real_fma((real)(UNIT_ROUNDOFF), real_fma((real)(6), radius, vector_norm1(ray->origin)),
+                             ray->origin_error);
+    // crossings are no farther than distance - radius and the place; so is the closest point
+    real place = real_fma((real)(3 * UNIT_ROUNDOFF), distance,
+                          real_fma(ray->direction_error, distance - radius, at_start));
+    place = real_fma(ray->direction_error + (real)(32 * UNIT_ROUNDOFF), place, place);
     real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
-    real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
+    real band = real_fma(along, along, place * (radius + radius + place));
     // not where all of it is behind the start, or beyond the end
-    real reach = ray->inverse_length * (radius + (real)(2) * (place + along));
+    real reach = ray_inverse_length(ray) * real_fma((real)(2), place + along, radius);
     real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
     mask apart = (crossed.middle_t + reach < ray->tmin) | (crossed.middle_t - reach > end);
     crossed.certain = lanes & (squared > band);
     crossed.perhaps = lanes & !((squared < -band) | apart);
-    crossed.near_t = crossed.far_t = crossed.middle_error = crossed.t_error = (real)(0);
+    crossed.half_chord = crossed.half_inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
+    crossed.refines = mask_none();
     if (!lanes_any(crossed.perhaps)) return crossed;
     // in t; where it is in doubt, of the band: between 0 and that of twice the band
-    real half_chord = real_sqrt(real_max(squared, band) * ray->inverse_squared);
-    // a place that moves by p moves the crossing by p over the cosine there, the least half chord over r
-    real least = squared - band, quarter = (real)(0.25f) * band;
-    mask grazes = least < quarter;
-    real cosine_radius = real_sqrt(lanes_select(grazes, quarter, least));
-    real few_squares = (real)(4 * UNIT_ROUNDOFF) * (radius * radius);
-    real moved = real_divide(real_fma((real)(0.51f), band, real_fma(place, place, few_squares)),
-                             lanes_select(cosine_radius > (real)(0), cosine_radius, (real)(1)));
-    moved = moved + lanes_select(grazes, place, (real)(0));
-    crossed.middle_error = ray->inverse_length * (place + along);
-    crossed.near_t = crossed.middle_t - half_chord;
-    crossed.far_t = crossed.middle_t + half_chord;
-    // both are off by no more than twice `along`, which the step squares
-    mask refines = (real)(64) * along < cosine_radius;
-    real inverse_slope = real_divide(ray->inverse_squared, lanes_select(refines, half_chord, (real)(1)));
-    crossed.near_t = lanes_select(
-        refines, sphere_crossing_refine(f, radius, ray, crossed.near_t, -inverse_slope), crossed.near_t);
-    crossed.far_t = lanes_select(
-        refines, sphere_crossing_refine(f, radius, ray, crossed.far_t, inverse_slope), crossed.far_t);
-    real computed = lanes_select(refines, (real)(2.5f * UNIT_ROUNDOFF) * distance, along + along);
-    crossed.t_error = ray->inverse_length * (moved + computed);
+    real chord_squared = real_max(squared, band);
+    crossed.half_chord = real_sqrt(chord_squared * ray->inverse_squared);
+    mask usable = crossed.half_chord > (real)(0);
+    real inverse = reciprocal_estimate(lanes_select(usable, crossed.half_chord, (real)(1)));
+    crossed.half_inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
+    // A place that moves by p moves the crossing by p over the cosine there, the least half chord over r.
+    // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75; beyond, h
+    // changes by less than h x (1 + x) / 2 across the ray, and p counts along it.
+    real inverse_chord = inverse * ray_inverse_length(ray);
+    real x = band * (inverse_chord * inverse_chord);
+    real steepness = real_fma((real)(1.6f) * inverse_chord, x, inverse_chord);
+    const real few_squares = (real)(4 * UNIT_ROUNDOFF) * (radius * radius);
+    real moved = real_fma(real_fma((real)(0.51f), band, real_fma(place, place, few_squares)), steepness,
+                          (real)(1.4f) * x * place);
+    crossed.middle_error = ray_inverse_length(ray) * (place + along);
+    // the crossings are off by no more than twice `along`, which the step squares
+    crossed.refines = (real)(64) * along * steepness < (real)(1);
+    real computed = lanes_select(crossed.refines, (real)(2.5f * UNIT_ROUNDOFF) * distance, along + along);
+    crossed.t_error = ray_inverse_length(ray) * (moved + computed);
     return crossed;
 }
 

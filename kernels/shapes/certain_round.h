@@ -251,7 +251,7 @@ static inline Interval intervals_common(Interval a, Interval b)
 // Beyond this t a rounding of the distance exceeds a 1024th of the size: nothing is certain there.
 static inline real round_range(const Ray *ray, real size)
 {
-    return (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray->inverse_length;
+    return (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray_inverse_length(ray);
 }
 
 // In u of the coordinates: what the axis' direction and the products add; where the radius depends on the

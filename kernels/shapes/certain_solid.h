@@ -84,8 +84,8 @@ static inline mask round_bounds(Vector center, real radius, const Ray *ray, real
 {
     CertainSphere bounding =
         certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
-    *from = bounding.near_t - bounding.t_error;
-    *to = bounding.far_t + bounding.t_error;
+    *from = sphere_near(&bounding, ray) - bounding.t_error;
+    *to = sphere_far(&bounding, ray) + bounding.t_error;
     return bounding.perhaps & (*to >= ray->tmin);
 }
 

@@ -58,15 +58,15 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
 {
     Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
-    real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal_and_inverse.w));
+    real size = (real)(uniform_divide(1 + 32 * UNIT_ROUNDOFF, normal_and_inverse.w));
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
-    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
-                                                 (real)(2) * vector_norm1_along(unsigned_normal, point)) +
-                        size * ray->origin_error;
-    real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
-                       size * (ray->length * ray->direction_error);
+    real of_point = vector_norm1_along(unsigned_normal, point),
+         of_origin = vector_norm1_along(unsigned_normal, ray->origin);
+    real height_error = real_fma(size, ray->origin_error,
+                                 (real)(UNIT_ROUNDOFF)*real_fma((real)(8), of_point, (real)(6) * of_origin));
+    real along_error = size * (ray->length * (ray->direction_error + (real)(5 * UNIT_ROUNDOFF)));
     mask crosses = fabs(along) > (real)(8) * along_error;
-    real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
+    real inverse = reciprocal_estimate(lanes_select(crosses, along, (real)(1)));
     real t = height * inverse;
     // the exact n . d is at least 7/8 of this one, and 8/7 < 1.2
     real t_error = (real)(1.2f) * real_fma(fabs(t), along_error, height_error) * fabs(inverse) +

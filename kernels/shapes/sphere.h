@@ -173,25 +173,22 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
     CertainSphere crossed =
         certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);
     if (!lanes_any(crossed.perhaps)) return certain_miss();
-    real near_high = crossed.near_t + crossed.t_error, far_high = crossed.far_t + crossed.t_error;
-    CertainHit far =
-        certain_crossing(ray, crossed.certain, crossed.perhaps, crossed.far_t - crossed.t_error, far_high);
-    CertainHit hit = far;
-    if (!(sphere->id.y & IGNORES_FRONT_FACES)) {
-        CertainHit near = certain_crossing(ray, crossed.certain, crossed.perhaps,
-                                           crossed.near_t - crossed.t_error, near_high);
-        hit = certain_first(ray, near, near_high, far);
-    }
+    const bool ignores_front = sphere->id.y & IGNORES_FRONT_FACES;
+    real near = sphere_near(&crossed, ray), near_high = near + crossed.t_error;
+    CertainHit hit =
+        certain_crossing(ray, crossed.certain, crossed.perhaps, near - crossed.t_error, near_high);
+    mask passed = crossed.perhaps & (ignores_front | (near_high < ray->tmin));
     left = left & lanes;
-    if (lanes_any(left)) {
-        // one crossing is the start; the other lies twice as far as the closest point
-        real t = (real)(2) * crossed.middle_t, t_error = (real)(2.1f) * crossed.middle_error;
-        CertainHit other =
-            certain_crossing(ray, left, left, real_max(t - t_error, crossed.far_t - crossed.t_error),
-                             real_min(t + t_error, far_high));
-        hit = certain_select(left, other, hit);
-    }
-    return hit;
+    if (!lanes_any(passed | left)) return hit;
+    real far = sphere_far(&crossed, ray), far_low = far - crossed.t_error, far_high = far + crossed.t_error;
+    hit = certain_select(passed, certain_crossing(ray, crossed.certain, crossed.perhaps, far_low, far_high),
+                         hit);
+    if (!lanes_any(left)) return hit;
+    // one crossing is the start; the other lies twice as far as the closest point
+    real t = (real)(2) * crossed.middle_t, t_error = (real)(2.1f) * crossed.middle_error;
+    CertainHit other =
+        certain_crossing(ray, left, left, real_max(t - t_error, far_low), real_min(t + t_error, far_high));
+    return certain_select(left, other, hit);
 }
 
 static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real t, real place_error,

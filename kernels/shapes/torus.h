@@ -269,12 +269,12 @@ static inline real torus_curvature(const CertainTorus *torus, real rho)
 static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 {
     TorusPoint start = torus_point(torus, ray, (real)(0));
-    real curvature = torus_curvature(torus, start.rho), cosine = fabs(start.slope) * ray->inverse_length;
+    real curvature = torus_curvature(torus, start.rho), cosine = fabs(start.slope) * ray_inverse_length(ray);
     real error =
         real_fma((real)(2) * start.place, curvature, ray->direction_error) + (real)(32 * UNIT_ROUNDOFF);
     real least = real_divide((real)(2), curvature);
     mask known = cosine > (real)(4) * error; // the exact one is more than the half that is used
-    return lanes_select(known, (real)(0.5f) * cosine * least * ray->inverse_length, (real)(0));
+    return lanes_select(known, (real)(0.5f) * cosine * least * ray_inverse_length(ray), (real)(0));
 }
 
 // Narrows a bracket at whose ends the exact ray is certainly on different sides. Only signs beyond `place`
@@ -298,7 +298,7 @@ static inline Interval torus_bracket(const CertainTorus *torus, const Ray *ray, 
         if (lanes_all(next == t)) break;
         t = next;
     }
-    mask steep = fabs(point.slope) * ray->inverse_length > (real)(0x1p-10f);
+    mask steep = fabs(point.slope) * ray_inverse_length(ray) > (real)(0x1p-10f);
     real width = real_divide((real)(2.5f) * point.place, lanes_select(steep, fabs(point.slope), (real)(1)));
     const real sides[2] = {t - width, t + width};
     for (uint i = 0; i < 2; i++) {
@@ -318,12 +318,14 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     const real radius = certain.major + certain.minor;
     CertainSphere bounding = certain_sphere(vector_of(torus->center_major),
                                             radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
-    real from = bounding.near_t - bounding.t_error, to = bounding.far_t + bounding.t_error;
+    real from = sphere_near(&bounding, ray) - bounding.t_error,
+         to = sphere_far(&bounding, ray) + bounding.t_error;
     mask lanes = bounding.perhaps & (to >= ray->tmin);
     if (!lanes_any(lanes)) return certain_miss();
 
     Vector closest = vector_fma(ray->direction, bounding.middle_t, certain.start);
-    Vector direction = vector_scale(ray->direction, ray->inverse_length);
+    real inverse_length = real_sqrt(ray->inverse_squared);
+    Vector direction = vector_scale(ray->direction, inverse_length);
     real squared_distance = vector_dot(closest, closest);
     real half_chord_squared = real_fma(radius * (real)(TORUS_ENLARGEMENT), radius, -squared_distance);
     TorusLine line = {vector_cross(closest, certain.axis),
@@ -354,7 +356,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     mask open = lanes;
     for (uint i = 1; i < TORUS_BREAKS; i++) {
         bool is_last = i + 1 == TORUS_BREAKS;
-        real after = is_last ? to : real_min(real_fma(breaks[i], ray->inverse_length, bounding.middle_t), to);
+        real after = is_last ? to : real_min(real_fma(breaks[i], inverse_length, bounding.middle_t), to);
         after = real_max(after, before);
         point = torus_point(&certain, ray, after);
         mask after_outside = point.distance > (real)(0),

@@ -167,7 +167,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
     t = interval_clamp(triangle_slab(a.y, b.y, c.y, slack, inverse.y), t);
     t = interval_clamp(triangle_slab(a.z, b.z, c.z, slack, inverse.z), t);
     // the vertices' t are off by a few roundings of the largest product in them
-    Vector along = ray->along;
+    Vector along = ray_along(ray);
     real t_error = (real)(4 * UNIT_ROUNDOFF) *
                    (max_abs.x * fabs(along.x) + max_abs.y * fabs(along.y) + max_abs.z * fabs(along.z));
     real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
@@ -180,7 +180,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
 static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdges *edges, const Ray *ray,
                                      mask hit)
 {
-    real t = triangle_t_accurate(triangle, ray, vector_dot(edges->a, ray->along));
+    real t = triangle_t_accurate(triangle, ray, vector_dot(edges->a, ray_along(ray)));
     // Above a sine of 1/4 (the normal's square is 3 at most) the accurate t is within a third of the boxes'
     // slack. In double a needle's normal may be worse.
     mask grazing = hit;
@@ -326,12 +326,13 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
                                                    TriangleSigns signs, TriangleSizes sizes, real error)
 {
     mask perhaps = lanes & signs.perhaps, certain = perhaps & signs.certain;
-    real a_t = vector_dot(edges->a, ray->along), b_t = vector_dot(edges->b, ray->along),
-         c_t = vector_dot(edges->c, ray->along);
+    const Vector along = ray_along(ray);
+    real a_t = vector_dot(edges->a, along), b_t = vector_dot(edges->b, along),
+         c_t = vector_dot(edges->c, along);
     real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
     real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
     real place = triangle_place_error(ray, distance, sizes);
-    real vertex_error = ray->inverse_length * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
+    real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
     // in doubt as well: if it is hit, then where the weights say
     mask narrows = perhaps & (fabs(edges->determinant) > (real)(8) * edge_error);

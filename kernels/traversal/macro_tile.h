@@ -86,7 +86,7 @@ static inline void macro_tile_set_reach(MacroTile *tile, uint packet)
 {
     const Traversal *traversal = &tile->traversals[packet];
     real t = (real)(1 + 16 * UNIT_ROUNDOFF);
-    real limit = IS_CERTIFIED ? traversal->limit : traversal->hit.t;
+    real limit = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;
     if (tile->frame.leaving) t = t * real_min(limit, (real)(LARGEST / 2));
     real reach = lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
     tile->reach[packet] = reach;

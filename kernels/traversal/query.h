@@ -17,10 +17,9 @@ typedef struct {
     mask active; // lanes that still traverse
     Hit hit;
     integer optical_depth; // for OCCLUSION, of the objects hit so far
-    // At `certified`: the exact hit is no farther than `limit`, and none but hit.object's before `rival`;
-    // `doubt`, for OCCLUSION: lanes with a hit in doubt.
-    real limit, rival;
-    mask doubt;
+    // At `certified`: the exact hit is no farther than hit.high, and none but hit.object's before `rival`.
+    // For OCCLUSION hit.doubt has the lanes with a hit in doubt.
+    real rival;
 } Traversal;
 
 // Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_MAX is that of opaque objects.
@@ -89,24 +88,21 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
 {
     Hit *hit = &traversal->hit;
     if (traversal->query == OCCLUSION) {
-        traversal->doubt = traversal->doubt | (found->doubt & traversal->active);
+        hit->doubt = hit->doubt | (found->doubt & traversal->active);
         traversal_occlude(traversal, scene, found->found & traversal->active, id);
         return;
     }
     if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(scene, id)) return;
-    const real none = (real)(LARGEST);
     integer object = (integer)((scalar_integer)id);
     mask is_new = (found->found | found->doubt) & (hit->object != object); // it may have been tested before
-    mask tie = (found->t == hit->t) & (object < hit->object);
-    mask closer = found->found & is_new & ((hit->object < (integer)(0)) | (found->t < hit->t) | tie);
-    real displaced = lanes_select(closer & (hit->object >= (integer)(0)), hit->low, none);
-    real other = lanes_select(is_new & !closer, found->low, displaced);
-    traversal->rival = real_min(traversal->rival, other);
-    mask limits = found->found & (found->high < traversal->limit);
-    traversal->limit = lanes_select(limits, found->high, traversal->limit);
+    mask closer = found->found & is_new & (found->t < hit->t);
+    // what is not kept: of the two, or of the shape in doubt
+    real other = lanes_select(closer, hit->low, found->low);
+    traversal->rival = lanes_select(is_new, real_min(traversal->rival, other), traversal->rival);
+    // of the exact ray's first hit, whichever shape has it
+    hit->high = lanes_select(found->found, real_min(hit->high, found->high), hit->high);
     hit->t = lanes_select(closer, found->t, hit->t);
     hit->low = lanes_select(closer, found->low, hit->low);
-    hit->high = lanes_select(closer, found->high, hit->high);
     hit->object = lanes_select(closer, object, hit->object);
 }
 
@@ -114,16 +110,16 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
 static inline void traversal_judge(Traversal *traversal)
 {
     if (traversal->query == OCCLUSION)
-        traversal->hit.doubt = traversal->doubt & traversal->active;
+        traversal->hit.doubt = traversal->hit.doubt & traversal->active;
     else
-        traversal->hit.doubt = traversal->active & !(traversal->rival > traversal->limit);
+        traversal->hit.doubt = traversal->active & !(traversal->rival > traversal->hit.high);
 }
 
 // Per-lane tmax, below LARGEST, the entry distance of a child that no ray hits; -LARGEST for lanes that are
 // done.
 static inline real traversal_tmax(const Traversal *traversal)
 {
-    real t = IS_CERTIFIED ? traversal->limit : traversal->hit.t;
+    real t = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;
     return lanes_select(traversal->active, real_min(t, (real)(LARGEST / 2)), (real)(-LARGEST));
 }
 

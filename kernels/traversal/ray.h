@@ -32,16 +32,14 @@ typedef struct {
     bool ends_at_light;
     // of a ray along a chord of the sphere that it leaves, NEVER of others: as of a Chord (shading/chords.h)
     real chord_turn, chord_end_place;
-    mask is_loose;               // too far off for cull spheres
-    real length, inverse_length; // of the direction, not below the exact ones, within 32 u
+    real length; // of the direction, not below the exact one, within 32 u
     // by ray_prepare: a bound on the length of across_u and across_v, and on the error of a triangle's corner
     // in the frame if it is no farther from the origin than `size`: across_error0 + across_error1 size
     real across_length, across_error0, across_error1;
     Vector inverse; // by ray_prepare, for boxes: 1 / direction
     // for triangles: two vectors across the direction, of length O(1) since they are computed from a
-    // direction scaled by a power of two, and one along it, whose product with a point seen from the origin
-    // is the point's t
-    Vector across_u, across_v, along;
+    // direction scaled by a power of two
+    Vector across_u, across_v;
 } Ray;
 
 typedef struct {
@@ -56,9 +54,9 @@ typedef struct {
 // what derives from it in mask registers. It does not see this through a function call; hence a macro.
 #define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
 
-static inline mask hit_found(const Hit *hit)
+static inline mask hit_found(integer object)
 {
-    return hit->object >= (integer)(0);
+    return object >= (integer)(0);
 }
 
 static inline real real_inverse_or_zero(real a)
@@ -113,7 +111,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     ray.squared = vector_dot(direction, direction);
     ray.tmin = tmin;
     ray.tmax = tmax;
-    ray.travelled = (real)(0);
+    if (HAS_IMAGES) ray.travelled = (real)(0);
     ray.common_origin = COMMON_ORIGIN_NONE;
     if (IS_CERTIFIED) {
         ray.origin_error = ray.direction_error = (real)(0);
@@ -121,17 +119,19 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
         if (HAS_CHORDS) ray.chord_turn = ray.chord_end_place = NEVER;
-        ray.is_loose = mask_none();
     }
     ray.active = active & (ray.squared > (real)(0));
     // 0 in inactive lanes: only a sphere around the origin still examines them
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
-    if (IS_CERTIFIED) {
-        ray.inverse_length = real_sqrt(ray.inverse_squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
-        ray.length = ray.squared * ray.inverse_length * (real)(1 + 16 * UNIT_ROUNDOFF);
-    }
+    if (IS_CERTIFIED) ray.length = real_sqrt(ray.squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
     return ray;
+}
+
+// One over the direction's length, not below the exact one, within 64 u.
+static inline real ray_inverse_length(const Ray *ray)
+{
+    return ray->inverse_squared * ray->length * (real)(1 + 16 * UNIT_ROUNDOFF);
 }
 
 // 1 / direction, huge where a component is 0.
@@ -154,7 +154,6 @@ static inline void ray_prepare(Ray *ray)
     if (!HAS_TRIANGLES) return;
     real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
     real scale = real_inverse_power_of_two(largest);
-    ray->along = vector_scale(d, ray->inverse_squared);
     if (IS_CERTIFIED) {
         shear_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
         // sqrt(1 + x^2) <= 1 + 0.42 x for x <= 1
@@ -176,20 +175,21 @@ static inline void ray_prepare(Ray *ray)
 static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 {
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
-    if (IS_CERTIFIED) ray.length = ray.inverse_length = (real)(1 + 16 * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) ray.length = (real)(1 + 16 * UNIT_ROUNDOFF);
     if (IS_COMPENSATED) return ray;
     ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
     return ray;
 }
 
-// Call once ray->active is final: inactive lanes miss every cull sphere.
-static inline void ray_set_common_origin(Ray *ray, uint common_origin)
+// Call once ray->active is final: inactive lanes miss every cull sphere. `is_loose`: lanes that are too far
+// off to be culled.
+static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask is_loose)
 {
     ray->common_origin = common_origin;
     const scalar units = IS_CERTIFIED ? CERTIFIED_CULL_DIRECTION_SLACK : CULL_DIRECTION_SLACK;
     real slack = (real)(units * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
     if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // rays start exactly there
-    if (IS_CERTIFIED) slack = lanes_select(ray->is_loose, (real)(LARGEST), slack);
+    if (IS_CERTIFIED) slack = lanes_select(is_loose, (real)(LARGEST), slack);
     ray->cull_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
 }
 
@@ -197,6 +197,12 @@ static inline void ray_set_common_origin(Ray *ray, uint common_origin)
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {
     return lanes_select(near_t > ray->tmin, near_t, far_t);
+}
+
+// Its product with a point seen from the origin is the point's t.
+static inline Vector ray_along(const Ray *ray)
+{
+    return vector_scale(ray->direction, ray->inverse_squared);
 }
 
 static inline Vector ray_point(const Ray *ray, real t)

@@ -14,12 +14,12 @@ static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene
     traversal->active = ray->active;
     traversal->hit.t = ray->tmax;
     traversal->hit.object = (integer)(-1);
-    traversal->optical_depth = (integer)(0);
+    if (HAS_TRANSMISSION) traversal->optical_depth = (integer)(0);
     if (IS_CERTIFIED) {
-        traversal->hit.low = traversal->hit.high = ray->tmax;
-        traversal->limit = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
+        traversal->hit.low = (real)(LARGEST);                           // of no hit: no rival
+        traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
         traversal->rival = (real)(LARGEST);
-        traversal->doubt = traversal->hit.doubt = mask_none();
+        traversal->hit.doubt = mask_none();
     }
     if (!lanes_any(ray->active)) return false;
     intersect_outside_bvh(traversal, scene, ray);
