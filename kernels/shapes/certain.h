@@ -146,7 +146,7 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real chord_squared = real_max(squared, band);
     crossed.half_chord = real_sqrt(chord_squared * ray->inverse_squared);
     mask usable = crossed.half_chord > (real)(0);
-    real inverse = reciprocal_estimate(lanes_select(usable, crossed.half_chord, (real)(1)));
+    real inverse = real_divide((real)(1), lanes_select(usable, crossed.half_chord, (real)(1)));
     crossed.half_inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
     // A place that moves by p moves the crossing by p over the cosine there, the least half chord over r.
     // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75; beyond, h

@@ -66,7 +66,7 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
                                  (real)(UNIT_ROUNDOFF)*real_fma((real)(8), of_point, (real)(6) * of_origin));
     real along_error = size * (ray->length * (ray->direction_error + (real)(5 * UNIT_ROUNDOFF)));
     mask crosses = fabs(along) > (real)(8) * along_error;
-    real inverse = reciprocal_estimate(lanes_select(crosses, along, (real)(1)));
+    real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
     real t = height * inverse;
     // the exact n . d is at least 7/8 of this one, and 8/7 < 1.2
     real t_error = (real)(1.2f) * real_fma(fabs(t), along_error, height_error) * fabs(inverse) +
