@@ -64,7 +64,8 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
          of_origin = vector_norm1_along(unsigned_normal, ray->origin);
     real height_error = real_fma(size, ray->origin_error,
                                  (real)(UNIT_ROUNDOFF)*real_fma((real)(8), of_point, (real)(6) * of_origin));
-    real along_error = size * (ray->length * (ray->direction_error + (real)(5 * UNIT_ROUNDOFF)));
+    real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
+                       size * (ray->length * ray->direction_error);
     mask crosses = fabs(along) > (real)(8) * along_error;
     real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
     real t = height * inverse;
