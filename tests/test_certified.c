@@ -71,7 +71,8 @@ static Object flat_in_view(size_t index)
     const Vector3 center = vector_add(point, vector_scale(aside, size));
     switch (index % 5) {
     case 0:
-        return (Object){.kind = SHAPE_SPHERE, .as.sphere = {vector_nudge(center), nudge(size), false}};
+        return (Object){.kind = SHAPE_SPHERE,
+                        .as.sphere = {vector_nudge(center), nudge(size), .only_inside = index % 20 == 0}};
     case 1: { // an edge through the point
         const Vector3 way = vector_scale(random_unit_vector(&random_state), size);
         return (Object){.kind = SHAPE_TRIANGLE,

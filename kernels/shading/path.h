@@ -123,15 +123,15 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         }
         color = color_add_weighted(color, weight, vector_select(ray.active, shaded->color, black));
 
-        Bounce reflected = {ray.origin, ray.direction, black, depth + 1,
-                            HAS_IMAGES ? ray.travelled : (real)(0)};
+        Bounce reflected = {ray.origin, ray.direction, black, depth + 1};
         Bounce refracted = reflected;
         mask total = mask_none();
-        if (lanes_any(hit_found(shaded->surface.object)) && depth < scene->header->bounces.x)
+        if (lanes_any(hit_found(shaded->surface.object)) && depth < scene->header->bounces.x) {
             total = surface_bounce(&shaded->surface, vector_renormalize(ray.direction), weight, false,
                                    &reflected, &refracted);
-        if (IS_CERTIFIED && lanes_any(hit_found(shaded->surface.object)) && depth < scene->header->bounces.x)
-            bounces_set_errors(&shaded->surface, &ray, total, &reflected, &refracted, doubt);
+            if (IS_CERTIFIED)
+                bounces_set_errors(&shaded->surface, &ray, total, &reflected, &refracted, doubt);
+        }
         if (COMPUTE_SIGNATURE)
             *path = path_signature_add(*path, &ray, shaded->surface.object, bounce_is_active(&reflected),
                                        bounce_is_active(&refracted), total);

@@ -79,30 +79,29 @@ enum { SHADOW_ERROR_MAX = 1 << 9 };
 // Where the facing is open by no more than this, what the light adds is too faint to matter.
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
 
-// Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes too far off to be
-// culled.
+// Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes whose
+// errors are too large for cull spheres.
 static inline mask light_set_errors(const Light *light, const Surface *surface, LightVisibility *visibility,
                                     Ray *shadow_ray)
 {
     const real zero = (real)(0);
     real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
-    mask far_off = mask_none(), is_loose = far_off;
+    mask far_off = mask_none(), skips_culling = far_off;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
-        // a unit vector is off by 2.5 u, a dot product by 3 u
+        // without another root: a unit vector is off by 14.5 u, a dot product by 3 u
         shadow_ray->length =
-            vector_dot(visibility->direction, shadow_ray->direction) * (real)(1 + 16 * UNIT_ROUNDOFF);
+            vector_dot(visibility->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
         real relative = place_error * ray_inverse_length(shadow_ray);
         far_off = !(relative <= SHADOW_DOUBT_MAX) | !(shadow_ray->squared > zero);
-        is_loose = relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF);
+        skips_culling = relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF);
         angle_error = angle_error + relative + relative;
         shadow_ray->ends_at_light = true;
     }
     shadow_ray->origin_error = place_error;
     shadow_ray->left = surface->object;
-    // without triangles there is one normal
-    real geometric = HAS_TRIANGLES ? vector_dot(surface->normal, visibility->direction) : visibility->facing;
+    real geometric = vector_dot(surface_normal(surface), visibility->direction);
     real facing_error = surface->normal_error + angle_error;
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
     shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
@@ -130,7 +129,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     visibility->lit = visibility->lit & !behind;
     visibility->doubt = self_doubt | (visibility->lit & far_off);
     shadow_ray->active = shadow_ray->active & !visibility->doubt;
-    return is_loose;
+    return skips_culling;
 }
 
 // Lanes in which what the light does is in doubt, once the shadow ray has been traced.
@@ -153,10 +152,10 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
         hit_found(surface->object) & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
     *shadow_ray = to_light.shadow_ray;
     shadow_ray->active = shadow_ray->active & visibility.lit;
-    mask is_loose = mask_none();
-    if (IS_CERTIFIED) is_loose = light_set_errors(&light, surface, &visibility, shadow_ray);
+    mask skips_culling = mask_none();
+    if (IS_CERTIFIED) skips_culling = light_set_errors(&light, surface, &visibility, shadow_ray);
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
-        ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index, is_loose);
+        ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index, skips_culling);
     ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
     return visibility;
 }

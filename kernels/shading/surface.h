@@ -19,20 +19,18 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
                     real_fma(weight.z, color.z, sum.z)};
 }
 
-// Members that only reflection, transmission or images need are not set without them.
-//
-// Color and `travelled` presume that the ray's direction is unit; of an explicit ray, which may have any
-// length, neither is used.
+// Members that only reflection, transmission or images need are not set without them. Of an explicit ray,
+// whose direction may have any length, colors and `travelled` are not used.
 typedef struct {
     integer object; // its id; -1: nothing hit
     Vector position;
-    Vector normal;         // geometric, unit, facing the ray; only triangles have another shading normal
+    Vector normal;         // geometric, unit, facing the ray; only with triangles: surface_normal
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
     real error;            // bound on the position's distance from the true surface
     real refracted_offset; // how far behind the surface a refracted ray starts
-    Color3 ambient;        // its color in ambient light
-    Color3 diffuse;        // and of a light that it faces
+    Color3 ambient;        // what it reflects of the ambient light
+    Color3 diffuse;        // and, as a factor, of a light that it faces
     real specular, shininess;
     real reflection, transmission, ior;
     mask entering;  // the ray runs into the solid, against its outward normal
@@ -252,9 +250,9 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
         is_open = fabs(shading_cosine) <= geometric_error + surface->normal_error;
         surface->geometric_error = geometric_error;
     }
-    real cosine = vector_dot(point->normal, ray->direction) * ray_inverse_length(ray);
+    real cosine = fabs(vector_dot(point->normal, ray->direction)); // times the ray's length
     real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
-    is_open = is_open | (fabs(cosine) <= cosine_error);
+    is_open = is_open | (cosine <= cosine_error * ray->length);
     surface->doubt = surface->doubt | (hit_found(surface->object) & is_open);
 }
 
@@ -270,7 +268,7 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     mask opposite = vector_dot(point->shading_normal, normal) < (real)(0);
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
-    if (IS_CERTIFIED) return; // no ray starts off a surface
+    if (IS_CERTIFIED) return; // rays start on the surface
     surface->error =
         (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
                                        (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
@@ -336,7 +334,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     return surface;
 }
 
-// Facing the ray.
+// The geometric normal, facing the ray.
 static inline Vector surface_normal(const Surface *surface)
 {
     return HAS_TRIANGLES ? surface->normal : surface->shading_normal;

@@ -92,26 +92,26 @@ typedef struct {
     mask certain, perhaps;       // the line crosses it, not behind the ray's start or beyond its end
     real middle_t, middle_error; // the closest point
     real half_chord, t_error;    // in t; t_error is that of sphere_near and sphere_far
-    mask refines;                // one step of Newton's method makes these exact
-    real half_inverse_slope;     // for it: of |x|^2 / 2 at the far crossing, x seen from the center
+    mask refines;                // a Newton step is taken
+    real inverse_slope;          // for it: of |x|^2 at the far crossing, x seen from the center
 } CertainSphere;
 
-static inline real sphere_refine(const CertainSphere *sphere, const Ray *ray, real t, real half_inverse_slope)
+static inline real sphere_refine(const CertainSphere *sphere, const Ray *ray, real t, real inverse_slope)
 {
     Vector x = vector_fma(ray->direction, t, sphere->start);
     real excess = real_fma(sphere->radius, sphere->radius, -vector_dot(x, x));
-    return lanes_select(sphere->refines, real_fma(excess, half_inverse_slope, t), t);
+    return lanes_select(sphere->refines, real_fma(excess, inverse_slope, t), t);
 }
 
 // The crossings.
 static inline real sphere_near(const CertainSphere *sphere, const Ray *ray)
 {
-    return sphere_refine(sphere, ray, sphere->middle_t - sphere->half_chord, -sphere->half_inverse_slope);
+    return sphere_refine(sphere, ray, sphere->middle_t - sphere->half_chord, -sphere->inverse_slope);
 }
 
 static inline real sphere_far(const CertainSphere *sphere, const Ray *ray)
 {
-    return sphere_refine(sphere, ray, sphere->middle_t + sphere->half_chord, sphere->half_inverse_slope);
+    return sphere_refine(sphere, ray, sphere->middle_t + sphere->half_chord, sphere->inverse_slope);
 }
 
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
@@ -139,7 +139,7 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     mask apart = (crossed.middle_t + reach < ray->tmin) | (crossed.middle_t - reach > end);
     crossed.certain = lanes & (squared > band);
     crossed.perhaps = lanes & !((squared < -band) | apart);
-    crossed.half_chord = crossed.half_inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
+    crossed.half_chord = crossed.inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
     crossed.refines = mask_none();
     if (!lanes_any(crossed.perhaps)) return crossed;
     // in t; where it is in doubt, of the band: between 0 and that of twice the band
@@ -147,10 +147,10 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     crossed.half_chord = real_sqrt(chord_squared * ray->inverse_squared);
     mask usable = crossed.half_chord > (real)(0);
     real inverse = real_divide((real)(1), lanes_select(usable, crossed.half_chord, (real)(1)));
-    crossed.half_inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
+    crossed.inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
     // A place that moves by p moves the crossing by p over the cosine there, the least half chord over r.
     // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75; beyond, h
-    // changes by less than h x (1 + x) / 2 across the ray, and p counts along it.
+    // changes by at most h x (1 + x) / 2 across the ray, and p, at most 1.4 x p, counts along it.
     real inverse_chord = inverse * ray_inverse_length(ray);
     real x = band * (inverse_chord * inverse_chord);
     real steepness = real_fma((real)(1.6f) * inverse_chord, x, inverse_chord);

@@ -84,6 +84,7 @@ static inline mask round_bounds(Vector center, real radius, const Ray *ray, real
 {
     CertainSphere bounding =
         certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
+    if (!lanes_any(bounding.perhaps)) return mask_none();
     *from = sphere_near(&bounding, ray) - bounding.t_error;
     *to = sphere_far(&bounding, ray) + bounding.t_error;
     return bounding.perhaps & (*to >= ray->tmin);

@@ -173,11 +173,11 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
     CertainSphere crossed =
         certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);
     if (!lanes_any(crossed.perhaps)) return certain_miss();
-    const bool ignores_front = sphere->id.y & IGNORES_FRONT_FACES;
     real near = sphere_near(&crossed, ray), near_high = near + crossed.t_error;
     CertainHit hit =
         certain_crossing(ray, crossed.certain, crossed.perhaps, near - crossed.t_error, near_high);
-    mask passed = crossed.perhaps & (ignores_front | (near_high < ray->tmin));
+    mask passed = crossed.perhaps;
+    if (!(sphere->id.y & IGNORES_FRONT_FACES)) passed = passed & (near_high < ray->tmin);
     left = left & lanes;
     if (!lanes_any(passed | left)) return hit;
     real far = sphere_far(&crossed, ray), far_low = far - crossed.t_error, far_high = far + crossed.t_error;

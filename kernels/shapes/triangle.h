@@ -377,7 +377,7 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     lanes = lanes & signs.perhaps & !ray_left_for_good(ray, triangle->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     CertainHit hit = triangle_certain_crossing(&edges, ray, lanes, signs, sizes, error);
-    if (RARELY(lanes_any(hit.doubt))) // the others must not depend on it
+    if (RARELY(lanes_any(hit.doubt))) // lanes without must not depend on those with
         hit = certain_select(hit.doubt, triangle_certain_hit_near(&edges, ray, lanes, sizes, error), hit);
     return hit;
 }

@@ -82,7 +82,8 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
 }
 
 // As traversal_record, for a hit with bounds. Of those found the nearest is kept; all others, and those in
-// doubt, are rivals. So the answer does not depend on the order in which shapes are tested.
+// doubt, are rivals. So which lanes are in doubt, and the hits of those that are not, do not depend on the
+// order in which shapes are tested.
 static inline void traversal_record_certain(Traversal *traversal, const Scene *scene, const CertainHit *found,
                                             uint id)
 {

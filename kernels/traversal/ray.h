@@ -32,7 +32,7 @@ typedef struct {
     bool ends_at_light;
     // of a ray along a chord of the sphere that it leaves, NEVER of others: as of a Chord (shading/chords.h)
     real chord_turn, chord_end_place;
-    real length; // of the direction, not below the exact one, within 32 u
+    real length; // of the direction, not below the exact one, within 48 u
     // by ray_prepare: a bound on the length of across_u and across_v, and on the error of a triangle's corner
     // in the frame if it is no farther from the origin than `size`: across_error0 + across_error1 size
     real across_length, across_error0, across_error1;
@@ -45,7 +45,8 @@ typedef struct {
 typedef struct {
     real t;
     integer object; // its id; -1: nothing hit
-    // At `certified` the exact t lies between; `doubt`: in lanes where any of this is in doubt.
+    // At `certified`: `low`, of this hit, is not above the exact t, `high` not below that of the exact ray's
+    // first hit, whichever shape has it; `doubt`: in lanes where any of this is in doubt.
     real low, high;
     mask doubt;
 } Hit;
@@ -128,7 +129,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     return ray;
 }
 
-// One over the direction's length, not below the exact one, within 64 u.
+// One over the direction's length, not below the exact one, within 80 u.
 static inline real ray_inverse_length(const Ray *ray)
 {
     return ray->inverse_squared * ray->length * (real)(1 + 16 * UNIT_ROUNDOFF);
@@ -181,15 +182,15 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     return ray;
 }
 
-// Call once ray->active is final: inactive lanes miss every cull sphere. `is_loose`: lanes that are too far
-// off to be culled.
-static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask is_loose)
+// Call once ray->active is final: inactive lanes miss every cull sphere. `skips_culling`: lanes that are too
+// far off to be culled.
+static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask skips_culling)
 {
     ray->common_origin = common_origin;
     const scalar units = IS_CERTIFIED ? CERTIFIED_CULL_DIRECTION_SLACK : CULL_DIRECTION_SLACK;
     real slack = (real)(units * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
     if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // rays start exactly there
-    if (IS_CERTIFIED) slack = lanes_select(is_loose, (real)(LARGEST), slack);
+    if (IS_CERTIFIED) slack = lanes_select(skips_culling, (real)(LARGEST), slack);
     ray->cull_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
 }
 
