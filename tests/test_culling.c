@@ -25,7 +25,7 @@ static const char kernel_text[] =
     "    global const scalar *line = lines + 6 * i;\n"
     "    Vector origin = {line[0], line[1], line[2]}, direction = {line[3], line[4], line[5]};\n"
     "    Ray ray = ray_make(origin, direction, 0, 1, mask_all());\n"
-    "    ray_set_common_origin(&ray, common_origin);\n"
+    "    ray_set_common_origin(&ray, common_origin, mask_none());\n"
     "    missed[i] = lanes_any(ray_misses_cull_sphere(&ray, &cull_spheres[i]));\n"
     "}\n";
 
