@@ -6,8 +6,7 @@
 // Infinity on a miss, from bits, since `fast` assumes there are none.
 static inline real hit_distance(const Hit *hit)
 {
-    return real_from_bits(
-        lanes_select(hit_found(hit->object), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
+    return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
 }
 
 #define LAYER_REAL                                         scalar
@@ -28,7 +27,7 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
     Hit hit = closest_hit(scene, &ray);
     Surface surface = visible_surface(scene, &ray, &hit);
-    const mask found = hit_found(hit.object);
+    const mask found = hit_found(&hit);
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     film_store_color(layers->ray, tile, ray.direction);
     film_store(layers->t, tile, 1, 0, hit_distance(&hit));

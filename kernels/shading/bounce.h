@@ -67,8 +67,8 @@ static inline Vector surface_reflect(const Surface *surface, Vector direction)
 {
     Vector reflected = vector_reflect(direction, surface->shading_normal);
     if (!HAS_TRIANGLES) return reflected;
-    mask inward = vector_dot(reflected, surface_normal(surface)) <= (real)(0);
-    return vector_select(inward, vector_reflect(direction, surface_normal(surface)), reflected);
+    mask inward = vector_dot(reflected, surface->normal) <= (real)(0);
+    return vector_select(inward, vector_reflect(direction, surface->normal), reflected);
 }
 
 // Likewise; returns the lanes of total internal reflection.
@@ -77,11 +77,10 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
     mask total =
         vector_refract(direction, surface->shading_normal, surface->entering, surface->ior, refracted);
     if (!HAS_TRIANGLES) return total;
-    mask outward = !total & (vector_dot(*refracted, surface_normal(surface)) >= (real)(0));
+    mask outward = !total & (vector_dot(*refracted, surface->normal) >= (real)(0));
     if (!lanes_any(outward)) return total;
     Vector plain;
-    mask plain_total =
-        vector_refract(direction, surface_normal(surface), surface->entering, surface->ior, &plain);
+    mask plain_total = vector_refract(direction, surface->normal, surface->entering, surface->ior, &plain);
     *refracted = vector_select(outward, plain, *refracted);
     return lanes_select(outward, plain_total, total);
 }
@@ -109,7 +108,7 @@ typedef struct {
 static inline Incidence surface_incidence(const Surface *surface, const Ray *ray)
 {
     real turn = ray->direction_error + BOUNCE_ROUNDING, normal_error = surface->normal_error;
-    return (Incidence){hit_found(surface->object) & ray->active, turn,
+    return (Incidence){surface_found(surface) & ray->active, turn,
                        fabs(vector_dot(ray->direction, surface->shading_normal)),
                        real_fma(turn, normal_error, turn + normal_error)};
 }
@@ -133,7 +132,7 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
     if (!HAS_TRIANGLES) return doubt;
     // the shading normal's reflection may run through the surface
     Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
-    real outward = fabs(vector_dot(by_shading, surface_normal(surface)));
+    real outward = fabs(vector_dot(by_shading, surface->normal));
     return doubt | (reflects & (outward <= error + normal_error));
 }
 
@@ -210,7 +209,7 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     mask doubt = transparent & snell.doubt;
     doubt = doubt | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
     if (!HAS_TRIANGLES) return doubt;
-    real inward = fabs(vector_dot(refracted->direction, surface_normal(surface)));
+    real inward = fabs(vector_dot(refracted->direction, surface->normal));
     return doubt | (refracts & (inward <= refracted->direction_error + normal_error));
 }
 

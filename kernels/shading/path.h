@@ -20,7 +20,7 @@ static inline void hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
     hit->surface.object = traversal->hit.object;
     hit->color = vector_of(scene->header->background);
     if (IS_CERTIFIED) hit->doubt = traversal->hit.doubt;
-    mask found = hit_found(hit->surface.object);
+    mask found = surface_found(&hit->surface);
     if (!lanes_any(found)) return;
     hit->surface = visible_surface(scene, ray, &traversal->hit);
     if (IS_CERTIFIED) hit->doubt = hit->doubt | (found & hit->surface.doubt);
@@ -33,7 +33,7 @@ static inline void shadow_rays_make(const Scene *scene, const ShadedHit *hit, ui
 {
     shadow_ray->active = light->lit = mask_none();
     shadow_ray->tmax = (real)(0);
-    if (lanes_any(hit_found(hit->surface.object)))
+    if (lanes_any(surface_found(&hit->surface)))
         *light = light_reach(scene, &hit->surface, index, shadow_ray);
 }
 
@@ -42,7 +42,7 @@ static inline void hit_light(const Scene *scene, uint index, LightVisibility *li
                              ShadedHit *hit)
 {
     if (IS_CERTIFIED) traversal_judge(traversal);
-    if (IS_CERTIFIED && lanes_any(hit_found(hit->surface.object))) {
+    if (IS_CERTIFIED && lanes_any(surface_found(&hit->surface))) {
         mask glossy = hit->surface.specular > (real)(0);
         light_add_doubt(light, &traversal->hit);
         mask matters = glossy | !light->facing_doubt;
@@ -113,7 +113,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     for (;;) {
         if (depth > 0 || !is_shaded) rays_shade(scene, &ray, 1, shaded);
         if (IS_CERTIFIED) *doubt = *doubt | (ray.active & shaded->doubt);
-        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, hit_found(shaded->surface.object));
+        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, surface_found(&shaded->surface));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE)
@@ -126,7 +126,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         Bounce reflected = {ray.origin, ray.direction, black, depth + 1};
         Bounce refracted = reflected;
         mask total = mask_none();
-        if (lanes_any(hit_found(shaded->surface.object)) && depth < scene->header->bounces.x) {
+        if (lanes_any(surface_found(&shaded->surface)) && depth < scene->header->bounces.x) {
             total = surface_bounce(&shaded->surface, vector_renormalize(ray.direction), weight, false,
                                    &reflected, &refracted);
             if (IS_CERTIFIED)

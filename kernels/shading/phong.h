@@ -34,7 +34,7 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
         to_light.shadow_ray =
-            ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), hit_found(surface->object));
+            ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface_found(surface));
         return to_light;
     }
     Vector position = vector_of(light->position);
@@ -42,7 +42,7 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
     to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),
-                                   (real)(1 - 32 * UNIT_ROUNDOFF), hit_found(surface->object));
+                                   (real)(1 - 32 * UNIT_ROUNDOFF), surface_found(surface));
     return to_light;
 }
 
@@ -105,7 +105,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real facing_error = surface->normal_error + angle_error;
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
     shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
-    mask turned = (visibility->facing < -facing_error) | !hit_found(surface->object);
+    mask turned = (visibility->facing < -facing_error) | !surface_found(surface);
     mask open = !turned & (visibility->facing <= facing_error);
     mask faint = facing_error <= FACING_ERROR_MAX;
     visibility->facing_doubt = open & faint;
@@ -149,7 +149,7 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     visibility.facing = vector_dot(surface->shading_normal, to_light.direction);
     visibility.fraction = to_light.strength;
     visibility.lit =
-        hit_found(surface->object) & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
+        surface_found(surface) & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
     *shadow_ray = to_light.shadow_ray;
     shadow_ray->active = shadow_ray->active & visibility.lit;
     mask skips_culling = mask_none();

@@ -42,6 +42,17 @@ typedef struct {
     ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
 
+static inline mask surface_found(const Surface *surface)
+{
+    return surface->object >= (integer)(0);
+}
+
+// The geometric normal, facing the ray.
+static inline Vector surface_normal(const Surface *surface)
+{
+    return HAS_TRIANGLES ? surface->normal : surface->shading_normal;
+}
+
 static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, uint index, const Ray *ray,
                                                real t)
 {
@@ -142,10 +153,10 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
 // by the roundings of ray_point, with the shapes' own.
 static inline real hit_place_error(const Ray *ray, const Hit *hit)
 {
-    real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), path = length * fabs(hit->t);
-    // a 1-norm is at most sqrt 3 times the length
-    real rounding = (real)(2 * UNIT_ROUNDOFF) * real_fma((real)(1.75f), path, vector_norm1(ray->origin));
-    real across = ray_place_error(ray, path),
+    real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
+    real rounding =
+        (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
+    real across = ray_place_error(ray, length * t),
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
     // not less than the root of the sum of squares
     real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
@@ -253,7 +264,7 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     real cosine = fabs(vector_dot(point->normal, ray->direction)); // times the ray's length
     real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
     is_open = is_open | (cosine <= cosine_error * ray->length);
-    surface->doubt = surface->doubt | (hit_found(surface->object) & is_open);
+    surface->doubt = surface->doubt | (surface_found(surface) & is_open);
 }
 
 // Turns both normals to the side that the ray comes from.
@@ -297,7 +308,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         if (HAS_CHORDS) surface.chord_end = chord_end_none();
     }
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
-    integer pending = lanes_select(hit_found(hit->object), hit->object, NO_OBJECT);
+    integer pending = lanes_select(hit_found(hit), hit->object, NO_OBJECT);
     for (;;) {
         scalar_integer object = lanes_smallest(pending);
         if (object == INT_MAX) break;
@@ -334,12 +345,6 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     return surface;
 }
 
-// The geometric normal, facing the ray.
-static inline Vector surface_normal(const Surface *surface)
-{
-    return HAS_TRIANGLES ? surface->normal : surface->shading_normal;
-}
-
 // The origin of a secondary ray, on the side the ray came from or, if `through`, on the other. It lies off
 // the surface by twice the bound on the position's error: once for that error and once for the new ray's own
 // test of the surface.
@@ -363,7 +368,7 @@ static inline mask may_be_in_contact(const Scene *scene, Vector position)
 // short line along the normal.
 static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
 {
-    mask transparent = hit_found(surface->object) & (surface->transmission > (real)(0));
+    mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
     real reach = (real)(16) * surface->place_error;
     Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
     Vector p = surface->position;
@@ -375,7 +380,7 @@ static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *s
     inward.tmax = reach + reach;
     inward.origin_error = surface->place_error * (real)(1.5f);
     Hit opaque = closest_opaque_hit(scene, &inward);
-    return transparent & (hit_found(opaque.object) | opaque.doubt);
+    return transparent & (hit_found(&opaque) | opaque.doubt);
 }
 
 // Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
@@ -384,7 +389,7 @@ static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *s
 // refracted ray starts halfway to it.
 static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
 {
-    mask transparent = hit_found(surface->object) & (surface->transmission > (real)(0));
+    mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
     transparent = transparent & may_be_in_contact(scene, surface->position);
     if (!lanes_any(transparent)) return mask_none();
     real error = surface->error, offset = error + error;
@@ -393,7 +398,7 @@ static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit
     inward.tmin = error;
     inward.tmax = offset + (real)(3) * error;
     Hit opaque = closest_opaque_hit(scene, &inward);
-    mask found = hit_found(opaque.object);
+    mask found = hit_found(&opaque);
     real gap = opaque.t - offset;
     mask touches = found & (gap <= error);
     surface->refracted_offset = lanes_select(found & !touches, (real)(0.5f) * gap, surface->refracted_offset);
@@ -409,15 +414,14 @@ static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *h
     real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);
     for (bool replaced = false;; replaced = true) {
         Surface surface = surface_interaction(scene, ray, hit);
-        if (HAS_TRANSMISSION & !IS_CERTIFIED) {
-            surface.error = real_max(surface.error, transparent_error);
-            surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
-        }
+        if (!HAS_TRANSMISSION) return surface;
         if (IS_CERTIFIED) {
-            if (HAS_TRANSMISSION) surface.doubt = surface.doubt | surface_may_touch_opaque(scene, &surface);
+            surface.doubt = surface.doubt | surface_may_touch_opaque(scene, &surface);
             return surface;
         }
-        if (!HAS_TRANSMISSION || replaced) return surface;
+        surface.error = real_max(surface.error, transparent_error);
+        surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
+        if (replaced) return surface;
         mask touches = surface_find_opaque(scene, &surface, hit);
         if (!lanes_any(touches)) return surface;
         transparent_error = lanes_select(touches, surface.error, (real)(0));

@@ -125,16 +125,17 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real squared = real_fma(radius, radius, -vector_dot(l, l));
     // not less than |f| where |l| is up to twice the radius: beyond, errors in proportion to |l| do not count
     real distance = real_fma(fabs(crossed.middle_t), ray->length, radius + radius);
-    real at_start = real_fma((real)(UNIT_ROUNDOFF), real_fma((real)(6), radius, vector_norm1(ray->origin)),
-                             ray->origin_error);
-    // crossings are no farther than distance - radius and the place; so is the closest point
-    real place = real_fma((real)(3 * UNIT_ROUNDOFF), distance,
-                          real_fma(ray->direction_error, distance - radius, at_start));
-    place = real_fma(ray->direction_error + (real)(32 * UNIT_ROUNDOFF), place, place);
+    real rounding = (real)(UNIT_ROUNDOFF)*real_fma((real)(3), distance,
+                                                   real_fma((real)(6), radius, vector_norm1(ray->origin)));
+    // crossings are no farther than this and the place; so is the closest point
+    real farthest = distance - radius;
+    real place = ray_place_error(ray, farthest) * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
+    place = real_fma(ray->direction_error, place, place);
     real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
-    real band = real_fma(along, along, place * (radius + radius + place));
+    real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
     // not where all of it is behind the start, or beyond the end
-    real reach = ray_inverse_length(ray) * real_fma((real)(2), place + along, radius);
+    const real inverse_length = ray_inverse_length(ray);
+    real reach = inverse_length * (radius + (real)(2) * (place + along));
     real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
     mask apart = (crossed.middle_t + reach < ray->tmin) | (crossed.middle_t - reach > end);
     crossed.certain = lanes & (squared > band);
@@ -143,25 +144,24 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     crossed.refines = mask_none();
     if (!lanes_any(crossed.perhaps)) return crossed;
     // in t; where it is in doubt, of the band: between 0 and that of twice the band
-    real chord_squared = real_max(squared, band);
-    crossed.half_chord = real_sqrt(chord_squared * ray->inverse_squared);
+    crossed.half_chord = real_sqrt(real_max(squared, band) * ray->inverse_squared);
     mask usable = crossed.half_chord > (real)(0);
     real inverse = real_divide((real)(1), lanes_select(usable, crossed.half_chord, (real)(1)));
     crossed.inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
     // A place that moves by p moves the crossing by p over the cosine there, the least half chord over r.
     // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75; beyond, h
     // changes by at most h x (1 + x) / 2 across the ray, and p, at most 1.4 x p, counts along it.
-    real inverse_chord = inverse * ray_inverse_length(ray);
+    real inverse_chord = inverse * inverse_length;
     real x = band * (inverse_chord * inverse_chord);
     real steepness = real_fma((real)(1.6f) * inverse_chord, x, inverse_chord);
     const real few_squares = (real)(4 * UNIT_ROUNDOFF) * (radius * radius);
     real moved = real_fma(real_fma((real)(0.51f), band, real_fma(place, place, few_squares)), steepness,
                           (real)(1.4f) * x * place);
-    crossed.middle_error = ray_inverse_length(ray) * (place + along);
+    crossed.middle_error = inverse_length * (place + along);
     // the crossings are off by no more than twice `along`, which the step squares
     crossed.refines = (real)(64) * along * steepness < (real)(1);
     real computed = lanes_select(crossed.refines, (real)(2.5f * UNIT_ROUNDOFF) * distance, along + along);
-    crossed.t_error = ray_inverse_length(ray) * (moved + computed);
+    crossed.t_error = inverse_length * (moved + computed);
     return crossed;
 }
 

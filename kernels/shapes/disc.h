@@ -98,8 +98,10 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     real low, high;
     mask crosses = certain_plane(disc_foot(disc), disc->normal, ray, &low, &high);
     // nearly parallel to it: no nearer than the sphere
-    low = lanes_select(crosses, low, real_max(low, sphere_near(&bounding, ray) - bounding.t_error));
-    high = lanes_select(crosses, high, sphere_far(&bounding, ray) + bounding.t_error);
+    if (!lanes_all(crosses)) {
+        low = lanes_select(crosses, low, real_max(low, sphere_near(&bounding, ray) - bounding.t_error));
+        high = lanes_select(crosses, high, sphere_far(&bounding, ray) + bounding.t_error);
+    }
     CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, low, high);
     Vector f = vector_subtract(ray->origin, center);
     Vector across = vector_fma(ray->direction, hit.t, f);

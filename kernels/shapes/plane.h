@@ -58,12 +58,11 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
 {
     Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
-    real size = (real)(uniform_divide(1 + 32 * UNIT_ROUNDOFF, normal_and_inverse.w));
+    real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal_and_inverse.w));
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
-    real of_point = vector_norm1_along(unsigned_normal, point),
-         of_origin = vector_norm1_along(unsigned_normal, ray->origin);
-    real height_error = real_fma(size, ray->origin_error,
-                                 (real)(UNIT_ROUNDOFF)*real_fma((real)(8), of_point, (real)(6) * of_origin));
+    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
+                                                 (real)(2) * vector_norm1_along(unsigned_normal, point)) +
+                        size * ray->origin_error;
     real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
                        size * (ray->length * ray->direction_error);
     mask crosses = fabs(along) > (real)(8) * along_error;

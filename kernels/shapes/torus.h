@@ -318,6 +318,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     const real radius = certain.major + certain.minor;
     CertainSphere bounding = certain_sphere(vector_of(torus->center_major),
                                             radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
+    if (!lanes_any(bounding.perhaps)) return certain_miss();
     real from = sphere_near(&bounding, ray) - bounding.t_error,
          to = sphere_far(&bounding, ray) + bounding.t_error;
     mask lanes = bounding.perhaps & (to >= ray->tmin);

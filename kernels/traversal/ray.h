@@ -55,9 +55,9 @@ typedef struct {
 // what derives from it in mask registers. It does not see this through a function call; hence a macro.
 #define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
 
-static inline mask hit_found(integer object)
+static inline mask hit_found(const Hit *hit)
 {
-    return object >= (integer)(0);
+    return hit->object >= (integer)(0);
 }
 
 static inline real real_inverse_or_zero(real a)
