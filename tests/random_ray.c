@@ -11,6 +11,12 @@ Scene scene_of_shapes(Object *objects, size_t count, Material *material)
     return scene;
 }
 
+Vector3 random_cube_point(Random *random, double half)
+{
+    double x = random_between(random, -half, half), y = random_between(random, -half, half);
+    return (Vector3){x, y, random_between(random, -half, half)};
+}
+
 static RandomRay ray_between(Vector3 eye, Vector3 target, Random *random)
 {
     Vector3 direction = vector_normalize(vector_subtract(target, eye));

@@ -7,6 +7,9 @@ typedef struct {
     Vector3 origin, direction;
 } RandomRay;
 
+// A point of the cube from -half to half.
+Vector3 random_cube_point(Random *random, double half);
+
 // A scene of these objects, all of one material, which is set. Nothing to free.
 Scene scene_of_shapes(Object *objects, size_t count, Material *material);
 

@@ -1,15 +1,12 @@
-// The BVH: its invariants for any boxes, that no hit depends on it, and that closed meshes do not leak; with
-// GLINT_LONG_TESTS=1 a million rays in place of ten thousand.
-// run_tests: sanitize-long-only
+// That no hit depends on the BVH, and that closed meshes do not leak; with GLINT_LONG_TESTS=1 a million rays
+// in place of ten thousand. run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
-#include "host/compile/bvh_widen.h"
-#include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
 #include "tests/film.h"
 #include "tests/probe.h"
-#include "tests/scene_reading.h"
+#include "tests/random_ray.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,252 +16,9 @@
 
 static Random random_state;
 
-static Vector3 random_in_cube(double half)
-{
-    double x = random_between(&random_state, -half, half), y = random_between(&random_state, -half, half);
-    return (Vector3){x, y, random_between(&random_state, -half, half)};
-}
-
 static size_t few_or_many(size_t few, size_t many)
 {
     return tests_are_long() ? many : few;
-}
-
-// The tree
-
-typedef struct {
-    const Bvh *bvh;
-    const Bounds *boxes;
-    const uint8_t *kinds;
-    uint8_t *seen;
-    unsigned depth;
-    unsigned wide_depth;
-} TreeCheck;
-
-static void assert_contains(const Bounds *outer, const Bounds *inner)
-{
-    assert_true(outer->min.x <= inner->min.x && outer->max.x >= inner->max.x);
-    assert_true(outer->min.y <= inner->min.y && outer->max.y >= inner->max.y);
-    assert_true(outer->min.z <= inner->min.z && outer->max.z >= inner->max.z);
-}
-
-static void leaf_check(TreeCheck *check, const BvhChild *leaf)
-{
-    assert_true(leaf->count <= BVH_LEAF_MAX);
-    assert_true(leaf->first + leaf->count <= check->bvh->primitive_count);
-    const uint32_t *order = check->bvh->order + leaf->first;
-    for (uint32_t i = 0; i < leaf->count; i++) {
-        assert_int_equal(check->seen[order[i]]++, 0);
-        assert_int_equal(check->kinds[order[i]], check->kinds[order[0]]);
-        assert_contains(&leaf->box, &check->boxes[order[i]]);
-    }
-}
-
-static void node_check(TreeCheck *check, uint32_t index, unsigned depth)
-{
-    assert_true(index < check->bvh->node_count);
-    if (depth > check->depth) check->depth = depth;
-    for (int side = 0; side < 2; side++) {
-        const BvhChild *child = &check->bvh->nodes[index].children[side];
-        if (bounds_is_empty(&child->box)) {
-            assert_int_equal(check->bvh->primitive_count > BVH_LEAF_MAX, 0);
-        } else if (child->count > 0) {
-            leaf_check(check, child);
-        } else {
-            assert_true(child->first > index);
-            for (int k = 0; k < 2; k++)
-                assert_contains(&child->box, &check->bvh->nodes[child->first].children[k].box);
-            node_check(check, child->first, depth + 1);
-        }
-    }
-}
-
-// Wide nodes: every primitive in exactly one leaf, every node met once, none too deep.
-static void wide_node_check(TreeCheck *check, const BvhWide *wide, unsigned width, uint32_t index,
-                            unsigned depth)
-{
-    assert_true(index < wide->node_count);
-    assert_true(depth <= BVH_DEPTH_MAX);
-    const BvhWideNode *node = &wide->nodes[index];
-    assert_true(node->child_count <= width);
-    if (depth > check->wide_depth) check->wide_depth = depth;
-    uint32_t next = node->first_node;
-    for (unsigned i = 0; i < node->child_count; i++) {
-        const BvhChild *child = node->children[i];
-        if (child->count > 0) {
-            leaf_check(check, child);
-            continue;
-        }
-        assert_true(next > index);
-        for (unsigned k = 0; k < wide->nodes[next].child_count; k++)
-            assert_contains(&child->box, &wide->nodes[next].children[k]->box);
-        check->depth++; // counts nodes here
-        wide_node_check(check, wide, width, next++, depth + 1);
-    }
-}
-
-static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, unsigned width)
-{
-    BvhWide wide;
-    bvh_widen(&wide, bvh, width);
-    TreeCheck check = {bvh, boxes, kinds, memory_allocate_zeroed(bvh->primitive_count, 1), 1, 0};
-    wide_node_check(&check, &wide, width, 0, 1);
-    for (size_t i = 0; i < bvh->primitive_count; i++)
-        assert_int_equal(check.seen[i], 1);
-    assert_int_equal(check.depth, wide.node_count);
-    assert_int_equal(check.wide_depth, wide.depth);
-    free(check.seen);
-    bvh_wide_free(&wide);
-}
-
-// Every primitive in exactly one leaf, all of them counted, leaves of one kind, boxes that hold what is below
-// them, bounded depth.
-static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
-{
-    Bvh bvh;
-    Stage *stage = stage_open();
-    stage_begin(stage, "building", NULL, count + 1);
-    stage_set(stage, 1);
-    bvh_build(&bvh, boxes, kinds, count, stage);
-    Text text = {0};
-    double seconds;
-    stage_write(stage, &text, &seconds);
-    assert_string_equal(text_c(&text), "building 100%");
-    text_free(&text);
-    stage_close(stage);
-    TreeCheck check = {&bvh, boxes, kinds, memory_allocate_zeroed(count, 1), 0, 0};
-    node_check(&check, 0, 1);
-    for (size_t i = 0; i < count; i++)
-        assert_int_equal(check.seen[i], 1);
-    assert_true(check.depth <= BVH_DEPTH_MAX);
-    assert_int_equal(check.depth, bvh.depth);
-    for (unsigned width = BVH_WIDTH_MIN; width <= BVH_WIDTH_MAX; width *= 2)
-        wide_check(&bvh, boxes, kinds, width);
-    free(check.seen);
-    bvh_free(&bvh);
-}
-
-static Bounds cube_around(Vector3 center, double half)
-{
-    return bounds_around(center, vector_all(half));
-}
-
-enum { IDENTICAL, ONE_CENTER, HUGE_AMONG_TINY, MANY_BINADES, NESTED, ON_A_LINE, FLAT, RANDOM, SET_COUNT };
-
-static Bounds box_of_set(int set, size_t index, size_t count)
-{
-    const Vector3 nothing = {0, 0, 0};
-    double part = (double)index / (double)count;
-    switch (set) {
-    case IDENTICAL:
-        return cube_around((Vector3){1, 2, 3}, 0.5);
-    case ONE_CENTER:
-        return cube_around(nothing, 1 + part);
-    case HUGE_AMONG_TINY:
-        return index == 0 ? cube_around(nothing, 1e6) : cube_around(random_in_cube(1), 1e-4);
-    case MANY_BINADES: {
-        double size = exp2(random_between(&random_state, -60, 60));
-        return cube_around(random_in_cube(size), size / 16);
-    }
-    case NESTED: // each beside the next, which is smaller: a split leaves one behind
-        return cube_around((Vector3){exp2(-100 * part), 0, 0}, exp2(-100 * part) / 64);
-    case ON_A_LINE:
-        return cube_around((Vector3){part, 0, 0}, 0);
-    case FLAT:
-        return bounds_around(
-            (Vector3){random_between(&random_state, -1, 1), 7, random_between(&random_state, -1, 1)},
-            (Vector3){0.01, 0, 0.01});
-    default:
-        return cube_around(random_in_cube(10), random_between(&random_state, 0, 0.5));
-    }
-}
-
-static void any_boxes_make_a_tree(void **state)
-{
-    (void)state;
-    static const size_t counts[SET_COUNT] = {65536, 65536, 100001, 50000, 50000, 20000, 20000, 50000};
-    for (int set = 0; set < SET_COUNT; set++) {
-        size_t count = counts[set];
-        Bounds *boxes = memory_allocate(count, sizeof *boxes);
-        uint8_t *kinds = memory_allocate_zeroed(count, 1);
-        for (size_t i = 0; i < count; i++)
-            boxes[i] = box_of_set(set, i, count);
-        tree_check(boxes, kinds, count);
-        for (size_t i = 0; i < count; i++)
-            kinds[i] = (uint8_t)(random_bits(&random_state) % KIND_COUNT);
-        tree_check(boxes, kinds, count);
-        free(boxes);
-        free(kinds);
-    }
-}
-
-static void few_boxes_make_a_tree(void **state)
-{
-    (void)state;
-    Bounds boxes[20];
-    uint8_t kinds[20];
-    for (size_t count = 1; count <= 20; count++) {
-        for (size_t i = 0; i < count; i++) {
-            boxes[i] = cube_around(random_in_cube(1), 0.1);
-            kinds[i] = (uint8_t)(i % 3);
-        }
-        tree_check(boxes, kinds, count);
-    }
-}
-
-// Beside a town of size 2: the slack of its boxes must not be a planet's.
-static void planets_stay_outside_the_tree(void **state)
-{
-    (void)state;
-    static const struct {
-        double radii[2]; // of planets
-        uint32_t in_tree;
-    } skies[] = {{{0.5, 15.9}, 2}, {{0.5, 16.1}, 1}, {{17, 18}, 2}, {{17, 600}, 0}};
-    enum { HOUSES = 30 };
-    for (size_t i = 0; i < sizeof skies / sizeof *skies; i++) {
-        Text text = {0};
-        text_appendf(&text, "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\nobjects:\n");
-        for (size_t k = 0; k < 2; k++)
-            text_appendf(&text, "  - sphere: {center: [0, %g, 0], radius: %g}\n", -skies[i].radii[k],
-                         skies[i].radii[k]);
-        for (int k = 0; k < HOUSES; k++)
-            text_appendf(&text, "  - sphere: {center: [%g, 0.1, 0], radius: 0.1}\n",
-                         0.9 * (2.0 * k / (HOUSES - 1) - 1));
-        Scene scene = scene_of_text("town.yaml", text_c(&text));
-        const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
-        CompiledScene compiled;
-        MessageList messages = {0};
-        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-        assert_int_equal(compiled.bvh_counts[KIND_SPHERES], HOUSES + skies[i].in_tree);
-        // the first two objects, the larger one last
-        const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
-        for (uint32_t k = 0; k < 2; k++)
-            assert_int_equal(entries[k].kind_index_material.y < HOUSES + skies[i].in_tree,
-                             k < skies[i].in_tree);
-        compiled_scene_free(&compiled);
-        scene_free(&scene);
-        text_free(&text);
-    }
-}
-
-// Triangles without area are points; here all are the same. They stay in the tree, and the planet out of it.
-static void points_make_a_tree(void **state)
-{
-    (void)state;
-    enum { POINTS = 100000 };
-    Scene scene = scene_of_text("points.yaml", "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\n"
-                                               "objects:\n"
-                                               "  - sphere: {center: [0, -3, 0], radius: 2}\n");
-    for (int i = 0; i < POINTS; i++)
-        array_push(scene.objects, ((Object){.kind = SHAPE_TRIANGLE}));
-    const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
-    CompiledScene compiled;
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-    assert_int_equal(compiled.bvh_counts[KIND_TRIANGLES], POINTS);
-    assert_int_equal(compiled.bvh_counts[KIND_SPHERES], 0);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // On and off
@@ -319,7 +73,7 @@ static Scene random_scene(size_t count)
         const ShapeForm *form = i % 3 == 0 ? &triangle : &forms[random_bits(&random_state) % form_count];
         if (i % 3 > 0 && !form->bounded) continue;
         double size = exp2(random_between(&random_state, -5, 0));
-        Vector3 center = random_in_cube(10);
+        Vector3 center = random_cube_point(&random_state, 10);
         Object object = i % 3 == 1 ? aligned_object(i / 3, center, size)
                                    : random_shape_at(form, center, size / 2, &random_state).object;
         object.material = random_bits(&random_state) % 3 == 0;
@@ -340,7 +94,7 @@ static Vector3 delicate_point(const Scene *scene)
         return vector_add(vertices[0], vector_scale(vector_subtract(vertices[1], vertices[0]), part));
     }
     Bounds box;
-    if (!shape_ops[object->kind]->bounds(scene, object, &box)) return random_in_cube(10);
+    if (!shape_ops[object->kind]->bounds(scene, object, &box)) return random_cube_point(&random_state, 10);
     if (random_coin(&random_state)) return (Vector3){box.max.x, box.min.y, box.max.z};
     Vector3 center = vector_scale(vector_add(box.min, box.max), 0.5);
     return (Vector3){box.max.x, center.y, center.z};
@@ -355,8 +109,9 @@ static TraceRay ray_of(Vector3 origin, Vector3 direction)
 static void rays_fill(TraceRay *rays, size_t count, const Scene *scene)
 {
     for (size_t i = 0; i < count; i++) {
-        Vector3 target = random_coin(&random_state) ? delicate_point(scene) : random_in_cube(10);
-        Vector3 origin = random_in_cube(12), direction = vector_subtract(target, origin);
+        Vector3 target =
+            random_coin(&random_state) ? delicate_point(scene) : random_cube_point(&random_state, 10);
+        Vector3 origin = random_cube_point(&random_state, 12), direction = vector_subtract(target, origin);
         if (i % 4 == 1) {
             double axes[3] = {0, -0.0, 0}, from[3] = {target.x, target.y, target.z};
             uint64_t axis = random_bits(&random_state) % 3;
@@ -430,7 +185,7 @@ static void rays_behind_fill(TraceRay *rays, const Scene *scene)
 {
     static const double nears[] = {-30, -4, -1e-3, 0, 1};
     for (size_t packet = 0; packet < PACKETS; packet++) {
-        Vector3 origin = random_in_cube(8), target = delicate_point(scene);
+        Vector3 origin = random_cube_point(&random_state, 8), target = delicate_point(scene);
         Vector3 ahead = vector_normalize(vector_subtract(target, origin));
         bool looks_behind = random_coin(&random_state); // each of its rays, at what is there
         if (looks_behind) ahead = vector_scale(ahead, -1);
@@ -439,7 +194,7 @@ static void rays_behind_fill(TraceRay *rays, const Scene *scene)
             Vector3 direction = random_unit_vector(&random_state);
             if (goes_along) direction = vector_add(ahead, vector_scale(direction, 0.03));
             TraceRay *ray = &rays[packet * PACKET + lane];
-            *ray = ray_of(vector_add(origin, random_in_cube(0.1)), direction);
+            *ray = ray_of(vector_add(origin, random_cube_point(&random_state, 0.1)), direction);
             ray->tmin = nears[random_bits(&random_state) % (looks_behind ? 3 : sizeof nears / sizeof *nears)];
             if (random_coin(&random_state)) ray->tmax = ray->tmin + random_between(&random_state, 1, 20);
         }
@@ -575,7 +330,7 @@ static void rays_at_seams(TraceRay *rays, size_t count, const Mesh *mesh, Vector
     for (size_t i = 0; i < count; i++) {
         const uint32_t *corners = mesh->triangles[random_bits(&random_state) % mesh->triangle_count];
         Vector3 a = mesh->vertices[corners[0]], b = mesh->vertices[corners[1]];
-        Vector3 origin = vector_add(center, random_in_cube(0.15));
+        Vector3 origin = vector_add(center, random_cube_point(&random_state, 0.15));
         if (!wide) {
             a = (Vector3){(float)a.x, (float)a.y, (float)a.z};
             b = (Vector3){(float)b.x, (float)b.y, (float)b.z};
@@ -622,9 +377,8 @@ static void closed_meshes_do_not_leak(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_boxes_make_a_tree),         cmocka_unit_test(few_boxes_make_a_tree),
-        cmocka_unit_test(planets_stay_outside_the_tree), cmocka_unit_test(points_make_a_tree),
-        cmocka_unit_test(no_hit_depends_on_the_tree),    cmocka_unit_test(rays_may_look_behind_their_start),
+        cmocka_unit_test(no_hit_depends_on_the_tree),
+        cmocka_unit_test(rays_may_look_behind_their_start),
         cmocka_unit_test(closed_meshes_do_not_leak),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
