@@ -67,19 +67,19 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
 // One warning for each texture of the material: meshes get theirs from the scene.
 static void warn_of_textures(const Importer *importer, const struct aiMaterial *material, const char *name)
 {
-    char previous[MAXLEN] = "";
+    struct aiString previous = {0};
     for (int type = aiTextureType_DIFFUSE; type <= AI_TEXTURE_TYPE_MAX; type++) {
         struct aiString path = {0};
         if (aiGetMaterialTextureCount(material, (enum aiTextureType)type) == 0) continue;
         aiGetMaterialTexture(material, (enum aiTextureType)type, 0, &path, NULL, NULL, NULL, NULL, NULL,
                              NULL);
         // assimp lists a glTF base color under two types
-        if (strcmp(path.data, previous) == 0) continue;
+        if (strcmp(path.data, previous.data) == 0) continue;
         draft_warn(
             importer->draft,
             "the texture '%.100s' of material '%.40s' is not used: give the mesh a material with an image",
             path.data, name);
-        memcpy(previous, path.data, sizeof previous);
+        previous = path;
     }
 }
 
