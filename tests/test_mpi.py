@@ -16,8 +16,9 @@ from pathlib import Path
 from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, shim_build, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
-MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
-              "HWLOC_COMPONENTS": "-gl"}  # else an X server that ends takes mpirun with it
+MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
+              # more ranks than processors, in Open MPI 4 and in 5
+              "OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
 BUILD = os.environ.get("BUILD", "build")
 RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
@@ -142,7 +143,7 @@ class Mpi(TestCase):
         self.assertRegex(self.mpirun(f"-n 2 {RANKS} {RENDER} --sizes 3", 1).stderr, "unrecognized option")
         self.assertRegex(self.mpirun(f"-n 2 {RANKS} render none.yaml", 1).stderr, "none.yaml")
         self.assertRegex(self.mpirun(f"-n 2 {RANKS} {RENDER} -o /nowhere/image.png", 1).stderr, "cannot create '/nowhere/image.png'")
-        process = self.mpirun(f"-n 1 {RANKS} {RENDER} : -n 1 -x OCL_ICD_VENDORS=/none {RANKS} {RENDER}", 1)
+        process = self.mpirun(f"-n 1 {RANKS} {RENDER} : -n 1 env OCL_ICD_VENDORS=/none {RANKS} {RENDER}", 1)
         self.assertRegex(process.stderr, "rank 1 on .*: no OpenCL device")
 
     def faults_build(self):
@@ -191,7 +192,7 @@ class Mpi(TestCase):
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
-        ranks = [f"-n 1 -x LD_PRELOAD=./faults.so {slow} {RANKS} {command} -o frames" for slow in ("-x FAULT_USEC=200000", "")]
+        ranks = [f"-n 1 env LD_PRELOAD=./faults.so {slow} {RANKS} {command} -o frames" for slow in ("FAULT_USEC=200000", "")]
         for first, second in ranks, reversed(ranks):
             process = self.mpirun(f"{first} : {second}")
             self.assertRegex(process.stderr, "warning: the other devices go on without one: clEnqueueNDRangeKernel")
@@ -206,7 +207,7 @@ class Mpi(TestCase):
         command = self.write_frames({"large": SPHERE + 4000 * SPHERE.splitlines(keepends=True)[-1]}.items())
         os.remove("expected/large.png")
         os.mkdir("frames")
-        small = f"-x LD_PRELOAD=./faults.so -x FAULT_USEC=0 -x FAULT_MEMORY=131072 {RANKS} {command} -o frames"
+        small = f"env LD_PRELOAD=./faults.so FAULT_USEC=0 FAULT_MEMORY=131072 {RANKS} {command} -o frames"
         process = self.mpirun(f"-n 2 {small}", 1)
         self.assertRegex(process.stderr, "the scene needs .* on the device")
         self.check_frames()
@@ -216,7 +217,7 @@ class Mpi(TestCase):
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
-        interrupted = f"-x LD_PRELOAD=./faults.so -x FAULT_USEC=0 -x FAULT_INTERRUPTS=1 {RANKS} {command} -o frames"
+        interrupted = f"env LD_PRELOAD=./faults.so FAULT_USEC=0 FAULT_INTERRUPTS=1 {RANKS} {command} -o frames"
         process = self.mpirun(f"-n 1 {interrupted} : -n 1 {RANKS} {command} -o frames", 130)
         self.assertRegex(process.stderr, "glint: interrupted: no image was written; an earlier frames/")
         self.assertEqual([name for name in os.listdir("frames") if not name.endswith(".png")], [])
@@ -225,7 +226,7 @@ class Mpi(TestCase):
         """Each rank is faulty as its variables say."""
         parts = []
         for fault in faults:
-            shim = f"-x LD_PRELOAD=./faults.so {' '.join(f'-x {name}={value}' for name, value in fault.items())}"
+            shim = f"env LD_PRELOAD=./faults.so {' '.join(f'{name}={value}' for name, value in fault.items())}"
             parts.append(f"-n 1 {shim} {RANKS} {RENDER} -o ranks.npy")
         process = self.mpirun(" : ".join(parts), status)
         if status == 0:

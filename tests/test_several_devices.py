@@ -136,7 +136,7 @@ class SeveralDevices(TestCase):
         self.assertEqual(process.stderr.count("% of the rows in "), 2, process.stderr)
 
     def test_wrong_lists(self):
-        for devices, pattern in (("0,0", "device 0 .* is listed twice"), ("pthread,0", "device 0 .* is listed twice"),
+        for devices, pattern in (("0,0", "device 0 .* is listed twice"), ("portable,0", "device 0 .* is listed twice"),
                                  ("0,2", 'no usable device matches "2"'), ("0,", 'no usable device matches ""')):
             self.refuses(f"render sphere.yaml {SIZE} --device {devices}", pattern, **TWO)
 
