@@ -1,41 +1,42 @@
-# make [BUILD=folder] [CFLAGS=…]: the user owns CFLAGS, and a variant is another BUILD folder. One whose name ends in
-# -sanitize is built with ASan and UBSan, at -O1, which takes two thirds of the time. A newer compiler's warnings:
-# CFLAGS='-O2 -Wno-error'.
+# make [BUILD=folder] [WERROR=1]: CC, CPPFLAGS, CFLAGS, LDFLAGS and PKG_CONFIG belong to the user, and a variant is another
+# BUILD folder. One whose name ends in -sanitize is built with ASan and UBSan, at -O1, which takes two thirds of the time.
 VERSION := 0.1.0
 MAKEFLAGS += --no-builtin-rules
 
 BUILD  ?= build
 CFLAGS ?= $(if $(filter %-sanitize,$(BUILD)),-O1,-O2) -g
-PREFIX ?= /usr/local
+PKG_CONFIG ?= pkg-config
 
 packages := libfyaml libpng libturbojpeg OpenEXR assimp libsodium OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
-ifneq ($(shell pkg-config --exists $(packages) && echo found),found)
+ifneq ($(shell $(PKG_CONFIG) --exists $(packages) && echo found),found)
 $(error Libraries are missing; tools/setup installs or lists them)
 endif
 endif
 
 # Of the window; without them glint is built without one.
 window_packages := sdl2 SDL2_ttf fontconfig
-has_window      := $(shell pkg-config --exists $(window_packages) && echo 1)
-window_flags    := $(if $(has_window),$(shell pkg-config --cflags $(window_packages)))
+has_window      := $(shell $(PKG_CONFIG) --exists $(window_packages) && echo 1)
+window_flags    := $(if $(has_window),$(shell $(PKG_CONFIG) --cflags $(window_packages)))
 
 ifneq ($(filter %-sanitize,$(BUILD)),)
 sanitize := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
-OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Werror \
-            $(patsubst -I%,-isystem %,$(shell pkg-config --cflags $(packages)) $(window_flags)) \
-            -DHAS_WINDOW=$(or $(has_window),0) $(sanitize)
+# The same bits wherever the source and BUILD are.
+reproducible := -ffile-prefix-map=$(CURDIR)=. -ffile-prefix-map=$(BUILD)/=build/
+OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes $(if $(filter 1,$(WERROR)),-Werror) \
+            $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
+            -DHAS_WINDOW=$(or $(has_window),0) $(sanitize) $(reproducible)
 # Of OpenEXR only the library with the C interface.
-LIBS     := $(shell pkg-config --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
-            $(shell pkg-config --libs-only-L OpenEXR) \
-            $(filter -lOpenEXRCore%,$(shell pkg-config --libs-only-l OpenEXR)) \
+LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
+            $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
+            $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail
 # In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
 GLINT_COMMIT  := $(or $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null)),unknown)
-version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_COMMIT)"' '-DGLINT_FLAGS="$(CFLAGS)"'
+version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_COMMIT)"'
 
 # KERNELS=folder: its files stand in for those of the same name in kernels/: the textbook's formulas, to measure beside
 # (tools/numerics/textbook), never to ship.
@@ -62,10 +63,10 @@ $(BUILD)/glint: $(objects) | $(if $(has_window),$(BUILD)/glint-view)
 
 # What glint view starts.
 $(BUILD)/glint-view: $(filter-out %/view_start.o,$(objects)) $(window_objects)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell pkg-config --libs $(window_packages)) -o $@
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs $(window_packages)) -o $@
 
 # glint render on the devices of an MPI job; needs libopenmpi-dev.
-mpi_flags := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags ompi-c 2>/dev/null))
+mpi_flags := $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags ompi-c 2>/dev/null))
 
 mpi: $(BUILD)/glint-mpi
 
@@ -73,7 +74,7 @@ mpi_objects := $(patsubst %.c,$(BUILD)/%.o,$(wildcard host/mpi/*.c))
 $(mpi_objects): OURS += $(mpi_flags)
 
 $(BUILD)/glint-mpi: $(mpi_objects) $(library)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell pkg-config --libs ompi-c) -o $@
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs ompi-c) -o $@
 
 $(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)
@@ -84,14 +85,14 @@ $(BUILD)/page_files.c: $(pages) host/cli/page tools/embed
 	tools/embed page_files $(pages) > $@
 
 $(BUILD)/%_files.o: $(BUILD)/%_files.c $(BUILD)/flags
-	$(CC) $(OURS) -Wno-overlength-strings $(CFLAGS) -c $< -o $@
+	$(CC) $(OURS) -Wno-overlength-strings $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
 $(BUILD)/host/cli/version.o: OURS += $(version_flags)
 $(BUILD)/host/cli/version.o: $(BUILD)/version
 
 $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(OURS) $(CFLAGS) -MMD -MP -c $< -o $@
+	$(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
 
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ -lcmocka $(LIBS) -o $@
@@ -126,7 +127,7 @@ fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/imp
 fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
 
 fuzz:
-	+$(MAKE) BUILD=$(BUILD)-fuzz CC='$(CLANG)' CFLAGS='-O2 -g -Wno-error' \
+	+$(MAKE) BUILD=$(BUILD)-fuzz CC='$(CLANG)' CFLAGS='-O2 -g' \
 	    sanitize='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all -D__SANITIZE_ADDRESS__' $(BUILD)-fuzz/fuzz
 
 # What guides it is the readers' coverage: messages and texts would take half of the time.
@@ -147,7 +148,7 @@ $(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 # These two change only when what they hold does, and what depends on it is then built anew.
-$(BUILD)/flags: text := $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
+$(BUILD)/flags: text := $(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
 $(BUILD)/version: text := $(GLINT_VERSION) $(GLINT_COMMIT)
 $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)

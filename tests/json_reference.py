@@ -203,7 +203,6 @@ MEANINGS = {
     "build": "object; of glint",
     "build.commit": "text; `unknown` outside of a clone",
     "build.compiler": "text",
-    "build.flags": "text; CFLAGS",
     "device.peak.stable": "boolean; each rate was reached three times within 3 %",
     "calibration_ms": "number; a fixed kernel before each round",
     "scene_hash": "hash; of the contents of the scene's files; rows of reports match by it",

@@ -177,7 +177,7 @@ static void test_baseline(void **state)
     (void)state;
     size_t errors;
     Baseline *baseline =
-        baseline_of("{\"schema\": 4, \"device\": {\"name\": \"d\"}, \"host\": {\"name\": \"h\"}, "
+        baseline_of("{\"schema\": 5, \"device\": {\"name\": \"d\"}, \"host\": {\"name\": \"h\"}, "
                     "\"calibration_ms\": [1, 1.5], \"runs\": [" BASELINE_ROW(
                         "0000000000000000", "[1, 1]") "," BASELINE_ROW(ROW_HASH, "[90, 91.5]") "]}",
                     &errors);
@@ -212,22 +212,22 @@ static void test_broken_baselines(void **state)
     const char *refused[] = {"",
                              "no json: [",
                              "[1, 2]",
-                             "{\"schema\": 3, \"runs\": []}",
+                             "{\"schema\": 4, \"runs\": []}",
                              "{\"runs\": []}",
                              "\"",
-                             "{\"schema\": 4}",
-                             "{\"schema\": 4, \"runs\": 3}"};
+                             "{\"schema\": 5}",
+                             "{\"schema\": 5, \"runs\": 3}"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         size_t errors;
         assert_null(baseline_of(refused[i], &errors));
         assert_int_equal(errors, 1);
     }
     // rows that say nothing are never found
-    const char *empty[] = {"{\"schema\": 4, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
-                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "{}") "]}",
-                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "[]") "]}",
-                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 0]") "]}",
-                           "{\"schema\": 4, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
+    const char *empty[] = {"{\"schema\": 5, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
+                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "{}") "]}",
+                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[]") "]}",
+                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 0]") "]}",
+                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
     for (size_t i = 0; i < sizeof empty / sizeof *empty; i++) {
         size_t errors;
         ReportTimes times;

@@ -51,7 +51,7 @@ class Bench(TestCase):
         process = self.glint(f"bench sphere.yaml {TRIANGLES} {QUICK} --precision single,double --launches --json")
         self.assertEqual(process.stderr, "")
         report = json.loads(process.stdout)
-        self.assertEqual(report["schema"], 4)
+        self.assertEqual(report["schema"], 5)
         self.assertRegex(report["date"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
         self.assertTrue(report["host"]["name"] and report["build"]["compiler"])
         self.assertRegex(report["build"]["commit"], "^([0-9a-f]{40}(-dirty)?|unknown)$")

@@ -240,7 +240,6 @@ void report_start_json(Json *json)
     json_begin_object(json, "build");
     json_text(json, "commit", glint_commit());
     json_text(json, "compiler", glint_compiler());
-    json_text(json, "flags", glint_flags());
     json_end(json);
 }
 

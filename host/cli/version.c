@@ -18,8 +18,3 @@ const char *glint_compiler(void)
     return "gcc " __VERSION__;
 #endif
 }
-
-const char *glint_flags(void)
-{
-    return GLINT_FLAGS;
-}

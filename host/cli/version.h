@@ -5,6 +5,5 @@
 const char *glint_version(void);
 // The commit's hash, with "-dirty" where files differed from it; "unknown" outside of a clone.
 const char *glint_commit(void);
-// The compiler with its version, and CFLAGS.
+// The compiler with its version.
 const char *glint_compiler(void);
-const char *glint_flags(void);

@@ -7,7 +7,7 @@
 
 typedef struct Baseline Baseline;
 
-enum { BENCH_SCHEMA = 4 }; // of the reports
+enum { BENCH_SCHEMA = 5 }; // of the reports
 
 // Reads a file that glint bench --json wrote; NULL with a message where it is none.
 Baseline *baseline_open(const char *path, MessageList *messages);
