@@ -1,6 +1,6 @@
 #!/bin/bash
-# The keys of the window are those of docs/view.md. The options of each command are the same in its --help and in the manual page, which
-# tools/man-options writes. Completion offers what --help lists.
+# The keys of the window are those of docs/view.md. The options of each command are the same in its --help and in the manual pages, which
+# tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 GLINT=${GLINT:-build/glint}
@@ -19,12 +19,13 @@ for subcommand in $subcommands; do
     esac
 done
 
-page=$(mktemp)
-trap 'rm -f "$page"' EXIT
-cp docs/glint.1 "$page"
-tools/man-options "$GLINT" "$page"
-for subcommand in $subcommands; do grep -q "options $subcommand\$" "$page" || { echo "docs/glint.1 has no options of $subcommand"; failed=1; }; done
-diff docs/glint.1 "$page" || failed=1
+pages=$(mktemp -d)
+trap 'rm -rf "$pages"' EXIT
+cp docs/glint*.1 "$pages"
+tools/man-options "$GLINT" "$pages"/*
+for subcommand in $subcommands; do grep -q "options $subcommand\$" "$pages"/* || { echo "no manual page has options of $subcommand"; failed=1; }; done
+tools/man-scene docs/scene-format.md >"$pages/glint-scene.5"
+for page in "$pages"/*; do diff "docs/${page##*/}" "$page" || failed=1; done
 
 # What mouse and keys do in the window.
 keys=$("$GLINT" view --help | sed -n '3,/^$/s/^  \(.*[^ ]\)   *\([^ ].*\)$/| \1 | \2 |/p' | sed 's/ * |/ |/')
