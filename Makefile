@@ -1,6 +1,6 @@
 # make [BUILD=folder] [WERROR=1]: CC, CPPFLAGS, CFLAGS, LDFLAGS and PKG_CONFIG belong to the user, and a variant is another
 # BUILD folder. One whose name ends in -sanitize is built with ASan and UBSan, at -O1, which takes two thirds of the time.
-VERSION := 0.1.0
+VERSION := 0.2.0
 MAKEFLAGS += --no-builtin-rules
 
 BUILD  ?= build
