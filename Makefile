@@ -32,11 +32,12 @@ LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml libpng libturbojpeg assimp lib
             $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail
-# In a clone what git says, such as 0.1.0-3-g5d2aaa6; elsewhere, or without tags, VERSION.
+# In a clone what git says, such as 0.2.0-3-g5d2aaa6; elsewhere, or without tags, VERSION. An archive by git has its commit in
+# version.c.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
-GLINT_COMMIT  := $(or $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null)),unknown)
-version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' '-DGLINT_COMMIT="$(GLINT_COMMIT)"'
+GLINT_COMMIT  := $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null))
+version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' $(if $(GLINT_COMMIT),'-DGLINT_COMMIT="$(GLINT_COMMIT)"')
 
 # KERNELS=folder: its files stand in for those of the same name in kernels/: the textbook's formulas, to measure beside
 # (tools/numerics/textbook), never to ship.
@@ -228,7 +229,7 @@ lint-cppcheck:
 	    -j $(LINT_JOBS) -I. -D_GNU_SOURCE $(version_flags) $(linted)
 
 lint-man:
-	@! groff -man -ww -z -Tutf8 docs/glint.1 2>&1 | grep .
+	@! groff -man -ww -z -Tutf8 $(man_pages) 2>&1 | grep .
 
 # The measured parts of the documents; the machine should have nothing else to do.
 accuracy_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
@@ -246,29 +247,44 @@ docs-measurements: $(BUILD)/glint
 	cp $(measured:%=$(BUILD)/%.json) docs/measurements
 	tools/report docs/accuracy.md docs/performance.md docs/verify.md
 
-data := $(DESTDIR)$(PREFIX)/share
+# make install [DESTDIR=…] [PREFIX=…] and what else stands here. Debian has ZSHDIR=/usr/share/zsh/vendor-completions.
+PREFIX  ?= /usr/local
+BINDIR  ?= $(PREFIX)/bin
+DATADIR ?= $(PREFIX)/share
+MANDIR  ?= $(DATADIR)/man
+DOCDIR  ?= $(DATADIR)/doc/glint
+BASHDIR ?= $(DATADIR)/bash-completion/completions
+ZSHDIR  ?= $(DATADIR)/zsh/site-functions
+FISHDIR ?= $(DATADIR)/fish/vendor_completions.d
+
+man_pages := $(wildcard docs/glint*.[15])
+# Source:target of the files that the programs $1 come with.
+installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(program).1) \
+    docs/glint-scene.5:$(MANDIR)/man5/glint-scene.5 \
+    tools/completions/glint.bash:$(BASHDIR)/glint \
+    tools/completions/glint.zsh:$(ZSHDIR)/_glint \
+    tools/completions/glint.fish:$(FISHDIR)/glint.fish \
+    $(foreach file,$(wildcard scenes/*.* scenes/*/*),$(file):$(DATADIR)/glint/$(file)) \
+    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE $(wildcard docs/*.md docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
+    $(if $(filter glint-view,$1),$(BUILD)/glint-view.desktop:$(DATADIR)/applications/glint-view.desktop \
+        tools/desktop/glint-view.svg:$(DATADIR)/icons/hicolor/scalable/apps/glint-view.svg \
+        tools/desktop/glint-view.metainfo.xml:$(DATADIR)/metainfo/alt.glint.glint_view.metainfo.xml)
+programs := glint $(if $(has_window),glint-view) $(if $(wildcard $(BUILD)/glint-mpi),glint-mpi)
 
 install: all
-	install -D $(BUILD)/glint $(DESTDIR)$(PREFIX)/bin/glint
-	for program in glint-view glint-mpi; do \
-	    if [ -e $(BUILD)/$$program ]; then install $(BUILD)/$$program $(DESTDIR)$(PREFIX)/bin/$$program; fi; \
+	sed 's|@DATADIR@|$(DATADIR)|' tools/desktop/glint-view.desktop > $(BUILD)/glint-view.desktop
+	for program in $(programs); do install -D $(BUILD)/$$program $(DESTDIR)$(BINDIR)/$$program || exit; done
+	for pair in $(call installed_files,$(programs)); do \
+	    install -D -m 644 $${pair%%:*} $(DESTDIR)$${pair#*:} || exit; \
 	done
-	install -D -m 644 docs/glint.1 $(data)/man/man1/glint.1
-	install -D -m 644 tools/completions/glint.bash $(data)/bash-completion/completions/glint
-	install -D -m 644 tools/completions/glint.zsh $(data)/zsh/site-functions/_glint
-	install -D -m 644 tools/completions/glint.fish $(data)/fish/vendor_completions.d/glint.fish
-	install -d $(data)/glint/scenes/meshes $(data)/glint/scenes/images
-	install -m 644 scenes/*.* $(data)/glint/scenes
-	install -m 644 scenes/meshes/* $(data)/glint/scenes/meshes
-	install -m 644 scenes/images/* $(data)/glint/scenes/images
-	install -d $(data)/doc/glint/docs
-	install -m 644 README.md SECURITY.md LICENSE $(data)/doc/glint
-	install -m 644 docs/*.md docs/*.png docs/*.gif docs/*.svg $(data)/doc/glint/docs
 
+# Leaves what others put there, and folders that are not glint's alone.
+uninstall: every := glint glint-view glint-mpi
 uninstall:
-	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,glint glint-view glint-mpi) $(data)/man/man1/glint.1 $(data)/bash-completion/completions/glint \
-	    $(data)/zsh/site-functions/_glint $(data)/fish/vendor_completions.d/glint.fish
-	rm -rf $(data)/glint $(data)/doc/glint
+	rm -f $(every:%=$(DESTDIR)$(BINDIR)/%) $(foreach pair,$(call installed_files,$(every)),$(DESTDIR)$(lastword $(subst :, ,$(pair))))
+	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) $(addprefix $(DESTDIR)$(DOCDIR),/docs /); do \
+	    [ ! -d $$folder ] || rmdir --ignore-fail-on-non-empty $$folder || exit; \
+	done
 
 clean:
 	rm -rf $(BUILD)

@@ -201,7 +201,7 @@ MEANINGS = {
     "host.{name,system,release,machine}": "text; from uname",
     "host.processors": "count; online",
     "build": "object; of glint",
-    "build.commit": "text; `unknown` outside of a clone",
+    "build.commit": "text; `unknown` outside of clones and archives of git",
     "build.compiler": "text",
     "device.peak.stable": "boolean; each rate was reached three times within 3 %",
     "calibration_ms": "number; a fixed kernel before each round",

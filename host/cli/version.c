@@ -7,7 +7,13 @@ const char *glint_version(void)
 
 const char *glint_commit(void)
 {
+#ifdef GLINT_COMMIT
     return GLINT_COMMIT;
+#else
+    // git archive puts the hash here
+    static const char commit[] = "$Format:%H$";
+    return commit[0] == '$' ? "unknown" : commit;
+#endif
 }
 
 const char *glint_compiler(void)
