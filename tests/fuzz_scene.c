@@ -105,7 +105,7 @@ static void edit_remove(Text *text)
 
 static void edit_random_bytes(Text *text)
 {
-    char bytes[16];
+    char bytes[16] = {0};
     size_t length = random_below(sizeof bytes + 1);
     for (size_t i = 0; i < length; i++)
         bytes[i] = (char)random_below(256);

@@ -365,9 +365,7 @@ static void faults_have_their_place(void **state)
         file_write("a.obj", cases[i].obj);
         assert_false(scene_read(&scene, SCENE_OF(""), cases[i].expected));
     }
-    FILE *file = fopen("a.obj", "wb");
-    assert_int_equal(fwrite("v 0\0", 1, 4, file), 4);
-    fclose(file);
+    file_write_bytes("a.obj", "v 0\0", 4);
     Scene scene;
     assert_false(scene_read(&scene, SCENE_OF(""), "a.obj:1:4: error: not text: a NUL character\n"));
     Text text = {0};

@@ -1,6 +1,7 @@
 // Textures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
 #include "host/image/image.h"
+#include "tests/files.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
@@ -414,9 +415,7 @@ static void texture_faults_are_reported(void **state)
     assert_int_equal(symlink("/dev/null", texture_path), 0);
     check_refused("not a regular file");
     unlink(texture_path);
-    FILE *file = fopen(texture_path, "w");
-    fputs("not a texture", file);
-    fclose(file);
+    file_write(texture_path, "not a texture");
     check_refused("neither PNG, JPEG, PPM, EXR nor NPY");
     TestTexture texture = texture_make(3, 2);
     texture.colors[4][1] = NAN;

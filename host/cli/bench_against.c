@@ -71,7 +71,7 @@ static int worker_close(Worker *worker)
     }
     if (worker->errors) {
         char line[512];
-        rewind(worker->errors);
+        fseek(worker->errors, 0, SEEK_SET);
         while (status != EXIT_DONE && !progress_interrupted() && fgets(line, sizeof line, worker->errors))
             fputs(line, stderr);
         fclose(worker->errors);

@@ -25,10 +25,11 @@ bool jpeg_decode(Image *image, const ImageFile *file)
         else if (tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
                                TJFLAG_ACCURATEDCT) != 0)
             image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
-        else
+        else {
+            for (size_t i = 0; i < count; i++)
+                image->values[i] = (float)bytes[i] / 255.0F;
             done = true;
-        for (size_t i = 0; done && i < count; i++)
-            image->values[i] = (float)bytes[i] / 255.0F;
+        }
     }
     image->display = true;
     image->transfer = TRANSFER_SRGB;

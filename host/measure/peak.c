@@ -12,12 +12,10 @@ static const double stable_ratio = 1.03;
 
 enum { FLOPS_OF_ROUND = 2 * 8 }; // of one lane: an fma in each of eight chains
 enum { COPY_BYTES_MAX = 128 << 20, COPY_BYTES_OF_ITEM = 16 };
-enum { WINDOWS_NEEDED = sizeof((PeakWindows){0}.best) / sizeof(double) };
-
 void peak_windows_add(PeakWindows *windows, double rate)
 {
     windows->count++;
-    for (size_t i = 0; i < WINDOWS_NEEDED; i++)
+    for (size_t i = 0; i < PEAK_WINDOWS_NEEDED; i++)
         if (rate > windows->best[i]) {
             double lower = windows->best[i];
             windows->best[i] = rate;
@@ -27,8 +25,8 @@ void peak_windows_add(PeakWindows *windows, double rate)
 
 bool peak_windows_stable(const PeakWindows *windows)
 {
-    return windows->count >= WINDOWS_NEEDED &&
-           windows->best[0] <= stable_ratio * windows->best[WINDOWS_NEEDED - 1];
+    return windows->count >= PEAK_WINDOWS_NEEDED &&
+           windows->best[0] <= stable_ratio * windows->best[PEAK_WINDOWS_NEEDED - 1];
 }
 
 // The rate of one launch.

@@ -16,9 +16,11 @@ typedef struct {
 // kernels. `with_double`: also of double, which the device must have.
 void peak_measure(Peak *peak, Compute *compute, bool with_double, double seconds);
 
+enum { PEAK_WINDOWS_NEEDED = 3 };
+
 // The best rates of the windows of a measurement; zeroed: none yet.
 typedef struct {
-    double best[3]; // descending
+    double best[PEAK_WINDOWS_NEEDED]; // descending
     size_t count;
 } PeakWindows;
 

@@ -236,7 +236,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
         fprintf(stderr, "usage: mpirun -n RANKS glint-mpi render SCENE... [OPTIONS]\n"
                         "The options are those of glint render; each rank renders on a device of its own.\n");
     } else {
-        char name[] = "glint-mpi render"; // which getopt's messages begin with
+        static char name[] = "glint-mpi render"; // which getopt's messages begin with
         arguments[1] = name;
         RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
         if (command) {

@@ -34,7 +34,7 @@ void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, 
 static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,
                                  const Field *fields, size_t field_count)
 {
-    const char *known[FIELDS_MAX];
+    const char *known[FIELDS_MAX] = {NULL};
     for (size_t i = 0; i < field_count; i++)
         known[i] = fields[i].name;
     char kind[64];

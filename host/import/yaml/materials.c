@@ -118,7 +118,7 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node)
 
 static void unknown_material_report(YamlReader *reader, const YamlNode *node)
 {
-    const char *known[NAMES_COMPARED];
+    const char *known[NAMES_COMPARED] = {NULL};
     size_t known_count = 0;
     for (; known_count < NAMES_COMPARED && known_count < reader->names.count; known_count++)
         known[known_count] = reader->names.items[known_count].name;
