@@ -122,6 +122,9 @@ void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const siz
 // either. NULL: the runtime's choice, nothing rounded.
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
                          const size_t *group);
+// Launches as kernel_launch does, with global ids that begin at `first`; NULL: at 0.
+LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
+                              const size_t *items, const size_t *group);
 // Waits for the event of `command`, the OpenCL function that enqueued it, reads and releases it; `host_start`
 // is clock_seconds() before the enqueue. Zeros: failed.
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start);

@@ -91,6 +91,12 @@ static void work_group_fit_kernel(const Device *device, cl_kernel kernel, cl_uin
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
                          const size_t *group)
 {
+    return kernel_launch_from(compute, kernel, dimensions, NULL, items, group);
+}
+
+LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
+                              const size_t *items, const size_t *group)
+{
     if (!compute_check(compute, compute->unmap_failure.status, compute->unmap_failure.call))
         return (LaunchTime){0};
     size_t global[3], local[3];
@@ -101,7 +107,7 @@ LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions,
         global[i] = (items[i] + local[i] - 1) / local[i] * local[i];
     double host_start = clock_seconds();
     cl_event event;
-    if (!compute_try(compute, clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, NULL, global,
+    if (!compute_try(compute, clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, first, global,
                                                      group ? local : NULL, 0, NULL, &event)))
         return (LaunchTime){0};
     return event_time(compute, event, "clEnqueueNDRangeKernel", host_start);

@@ -1,5 +1,7 @@
 #include "host/render/band.h"
 
+enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the last group to end would idle the other compute units
+
 // The pixels of a work-item: a macro-tile.
 static TileShape item_shape(uint32_t lanes)
 {
@@ -93,6 +95,7 @@ Place band_place(const Renderer *renderer, BandRows rows)
     return (Place){
         .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
                   settings->region_width, rows.row_count}},
+        .item = item,
         .items = {divide_up(settings->region_width, item.width), divide_up(rows.row_count, item.height)},
         .group = {side, side}};
 }
@@ -101,8 +104,81 @@ Place list_place(const Renderer *renderer, uint32_t count)
 {
     const uint32_t of_item = renderer->report.lanes * renderer->report.lanes;
     size_t side = group_side(renderer);
-    return (Place){
-        .band = {{0, 0, count, 1}}, .items = {divide_up(count, of_item), 1}, .group = {side * side, 1}};
+    return (Place){.band = {{0, 0, count, 1}},
+                   .item = {of_item, 1},
+                   .items = {divide_up(count, of_item), 1},
+                   .group = {side * side, 1}};
+}
+
+static size_t least(size_t a, size_t b)
+{
+    return a < b ? a : b;
+}
+
+// Of `left` groups, at most `most`. The last two parts are about equal, since a small launch would slow the
+// growth of the next ones.
+static size_t groups_of_part(size_t most, size_t left)
+{
+    return left <= most ? left : left < 2 * most ? (left + 1) / 2 : most;
+}
+
+bool place_next(Place *part, const Place *whole, uint64_t pixels_max)
+{
+    const size_t *group = whole->group, *items = whole->items;
+    size_t column = part->first[0] + part->items[0], row = part->first[1];
+    if (column >= items[0]) {
+        column = 0;
+        row += part->items[1];
+    }
+    if (row >= items[1]) return false;
+    *part = *whole;
+    // groups at the edges reach beyond the film
+    if (row == 0 && column == 0 && place_pixels(whole) <= pixels_max) return true;
+    const size_t group_pixels = group[0] * group[1] * whole->item.width * whole->item.height;
+    const size_t most = pixels_max > group_pixels ? (size_t)(pixels_max / group_pixels) : 1;
+    const size_t row_groups = (items[0] + group[0] - 1) / group[0];
+    const size_t groups_right = (items[0] - column + group[0] - 1) / group[0];
+    const size_t rows_below = (items[1] - row + group[1] - 1) / group[1];
+    const bool has_whole_rows = column == 0 && most >= row_groups;
+    const size_t columns = has_whole_rows ? row_groups : groups_of_part(most, groups_right);
+    const size_t rows = has_whole_rows ? groups_of_part(most / row_groups, rows_below) : 1;
+    part->first[0] = column;
+    part->first[1] = row;
+    part->items[0] = least(columns * group[0], items[0] - column);
+    part->items[1] = least(rows * group[1], items[1] - row);
+    return true;
+}
+
+uint64_t place_pixels(const Place *place)
+{
+    const uint64_t left = place->first[0] * place->item.width, top = place->first[1] * place->item.height;
+    const uint64_t width = least(place->items[0] * place->item.width, place->band.s[2] - left);
+    return width * least(place->items[1] * place->item.height, place->band.s[3] - top);
+}
+
+Pace *renderer_pace(Renderer *renderer, KernelKind kind)
+{
+    const RenderSettings *settings = &renderer->settings;
+    const TileShape group = group_shape(renderer);
+    Pace *pace = &renderer->paces[kind];
+    pace->target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1;
+    pace->samples_min =
+        (double)GROUPS_OF_UNIT_MIN * renderer->compute->device->compute_units * group.width * group.height;
+    return pace;
+}
+
+// Launches the kernel over the place, part by part; `samples` per pixel.
+static bool place_launch(Renderer *renderer, KernelKind kind, const Place *place, uint32_t samples)
+{
+    Pace *pace = renderer_pace(renderer, kind);
+    bool (*stop)(void) = renderer->settings.stop;
+    Place part = {0};
+    while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
+        const double seconds = renderer_launch(renderer, kind, 2, part.first, part.items, part.group);
+        pace_note_launch(pace, place_pixels(&part) * samples, seconds);
+        if (!compute_ok(renderer->compute) || (stop && stop())) return false;
+    }
+    return true;
 }
 
 static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
@@ -119,8 +195,8 @@ static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
         renderer->report.rays[i] += counts[i];
 }
 
-double band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
-                   uint32_t last)
+bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
+                 uint32_t last)
 {
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &renderer->offsets);
@@ -135,12 +211,12 @@ double band_render(Renderer *renderer, const BandBuffers *buffers, const Place *
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 8, sizeof(cl_mem), &buffers->doubts);
     kernel_argument(renderer->compute, kernel, FLAT_COUNT + 9, sizeof(cl_mem), &buffers->pixels);
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
-    LaunchTime time = renderer_launch(renderer, KERNEL_RENDER, 2, place->items, place->group);
+    const bool go_on = place_launch(renderer, KERNEL_RENDER, place, last - first);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);
-    return time.trusted ? time.event_seconds : time.host_seconds;
+    return go_on;
 }
 
-void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
+bool band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
                unsigned aovs, const Place *place)
 {
     cl_kernel kernel = renderer_kernel(renderer, kind);
@@ -154,5 +230,6 @@ void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandB
         kernel_argument(renderer->compute, kernel, argument++, sizeof shadow_count, &shadow_count);
     kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->center_doubts);
     kernel_argument(renderer->compute, kernel, argument, sizeof(cl_mem), &buffers->pixels);
-    renderer_launch(renderer, kind, 2, place->items, place->group);
+    pace_begin_band(renderer_pace(renderer, kind));
+    return place_launch(renderer, kind, place, 1);
 }

@@ -18,23 +18,29 @@ typedef struct {
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film);
 void band_buffers_close(BandBuffers *buffers);
 
-// The pixels that a launch renders.
-typedef struct {
-    cl_uint4 band; // x, y, width, height; of a list its length and 1
-    size_t items[2], group[2];
-} Place;
-
-Place band_place(const Renderer *renderer, BandRows rows);
-// The tiles of a film's work-items.
-size_t film_tile_count(const Renderer *renderer, const Film *film);
-// The first `count` pixels of a list.
-Place list_place(const Renderer *renderer, uint32_t count);
-
 // The pixels of a work-item or of a work-group.
 typedef struct {
     uint32_t width, height;
 } TileShape;
 TileShape group_shape(const Renderer *renderer);
+
+// The pixels that a launch renders.
+typedef struct {
+    cl_uint4 band; // x, y, width, height; of a list its length and 1
+    TileShape item;
+    size_t first[2], items[2], group[2];
+} Place;
+
+Place band_place(const Renderer *renderer, BandRows rows);
+// Steps through a place in parts of whole work-groups: rows of them, or a part of one row. Each part has at
+// most `pixels_max` pixels, or one group. `part` is a Place of zeros before the first step; returns false
+// after the last part.
+bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
+uint64_t place_pixels(const Place *place);
+// The tiles of a film's work-items.
+size_t film_tile_count(const Renderer *renderer, const Film *film);
+// The first `count` pixels of a list.
+Place list_place(const Renderer *renderer, uint32_t count);
 
 // The film of these rows, without its layers.
 Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count);
@@ -50,10 +56,12 @@ static inline uint32_t settings_cell(const RenderSettings *settings)
     return settings->cell > 0 ? settings->cell : 1;
 }
 
-// One launch for samples first..last-1. Returns its seconds: the event's if trusted, else the host's.
-double band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
-                   uint32_t last);
+// Renders samples first..last-1 of the place, in launches of the kernel's pace. Returns false if the device
+// failed or settings.stop ended it.
+bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
+                 uint32_t last);
 
-// Launches a kernel that fills its layers, whose buffers follow the band in its arguments.
-void band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
+// Launches a kernel that fills its layers, whose buffers follow the band in its arguments. Paced and stopped
+// as band_render.
+bool band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
                unsigned aovs, const Place *place);

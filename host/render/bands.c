@@ -10,10 +10,7 @@
 
 static const double PASS_SECONDS = 0.1; // of renderer_accumulate, about
 
-enum {
-    BAND_BYTES_MAX = 4 << 20, // color and shadow, the one layer that grows with the lights
-    GROUPS_OF_UNIT_MIN = 4
-};
+enum { BAND_BYTES_MAX = 4 << 20 }; // color and shadow, the one layer that grows with the lights
 
 FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
 {
@@ -73,12 +70,12 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
     return go_on;
 }
 
-// Enough rows for several groups per compute unit: with fewer, the last group to end would idle the others.
-static uint32_t rows_min(const Renderer *renderer)
+// Enough rows to keep the device busy.
+static uint32_t rows_min(const Renderer *renderer, const Pace *pace)
 {
     const TileShape group = group_shape(renderer);
-    uint32_t of_row = (renderer->settings.region_width + group.width - 1) / group.width;
-    uint32_t wanted = GROUPS_OF_UNIT_MIN * renderer->compute->device->compute_units;
+    const uint32_t of_row = (renderer->settings.region_width + group.width - 1) / group.width;
+    const uint32_t wanted = (uint32_t)(pace->samples_min / group.width / group.height);
     return (wanted + of_row - 1) / of_row * group.height;
 }
 
@@ -88,7 +85,7 @@ static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t s
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * sample_count;
     uint64_t rows = pace_band_samples(pace) / row_samples;
-    uint32_t least = rows_min(renderer);
+    uint32_t least = rows_min(renderer, pace);
     if (rows < least) rows = least;
     rows -= rows % group_shape(renderer).height;
     return rows < most ? (uint32_t)rows : most;
@@ -107,36 +104,32 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
 
-static bool is_stopped(const Renderer *renderer, const Delivery *delivery)
+static bool has_ended(const Delivery *delivery)
 {
-    return (renderer->settings.stop && renderer->settings.stop()) ||
-           (delivery->queue && delivery->queue->has_ended(delivery->queue->context));
+    return delivery->queue && delivery->queue->has_ended(delivery->queue->context);
 }
 
-// Samples first..end-1 of a band, in launches of the pace. False: failed or stopped.
-static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows, Pace *pace, uint32_t first,
-                        uint32_t end, const Delivery *delivery)
+// Renders samples first..end-1 of a band. Returns false if the device failed or the render is stopped.
+static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows, uint32_t first, uint32_t end,
+                        const Delivery *delivery)
 {
-    const RenderSettings *settings = &renderer->settings;
-    uint64_t pixels = (uint64_t)settings->region_width * rows.row_count;
+    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
     const Place place = band_place(renderer, rows);
     bool go_on = true;
     pace_begin_band(pace);
     if (first == 0) band_clear_doubts(renderer, buffers, rows);
     while (go_on && first < end) {
-        uint32_t samples = pace_launch_samples(pace, pixels, end - first);
-        double seconds = band_render(renderer, buffers, &place, first, first + samples);
-        pace_note_launch(pace, pixels, samples, seconds);
+        const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
+        go_on = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(delivery);
         first += samples;
-        go_on = compute_ok(renderer->compute) && !is_stopped(renderer, delivery);
     }
-    if (go_on && renderer->repeat && end == settings->sample_count)
-        band_repeat(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
+    if (go_on && renderer->repeat && end == renderer->settings.sample_count)
+        go_on = band_repeat(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
     return go_on && compute_ok(renderer->compute);
 }
 
-// One ray per pixel.
-static void band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned aovs, BandRows rows)
+// Traces one ray per pixel. Returns false as band_fill does.
+static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
     const Place place = band_place(renderer, rows);
     const struct {
@@ -145,14 +138,11 @@ static void band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned ao
     } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}};
     for (size_t i = 0; i < sizeof fills / sizeof *fills; i++) {
         if (!(aovs & fills[i].layers)) continue;
-        band_fill(renderer, fills[i].kind, fills[i].layers, buffers, aovs, &place);
-        if (renderer->repeat) band_repeat(renderer, fills[i].kind, fills[i].layers, buffers, aovs, rows);
+        if (!band_fill(renderer, fills[i].kind, fills[i].layers, buffers, aovs, &place)) return false;
+        if (renderer->repeat && !band_repeat(renderer, fills[i].kind, fills[i].layers, buffers, aovs, rows))
+            return false;
     }
-}
-
-static Pace pace_start(const RenderSettings *settings)
-{
-    return (Pace){.target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1};
+    return true;
 }
 
 bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
@@ -164,16 +154,16 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     BandBuffers buffers = {0};
     band_buffers_open(&buffers, renderer, aovs, film_of_rows(renderer, 0, rows_max(renderer, aovs)));
     renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
-    Pace pace = pace_start(settings);
+    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
+    pace_begin_band(pace); // the last render's band may have been of another scene or size
     bool go_on = compute_ok(compute);
     while (go_on) {
-        uint32_t wanted = band_rows(renderer, &pace, settings->sample_count, buffers.rows);
+        uint32_t wanted = band_rows(renderer, pace, settings->sample_count, buffers.rows);
         BandRows rows = queue->take(queue->context, wanted, step);
         if (rows.row_count == 0) break;
-        go_on = band_sample(renderer, &buffers, rows, &pace, 0, settings->sample_count, &delivery);
-        if (!go_on) break;
-        band_fill_aovs(renderer, &buffers, aovs, rows);
-        go_on = band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
+        go_on = band_sample(renderer, &buffers, rows, 0, settings->sample_count, &delivery) &&
+                band_fill_aovs(renderer, &buffers, aovs, rows) &&
+                band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
     }
     band_buffers_close(&buffers);
     return go_on && compute_ok(compute);
@@ -190,8 +180,10 @@ typedef struct {
 } PassBands;
 
 // The first pass divides the image into bands, each with buffers of its own.
-static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Pace *pace, Delivery *delivery)
+static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Delivery *delivery)
 {
+    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
+    pace_begin_band(pace);
     const uint32_t height = renderer->settings.region_height;
     const uint32_t most = rows_max(renderer, aovs);
     bool go_on = compute_ok(renderer->compute);
@@ -201,7 +193,7 @@ static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Pace
         PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
         band_buffers_open(&band.buffers, renderer, aovs, film_of_rows(renderer, 0, band.rows.row_count));
         array_push(*bands, band);
-        go_on = band_sample(renderer, &band.buffers, band.rows, pace, 0, 1, delivery) &&
+        go_on = band_sample(renderer, &band.buffers, band.rows, 0, 1, delivery) &&
                 band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);
         row += band.rows.row_count;
     }
@@ -210,13 +202,11 @@ static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Pace
 
 static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, const Delivery *delivery)
 {
-    const RenderSettings *settings = &renderer->settings;
     bool go_on = true;
     for (size_t i = 0; go_on && i < bands->count; i++) {
         PassBand *band = &bands->items[i];
-        band_fill_aovs(renderer, &band->buffers, aovs, band->rows);
-        go_on = band_deliver(renderer, &band->buffers, aovs, band->rows, delivery) &&
-                !(settings->stop && settings->stop());
+        go_on = band_fill_aovs(renderer, &band->buffers, aovs, band->rows) &&
+                band_deliver(renderer, &band->buffers, aovs, band->rows, delivery);
     }
     return go_on;
 }
@@ -226,9 +216,8 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
     const uint32_t count = renderer->settings.sample_count;
     Delivery delivery = {.pass_sink = sink, .context = context};
     PassBands bands = {0};
-    Pace pace = pace_start(&renderer->settings);
     double start = clock_seconds(), seconds_of_sample;
-    bool go_on = first_pass(renderer, &bands, aovs, &pace, &delivery);
+    bool go_on = first_pass(renderer, &bands, aovs, &delivery);
     seconds_of_sample = clock_seconds() - start;
     if (go_on && aovs) go_on = aov_pass(renderer, &bands, aovs, &delivery);
     while (go_on && delivery.samples < count) {
@@ -237,8 +226,7 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
         start = clock_seconds();
         for (size_t i = 0; go_on && i < bands.count; i++) {
             PassBand *band = &bands.items[i];
-            go_on = band_sample(renderer, &band->buffers, band->rows, &pace, first, delivery.samples,
-                                &delivery) &&
+            go_on = band_sample(renderer, &band->buffers, band->rows, first, delivery.samples, &delivery) &&
                     band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);
         }
         seconds_of_sample = (clock_seconds() - start) / (delivery.samples - first);

@@ -1,21 +1,24 @@
 // The cost of a band's samples is known only from its own launches: a band of sky costs next to nothing, the
-// next, of glass, thousands of times as much. So the time per sample decides the rows of the next band, but
-// its first launch has one sample per pixel. Its later launches follow its own time, to which all of its
-// pixels have contributed, and may grow faster for that reason.
+// next, of glass, a hundred times as much. So its first pass has one sample per pixel, in launches that aim
+// at a part of the target by the time of the launch before. Its later passes follow the time of the pass
+// before, to which all of its pixels have contributed.
 #include "host/render/pace.h"
 
 #include <math.h>
 
 enum {
-    FIRST_LAUNCH_SAMPLES = 1 << 17, // before any time is known
-    LAUNCH_SAMPLES_MAX = 1024,      // per pixel
+    FIRST_BAND_SAMPLES = 1 << 17,
+    FIRST_LAUNCH_SAMPLES = 1 << 12,
+    PASS_SAMPLES_MAX = 1024, // per pixel
     BAND_GROWTH_MAX = 4,
-    LAUNCH_GROWTH_MAX = 16, // within a band
+    LAUNCH_GROWTH_MAX = 4,
 };
+
+static const double FIRST_PASS_SHARE = 0.25; // of the target
 
 uint64_t pace_band_samples(const Pace *pace)
 {
-    if (pace->band_samples <= 0 || pace->band_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
+    if (pace->band_samples <= 0 || pace->band_seconds <= 0) return FIRST_BAND_SAMPLES;
     double rate = pace->band_samples / pace->band_seconds;
     return (uint64_t)fmin(pace->target_seconds * rate, BAND_GROWTH_MAX * pace->band_samples);
 }
@@ -23,28 +26,34 @@ uint64_t pace_band_samples(const Pace *pace)
 void pace_begin_band(Pace *pace)
 {
     pace->band_samples = pace->band_seconds = 0;
-    pace->begins_band = true;
+    pace->pass_samples = pace->pass_seconds = 0;
+    pace->samples_per_second = 0;
 }
 
-static double samples_wanted(const Pace *pace)
+uint64_t pace_launch_samples(const Pace *pace)
 {
-    if (pace->launch_samples <= 0 || pace->launch_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
-    if (pace->begins_band) return 0; // one per pixel
-    double of_target = pace->target_seconds * pace->launch_samples / pace->launch_seconds;
-    return fmin(of_target, LAUNCH_GROWTH_MAX * pace->launch_samples);
+    if (pace->launch_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
+    const double last_rate = FIRST_PASS_SHARE * pace->launch_samples / pace->launch_seconds;
+    const double rate = pace->samples_per_second > 0 ? pace->samples_per_second : last_rate;
+    const double largest = fmax(FIRST_LAUNCH_SAMPLES, LAUNCH_GROWTH_MAX * pace->launch_samples);
+    return (uint64_t)fmax(1, fmin(fmax(rate * pace->target_seconds, pace->samples_min), largest));
 }
 
-uint32_t pace_launch_samples(const Pace *pace, uint64_t pixels, uint32_t left)
+uint32_t pace_begin_pass(Pace *pace, uint64_t pixels, uint32_t left)
 {
-    double largest = left < LAUNCH_SAMPLES_MAX ? left : LAUNCH_SAMPLES_MAX;
-    return (uint32_t)fmax(1, fmin(samples_wanted(pace) / (double)pixels, largest));
+    if (pace->pass_seconds > 0) pace->samples_per_second = pace->pass_samples / pace->pass_seconds;
+    pace->pass_samples = pace->pass_seconds = 0;
+    if (pace->launch_seconds > 0 && pace->samples_per_second <= 0) return 1;
+    const uint32_t largest = left < PASS_SAMPLES_MAX ? left : PASS_SAMPLES_MAX;
+    return (uint32_t)fmax(1, fmin((double)pace_launch_samples(pace) / (double)pixels, largest));
 }
 
-void pace_note_launch(Pace *pace, uint64_t pixels, uint32_t samples, double seconds)
+void pace_note_launch(Pace *pace, uint64_t samples, double seconds)
 {
-    pace->launch_samples = (double)pixels * samples;
+    pace->launch_samples = (double)samples;
     pace->launch_seconds = seconds;
-    pace->band_samples += pace->launch_samples;
+    pace->pass_samples += (double)samples;
+    pace->pass_seconds += seconds;
+    pace->band_samples += (double)samples;
     pace->band_seconds += seconds;
-    pace->begins_band = false;
 }

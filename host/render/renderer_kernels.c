@@ -133,6 +133,7 @@ void renderer_kernels_choose(Renderer *renderer)
     } else {
         variant_close(renderer, &renderer->variant);
         renderer->variant = (KernelVariant){.prelude = prelude, .options = build_options(renderer)};
+        memset(renderer->paces, 0, sizeof renderer->paces);
     }
     for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
         if (renderer->variant.kernels[kind].kernel)
@@ -177,11 +178,11 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     return slot->kernel;
 }
 
-LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
-                           const size_t *group)
+double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *first,
+                       const size_t *items, const size_t *group)
 {
     KernelSlot *slot = &renderer->variant.kernels[kind];
-    LaunchTime time = kernel_launch(renderer->compute, slot->kernel, dimensions, items, group);
+    LaunchTime time = kernel_launch_from(renderer->compute, slot->kernel, dimensions, first, items, group);
     array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
-    return time;
+    return time.trusted ? time.event_seconds : time.host_seconds;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/compile/compiled_scene.h"
+#include "host/render/pace.h"
 #include "host/render/renderer.h"
 
 typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_PATH, KERNEL_TRACE, KERNEL_COUNT } KernelKind;
@@ -31,6 +32,7 @@ struct Renderer {
     size_t light_count;
     // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
     KernelVariant variant, other_variant;
+    Pace paces[KERNEL_COUNT]; // of the variant in use
     // For the next pass; NULL: this is the last.
     Renderer *repeat;
 };
@@ -52,9 +54,13 @@ void renderer_kernels_close(Renderer *renderer);
 // the device failed.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 
-// Launches as kernel_launch does and adds the time to the report.
-LaunchTime renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *items,
-                           const size_t *group);
+// Launches as kernel_launch_from does and adds the time to the report. Returns the launch's seconds: the
+// event's if trusted, else the host's.
+double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *first,
+                       const size_t *items, const size_t *group);
+
+// The pace of a kernel's launches, with its target by the settings.
+Pace *renderer_pace(Renderer *renderer, KernelKind kind);
 
 // Maps a buffer for the host, to read or also to write, and adds the time to the report; NULL: the device
 // failed. Released with renderer_unmap, which accepts NULL.

@@ -114,9 +114,22 @@ static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const Pix
     renderer_unmap(renderer, layer, values);
 }
 
+// Renders all samples of a list. Returns false as band_render does.
+static bool list_render(Renderer *renderer, const BandBuffers *buffers, const Place *place)
+{
+    const uint32_t end = renderer->settings.sample_count;
+    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
+    pace_begin_band(pace);
+    for (uint32_t first = 0, samples; first < end; first += samples) {
+        samples = pace_begin_pass(pace, place_pixels(place), end - first);
+        if (!band_render(renderer, buffers, place, first, first + samples)) return false;
+    }
+    return true;
+}
+
 // Renders a list of the band's pixels by `repeat`, and puts them into the band's layers. `undecided`: of each
-// pixel, how many of its samples `repeat` leaves in doubt; NULL: not asked for.
-static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
+// pixel, how many of its samples `repeat` leaves in doubt; NULL: not asked for. Returns false as band_repeat.
+static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
                         uint32_t *undecided)
 {
     const Film film = {.width = (uint32_t)list->index.count,
@@ -128,20 +141,20 @@ static void list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
     band_buffers_open(&repeated, repeat, band->aovs, film);
     buffer_write(repeat->compute, repeated.pixels, list->pixels.count * sizeof *list->pixels.items,
                  list->pixels.items);
-    if (band->kind == KERNEL_RENDER)
-        band_render(repeat, &repeated, &place, 0, renderer->settings.sample_count);
-    else
-        band_fill(repeat, band->kind, band->layers, &repeated, band->aovs, &place);
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+    const bool whole = band->kind == KERNEL_RENDER
+                           ? list_render(repeat, &repeated, &place)
+                           : band_fill(repeat, band->kind, band->layers, &repeated, band->aovs, &place);
+    for (Layer layer = 0; layer < LAYER_COUNT && whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
             film_layer_size(&band->film, layer) > 0)
             layer_merge(renderer, layer, repeated.layers[layer], band->buffers->layers[layer], list,
                         &band->film);
-    if (undecided)
+    if (undecided && whole)
         buffer_read(renderer->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
                     list->index.count * sizeof *undecided, undecided);
     repeat_launches_take(&renderer->report, &repeat->report);
     band_buffers_close(&repeated);
+    return whole && compute_ok(renderer->compute);
 }
 
 // Leaves those of the list's pixels that are undecided; returns the number of their undecided samples.
@@ -162,7 +175,7 @@ static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
     return samples;
 }
 
-void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
+bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
                  BandRows rows)
 {
     cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
@@ -170,23 +183,25 @@ void band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
     const size_t tile_count = film_tile_count(renderer, &band.film);
     uint32_t *values = renderer_map(renderer, doubts, tile_count * sizeof *values, CL_MAP_READ);
-    if (!values) return;
+    if (!values) return false;
     PixelList list = doubts_list(renderer, rows, values, tile_count);
     renderer_unmap(renderer, doubts, values);
+    bool go_on = true;
     if (list.index.count > 0) {
         RepeatCounts *counts = &buffers->repeats;
         uint32_t *undecided = memory_allocate(list.index.count, sizeof *undecided);
         counts->repeated +=
             (uint64_t)list.index.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
         doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
-        list_repeat(renderer, renderer->repeat, &band, &list, undecided);
-        if (compute_ok(renderer->compute)) counts->undecided += list_keep_undecided(&list, undecided);
-        if (compute_ok(renderer->compute) && list.index.count > 0) {
+        go_on = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
+        if (go_on) counts->undecided += list_keep_undecided(&list, undecided);
+        if (go_on && list.index.count > 0) {
             doubts_raise(renderer, &band, &list, DOUBT_UNDECIDED);
-            list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
+            go_on = list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
         }
         free(undecided);
     }
     free(list.pixels.items);
     free(list.index.items);
+    return go_on;
 }

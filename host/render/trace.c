@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { TRACE_GROUP = 64, TRACE_RAYS_OF_LAUNCH = 1 << 18 };
+enum { TRACE_GROUP = 64, BATCH_RAYS_MAX = 1 << 18 };
 
 static void scalar_set(void *scalars, size_t index, bool is_double, double value)
 {
@@ -65,7 +65,8 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
     return scalars;
 }
 
-static void trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_mem results, cl_mem objects)
+// Returns the launch's seconds.
+static double trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_mem results, cl_mem objects)
 {
     Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
@@ -74,7 +75,7 @@ static void trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_mem
     kernel_argument(compute, kernel, FLAT_COUNT + 2, sizeof results, &results);
     kernel_argument(compute, kernel, FLAT_COUNT + 3, sizeof objects, &objects);
     size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = TRACE_GROUP;
-    renderer_launch(renderer, KERNEL_TRACE, 1, &items, &group);
+    return renderer_launch(renderer, KERNEL_TRACE, 1, NULL, &items, &group);
 }
 
 static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_mem objects, TraceHit *hits)
@@ -101,7 +102,8 @@ static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count
     free(scalars);
     cl_mem results = buffer_create(compute, (size_t)count * RESULT_SCALARS * scalar, NULL, CL_MEM_WRITE_ONLY);
     cl_mem objects = buffer_create(compute, (size_t)count * sizeof(uint32_t), NULL, CL_MEM_WRITE_ONLY);
-    trace_launch(renderer, count, ray_buffer, results, objects);
+    const double seconds = trace_launch(renderer, count, ray_buffer, results, objects);
+    pace_note_launch(renderer_pace(renderer, KERNEL_TRACE), count, seconds);
     hits_unpack(renderer, count, results, objects, hits);
     buffer_release(ray_buffer);
     buffer_release(results);
@@ -114,10 +116,12 @@ bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, 
     // the report is of images: a view asks about pixel after pixel
     RenderReport *report = &renderer->report;
     const size_t launch_count = report->launches.count, read_count = report->reads.count;
-    for (size_t first = 0; first < ray_count && compute_ok(compute); first += TRACE_RAYS_OF_LAUNCH) {
-        size_t left = ray_count - first;
-        uint32_t count = left < TRACE_RAYS_OF_LAUNCH ? (uint32_t)left : TRACE_RAYS_OF_LAUNCH;
-        trace_batch(renderer, rays + first, count, hits + first);
+    Pace *pace = renderer_pace(renderer, KERNEL_TRACE);
+    pace_begin_band(pace);
+    for (size_t first = 0, count; first < ray_count && compute_ok(compute); first += count) {
+        count = ray_count - first < BATCH_RAYS_MAX ? ray_count - first : BATCH_RAYS_MAX;
+        if (count > pace_launch_samples(pace)) count = (size_t)pace_launch_samples(pace);
+        trace_batch(renderer, rays + first, (uint32_t)count, hits + first);
     }
     report->launches.count = launch_count;
     report->reads.count = read_count;
