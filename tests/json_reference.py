@@ -138,6 +138,7 @@ MEANINGS = {
     "devices[].usable": "boolean; kernels can be built and run",
     "devices[].unusable_because": "text or null",
     "devices[].{name,vendor,platform,platform_version,version,driver}": "text; from OpenCL",
+    "devices[].profile": "text; `full` or `embedded`",
     "devices[].type": "text; `cpu`, `gpu`, `accelerator` or `other`",
     "devices[].units": "count; compute units",
     "devices[].clock_mhz": "count; the driver's maximum; 0 if unknown",

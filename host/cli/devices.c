@@ -41,6 +41,7 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_text(json, "unusable_because", why);
         json_text(json, "name", device->name);
         json_text(json, "type", device_type_name(device->type));
+        json_text(json, "profile", device->embedded_profile ? "embedded" : "full");
         json_text(json, "vendor", device->vendor);
         json_text(json, "platform", device->platform_name);
         json_text(json, "platform_version", device->platform_version);

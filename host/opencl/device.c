@@ -119,7 +119,16 @@ static void device_describe(DeviceList *list, Device *device)
     device->denormals = (fp32 & CL_FP_DENORM) != 0;
     device->fma_in_hardware = (fp32 & CL_FP_FMA) != 0;
     device->correctly_rounded = (fp32 & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+    char *profile = device_text(list, id, CL_DEVICE_PROFILE);
+    device->embedded_profile = strcmp(profile, "EMBEDDED_PROFILE") == 0;
+    free(profile);
+    // a configuration of 0 is unknown
+    device->rounds_toward_zero = fp32 != 0 && !(fp32 & CL_FP_ROUND_TO_NEAREST);
+    device->lacks_infinity = fp32 != 0 && !(fp32 & CL_FP_INF_NAN);
     device->fp64 = fp64 != 0 || extensions_have(device->extensions, "cl_khr_fp64");
+    // kernels in double use 64-bit integers, an extension there
+    if (device->embedded_profile && !extensions_have(device->extensions, "cles_khr_int64"))
+        device->fp64 = false;
 
     device_number(list, id, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, &device->native_float_width);
     if (device->native_float_width == 0) device->native_float_width = 1;
@@ -207,10 +216,12 @@ void device_list_close(DeviceList *list)
 
 bool device_usable(const Device *device, const char **why)
 {
-    const char *missing = !device->available       ? "not available"
-                          : !device->compiler      ? "no compiler"
-                          : !device->little_endian ? "big-endian"
-                                                   : NULL;
+    const char *missing = !device->available           ? "not available"
+                          : !device->compiler          ? "no compiler"
+                          : !device->little_endian     ? "big-endian"
+                          : device->rounds_toward_zero ? "float arithmetic rounds toward zero only"
+                          : device->lacks_infinity     ? "float arithmetic has no infinity and no NaN"
+                                                       : NULL;
     if (why) *why = missing;
     return missing == NULL;
 }

@@ -23,6 +23,9 @@ typedef struct {
     double timer_resolution_seconds;
     bool fp64, denormals, fma_in_hardware;
     bool correctly_rounded; // supports -cl-fp32-correctly-rounded-divide-sqrt
+    bool embedded_profile;
+    // only devices of the embedded profile may be so
+    bool rounds_toward_zero, lacks_infinity;
     bool compiler, available, little_endian;
 } Device;
 
@@ -43,7 +46,7 @@ char *device_list_failure_text(const DeviceList *list);
 
 // `selector`: an index, a part of the device's or platform's name (any case; a number only as a whole),
 // "cpu", "gpu", or NULL for the default: a GPU if there is one, else a CPU, else any device. Considers only
-// devices that are available, little-endian and have a compiler; of identical ones, chooses the first. NULL,
+// devices that are usable; of identical ones, chooses the first. NULL,
 // with an error message, if none matches: the message lists the devices, or says how to install PoCL if there
 // are none.
 const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages);
@@ -58,7 +61,8 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
 // NULL.
 const char *device_selector(const char *option);
 
-// Whether the device can build and run kernels; if not, *why (may be NULL) says what is missing.
+// Whether the device can build and run kernels, and its arithmetic is what they need; if not, *why (may be
+// NULL) says what is missing.
 bool device_usable(const Device *device, const char **why);
 
 // The default number of rays per work-item: on a CPU the native vector width of float, or of double where

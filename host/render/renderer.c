@@ -21,6 +21,12 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
     if (settings->perturb_scale > PERTURB_SCALE_MAX)
         return message_error(messages, "errors can be at most %d times as large, not %u", PERTURB_SCALE_MAX,
                              settings->perturb_scale);
+    if (device->embedded_profile &&
+        (settings->precision == PRECISION_STRICT || settings->precision == PRECISION_CERTIFIED))
+        return message_error(messages,
+                             "precision %s: the device \"%s\" has the embedded profile, whose divisions and "
+                             "square roots may be less exact than the precision assumes",
+                             precision_names[settings->precision], device->name);
     if (settings->precision == PRECISION_DOUBLE && !device->fp64)
         return message_error(messages, "precision double: the device \"%s\" has no 64-bit floating point",
                              device->name);

@@ -1,0 +1,212 @@
+// Preloaded into glint by tests/test_device_limits.py: OpenCL devices report the limits that GLINT_LIMITS
+// lists, NAME or NAME=VALUE with commas between, and enforce them.
+//
+//   embedded       the embedded profile
+//   toward-zero    float arithmetic does not round to nearest
+//   no-infinity    float arithmetic has no infinity and no NaN
+//   no-double      no 64-bit floating point
+//   group=N        work-groups have at most N work-items, a side included
+//   constant=N     constant memory has N bytes
+//   memory=N       global memory has N bytes, over all buffers
+//   buffer=N       a buffer has at most N bytes
+//   buffers=N      a kernel takes at most N buffers
+//   first=N        the watchdog: a kernel's launch fails if it has more than N work-items, and more than four
+//                  times those of its last launch
+#define CL_TARGET_OPENCL_VERSION 120
+#define _GNU_SOURCE
+#include <CL/cl.h>
+#include <CL/cl_ext.h>
+#include <dlfcn.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The OpenCL function that the shim stands in for.
+#define NEXT(function) ((__typeof__(&function))dlsym(RTLD_NEXT, #function))
+
+// Whether the limit is set; *value, which may be NULL, receives its number.
+static bool limit_get(const char *name, size_t *value)
+{
+    const char *list = getenv("GLINT_LIMITS");
+    const size_t length = strlen(name);
+    for (const char *at = list; at; at = strchr(at, ',')) {
+        at += *at == ',';
+        if (strncmp(at, name, length) != 0 || !strchr("=,", at[length])) continue;
+        if (value) *value = at[length] == '=' ? strtoull(at + length + 1, NULL, 10) : 0;
+        return true;
+    }
+    return false;
+}
+
+static cl_int answer(const void *value, size_t value_size, size_t size, void *to, size_t *needed)
+{
+    if (needed) *needed = value_size;
+    if (to && size < value_size) return CL_INVALID_VALUE;
+    if (to) memcpy(to, value, value_size);
+    return CL_SUCCESS;
+}
+
+#define ANSWER(Type, value) answer(&(Type){value}, sizeof(Type), size, to, needed)
+
+// Removes a word from a list of extensions.
+static void word_remove(char *text, const char *word)
+{
+    char *at = strstr(text, word);
+    if (at) memmove(at, at + strlen(word), strlen(at + strlen(word)) + 1);
+}
+
+cl_int clGetDeviceInfo(cl_device_id device, cl_device_info what, size_t size, void *to, size_t *needed)
+{
+    size_t value;
+    if (what == CL_DEVICE_PROFILE && limit_get("embedded", NULL))
+        return answer("EMBEDDED_PROFILE", sizeof "EMBEDDED_PROFILE", size, to, needed);
+    if (what == CL_DEVICE_MAX_WORK_GROUP_SIZE && limit_get("group", &value)) return ANSWER(size_t, value);
+    if (what == CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE && limit_get("constant", &value))
+        return ANSWER(cl_ulong, value);
+    if (what == CL_DEVICE_GLOBAL_MEM_SIZE && limit_get("memory", &value)) return ANSWER(cl_ulong, value);
+    if (what == CL_DEVICE_MAX_MEM_ALLOC_SIZE && limit_get("buffer", &value)) return ANSWER(cl_ulong, value);
+    if (what == CL_DEVICE_DOUBLE_FP_CONFIG && limit_get("no-double", NULL))
+        return ANSWER(cl_device_fp_config, 0);
+    const cl_int status = NEXT(clGetDeviceInfo)(device, what, size, to, needed);
+    if (status != CL_SUCCESS || !to) return status;
+    if (what == CL_DEVICE_MAX_WORK_ITEM_SIZES && limit_get("group", &value))
+        for (size_t i = 0; i < 3; i++)
+            ((size_t *)to)[i] = value;
+    if (what == CL_DEVICE_SINGLE_FP_CONFIG && limit_get("toward-zero", NULL))
+        *(cl_device_fp_config *)to =
+            (*(cl_device_fp_config *)to & ~(cl_device_fp_config)CL_FP_ROUND_TO_NEAREST) | CL_FP_ROUND_TO_ZERO;
+    if (what == CL_DEVICE_SINGLE_FP_CONFIG && limit_get("no-infinity", NULL))
+        *(cl_device_fp_config *)to &= ~(cl_device_fp_config)CL_FP_INF_NAN;
+    if (what == CL_DEVICE_EXTENSIONS && limit_get("no-double", NULL)) word_remove(to, "cl_khr_fp64");
+    return status;
+}
+
+cl_int clGetKernelWorkGroupInfo(cl_kernel kernel, cl_device_id device, cl_kernel_work_group_info what,
+                                size_t size, void *to, size_t *needed)
+{
+    size_t value;
+    if (what == CL_KERNEL_WORK_GROUP_SIZE && limit_get("group", &value)) return ANSWER(size_t, value);
+    return NEXT(clGetKernelWorkGroupInfo)(kernel, device, what, size, to, needed);
+}
+
+cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const char **texts,
+                                     const size_t *lengths, cl_int *status)
+{
+    for (cl_uint i = 0; i < count; i++)
+        if (limit_get("no-double", NULL) && strstr(texts[i], "#define IS_DOUBLE 1")) {
+            *status = CL_INVALID_VALUE; // glint was told that there is no such type
+            return NULL;
+        }
+    return NEXT(clCreateProgramWithSource)(context, count, texts, lengths, status);
+}
+
+enum { BUFFERS_MAX = 4096, KERNELS_MAX = 64, ARGUMENTS_MAX = 256 };
+
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+static struct {
+    cl_mem buffer;
+    size_t size;
+} buffers[BUFFERS_MAX];
+static struct {
+    cl_kernel kernel;
+    size_t last_items;
+    bool is_buffer[ARGUMENTS_MAX];
+} kernels[KERNELS_MAX];
+
+static size_t buffer_find(cl_mem buffer)
+{
+    for (size_t i = 0; i < BUFFERS_MAX; i++)
+        if (buffers[i].buffer == buffer) return i;
+    fputs("the shim has room for 4096 buffers\n", stderr);
+    abort();
+}
+
+// The kernel's entry, which is made if it has none.
+static size_t kernel_find(cl_kernel kernel)
+{
+    size_t place = KERNELS_MAX;
+    for (size_t i = KERNELS_MAX; i-- > 0;) {
+        if (kernels[i].kernel == kernel) return i;
+        if (!kernels[i].kernel) place = i;
+    }
+    if (place == KERNELS_MAX) abort();
+    kernels[place].kernel = kernel;
+    return place;
+}
+
+cl_mem clCreateBuffer(cl_context context, cl_mem_flags flags, size_t size, void *bytes, cl_int *status)
+{
+    size_t most, sum = size;
+    *status = CL_INVALID_BUFFER_SIZE;
+    if (limit_get("buffer", &most) && size > most) return NULL;
+    pthread_mutex_lock(&mutex);
+    for (size_t i = 0; i < BUFFERS_MAX; i++)
+        sum += buffers[i].size;
+    cl_mem buffer = NULL;
+    *status = CL_MEM_OBJECT_ALLOCATION_FAILURE;
+    if (!limit_get("memory", &most) || sum <= most)
+        buffer = NEXT(clCreateBuffer)(context, flags, size, bytes, status);
+    if (buffer) {
+        const size_t place = buffer_find(NULL);
+        buffers[place].buffer = buffer;
+        buffers[place].size = size;
+    }
+    pthread_mutex_unlock(&mutex);
+    return buffer;
+}
+
+cl_int clReleaseMemObject(cl_mem buffer)
+{
+    pthread_mutex_lock(&mutex);
+    const size_t place = buffer_find(buffer);
+    buffers[place].buffer = NULL;
+    buffers[place].size = 0;
+    pthread_mutex_unlock(&mutex);
+    return NEXT(clReleaseMemObject)(buffer);
+}
+
+cl_int clSetKernelArg(cl_kernel kernel, cl_uint index, size_t size, const void *value)
+{
+    size_t most, count = 0;
+    cl_mem buffer = NULL;
+    if (size == sizeof buffer && value) memcpy(&buffer, value, size);
+    pthread_mutex_lock(&mutex);
+    const size_t place = kernel_find(kernel);
+    for (size_t i = 0; i < BUFFERS_MAX && buffer; i++)
+        if (buffers[i].buffer == buffer) kernels[place].is_buffer[index] = true;
+    for (size_t i = 0; i < ARGUMENTS_MAX; i++)
+        count += kernels[place].is_buffer[i];
+    pthread_mutex_unlock(&mutex);
+    if (limit_get("buffers", &most) && count > most) return CL_OUT_OF_RESOURCES;
+    return NEXT(clSetKernelArg)(kernel, index, size, value);
+}
+
+cl_int clReleaseKernel(cl_kernel kernel)
+{
+    pthread_mutex_lock(&mutex);
+    memset(&kernels[kernel_find(kernel)], 0, sizeof *kernels);
+    pthread_mutex_unlock(&mutex);
+    return NEXT(clReleaseKernel)(kernel);
+}
+
+cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions,
+                              const size_t *first, const size_t *global, const size_t *local,
+                              cl_uint wait_count, const cl_event *wait, cl_event *event)
+{
+    size_t items = 1, group = 1, most;
+    for (cl_uint i = 0; i < dimensions; i++) {
+        items *= global[i];
+        group *= local ? local[i] : 1;
+    }
+    if (limit_get("group", &most) && group > most) return CL_INVALID_WORK_GROUP_SIZE;
+    pthread_mutex_lock(&mutex);
+    size_t *last = &kernels[kernel_find(kernel)].last_items;
+    const bool is_too_long = limit_get("first", &most) && items > most && items > 4 * *last;
+    *last = items;
+    pthread_mutex_unlock(&mutex);
+    if (is_too_long) return CL_OUT_OF_RESOURCES;
+    return NEXT(clEnqueueNDRangeKernel)(queue, kernel, dimensions, first, global, local, wait_count, wait,
+                                        event);
+}

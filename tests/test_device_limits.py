@@ -1,0 +1,97 @@
+#!/usr/bin/env -S python3 -B
+"""Limits of devices, which tests/shims/limits.c reports and enforces: glint works within each, with the same bits, or
+refuses the device with the reason."""
+import os
+from pathlib import Path
+
+from glint import ROOT, SPHERE, TestCase, find_icd, main, need_device, read, run, shim_build, skip_all, write
+
+POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
+RENDER = "render sphere.yaml --quiet --size 320x200 -o image.npy"
+ALL_AOVS = "t,normal,position,object,shadow,ray,path,color"
+MEBI = 1 << 20
+
+# Limits, command: the same bits as without the limits.
+WORKS = (
+    ("embedded", f"{RENDER} --precision single"),
+    ("embedded", f"{RENDER} --precision fast"),
+    ("no-double", f"{RENDER} --precision strict --lanes 1"),
+    ("group=1", f"{RENDER} --precision strict --lanes 1 --aov {ALL_AOVS}"),
+    ("group=12", f"{RENDER} --precision strict --lanes 1 --aov {ALL_AOVS}"),
+    ("group=12", "trace sphere.yaml --rays rays.txt --lanes 1"),
+    ("constant=16384", f"{RENDER} --precision strict"),
+    (f"memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision strict --size 3840x2160 --aov {ALL_AOVS}"),
+    # the watchdog: no launch grows more than fourfold
+    ("first=4096", f"{RENDER} --precision strict --lanes 1 --size 3840x400 --aov {ALL_AOVS}"),
+    ("first=4096", f"{RENDER} --precision strict --lanes 1 --size 8x8 --samples 100"),
+    ("first=4096", f"{RENDER} --precision certified --lanes 1 --size 1920x300 --samples 2"),
+    ("first=4096", "trace sphere.yaml --rays rays.txt --lanes 1"),
+    ("first=4096", "verify S1 M1 --precision strict --lanes 1"),
+)
+# Limits, command, exit status, message.
+REFUSED = (
+    ("embedded", f"{RENDER} --precision strict", 1, "precision strict: the device .* has the embedded profile"),
+    ("embedded", f"{RENDER} --precision certified", 1, "precision certified: the device .* has the embedded profile"),
+    ("toward-zero", RENDER, 1, "unusable: float arithmetic rounds toward zero only"),
+    ("no-infinity", RENDER, 1, "unusable: float arithmetic has no infinity and no NaN"),
+    ("no-double", f"{RENDER} --precision double", 1, "precision double: the device .* has no 64-bit floating point"),
+    (f"buffer={16 * MEBI}", "render large.yaml -o image.npy --quiet", 1, "the scene needs .* at most 16.0 MiB in one buffer"),
+    (f"memory={64 * MEBI}", "render large.yaml -o image.npy --quiet", 1, "the scene needs .* the device .* has 64.0 MiB"),
+    # a limit that the device does not report
+    ("first=1000", f"{RENDER} --lanes 1", 2, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES .* on "),
+)
+
+
+def large_mesh(path, side=640):
+    """A square of 2 * side * side triangles."""
+    vertices = [f"v {x / side - 0.5} {y / side - 0.5} 0" for y in range(side + 1) for x in range(side + 1)]
+    corners = (y * (side + 1) + x + 1 for y in range(side) for x in range(side))
+    faces = (f"f {c} {c + 1} {c + side + 2}\nf {c} {c + side + 2} {c + side + 1}" for c in corners)
+    write(path, "\n".join([*vertices, *faces, ""]))
+
+
+class DeviceLimits(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("sphere.yaml", SPHERE)
+        write("large.yaml", SPHERE + "  - mesh: {file: large.obj}\n")
+        write("rays.txt", "".join(f"0 0 -4  {i / 40000 - 0.5} {i % 200 / 200 - 0.5} 1\n" for i in range(40000)))
+
+    def outputs(self, command, limits):
+        """The command's standard output and files, of the device with the limits; verify prints times."""
+        env = POCL if limits is None else POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits}
+        process = self.glint(command, env=env)
+        files = {path.name: path.read_bytes() for path in sorted(Path().glob("image*"))}
+        for name in files:
+            os.unlink(name)
+        return "" if command.startswith("verify") else process.stdout, files
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = os.path.join(os.environ.get("TMPDIR", "/tmp"), f"glint-limits-{os.getpid()}.so")
+        cls.shim = shim_build(cls.folder, read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
+        cls.addClassCleanup(os.unlink, cls.folder)
+
+    def test_works_within(self):
+        for limits, command in WORKS:
+            with self.subTest(limits=limits, command=command):
+                self.assertEqual(self.outputs(command, limits), self.outputs(command, None))
+
+    def test_is_refused(self):
+        large_mesh("large.obj")
+        for limits, command, status, message in REFUSED:
+            with self.subTest(limits=limits, command=command):
+                self.refuses(command, message, status, env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits})
+                self.assertFalse(os.path.exists("image.npy"))
+
+    def test_devices_report(self):
+        report = self.json("devices --json", env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": "embedded,no-double,group=12"})
+        device = report["devices"][0]
+        self.assertEqual((device["profile"], device["fp64"], device["largest_work_group"]), ("embedded", False, 12))
+
+
+if __name__ == "__main__":
+    need_device()
+    if run("devices", env=POCL).returncode != 0:
+        skip_all("PoCL is not installed")
+    main()
