@@ -252,7 +252,7 @@ enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADO
 enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
 
 typedef struct {
-    scalar4 color;
+    scalar4 color;     // w: the largest of its channels
     scalar4 position;  // from the eye; point and spot
     scalar4 direction; // unit, away from the light; directional and spot
     // spot: x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which no

@@ -409,12 +409,104 @@ static void hard_cases_are_decided(void **state)
     assert_int_equal(pictures.wrong_decided, 0);
 }
 
+// The colors of decided pixels that are off by more than a 256th of full light.
+static size_t count_wrong_colors(const CertifySample *sample, const Film *film)
+{
+    size_t wrong = 0;
+    for (size_t i = 0; i < sample->count; i++) {
+        const ReferencePixel *expected = &sample->pixels[i];
+        const size_t pixel = (size_t)sample->places[i][1] * film->width + sample->places[i][0];
+        if (reference_is_undecided(expected) || film->doubt[pixel] == DOUBT_UNDECIDED) continue;
+        const double error = film->color[3 * pixel] - expected->color.x;
+        wrong += !(fabs(error) <= 0x1p-8 * fmax(1, fabs(expected->color.x)));
+    }
+    return wrong;
+}
+
+enum { SMALL_SIDE = 15 }; // odd: the image has a pixel in its center
+
+// Renders a small image at certified, whose decided pixels must be the reference's, in color as well. Returns
+// the number of those left undecided. Frees the scene.
+static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what, double number)
+{
+    CertifySample reference;
+    assert_true(certify_sample_open(&reference, scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
+                                    bounce_count, NULL));
+    RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);
+    settings.bounce_count = bounce_count;
+    settings.extra_features = FEATURE_ALL; // one program for all
+    Renderer *renderer = probe_renderer(scene, &settings);
+    assert_non_null(renderer);
+    Film film;
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    const CertifyErrors errors = certify_compare(&reference, &film);
+    const size_t wrong_colors = count_wrong_colors(&reference, &film);
+    if (errors.wrong_decided > 0 || wrong_colors > 0)
+        fail_msg("%s, %g: of the pixels not undecided %zu are wrong, %zu in color", what, number,
+                 errors.wrong_decided, wrong_colors);
+    const size_t undecided = film.repeats.undecided;
+    film_free(&film);
+    renderer_close(renderer);
+    certify_sample_close(&reference);
+    scene_free(scene);
+    return undecided;
+}
+
+// A scene seen along -z from a point, `half_tangent` up and down.
+static Scene scene_seen_from(Vector3 from, double tangent)
+{
+    Scene scene = {.camera = {.position = from,
+                              .look_at = {from.x, from.y, from.z - fmax(1, fabs(from.z))},
+                              .up = {0, 1, 0},
+                              .field_axis = FIELD_HORIZONTAL,
+                              .half_tangent = tangent},
+                   .background = {0.25, 0.25, 0.25},
+                   .ambient = {0.1, 0.1, 0.1}};
+    array_push(scene.materials, material_default());
+    return scene;
+}
+
+static void point_light_add(Scene *scene, Vector3 position, double intensity)
+{
+    const Color color = {intensity, intensity, intensity};
+    array_push(scene->lights, ((Light){.kind = LIGHT_POINT, .color = color, .position = position}));
+}
+
+// Lights that lie on a wall but for less than its distance is rounded by, and so far away that their squared
+// distance overflows; and a bright one that all but grazes the wall.
+static void lights_on_surfaces_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    const Object wall = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 0, 1}}};
+    const double heights[] = {1e-5, 1e-7, 1e-9, 1e-12, 1e-15, 1e-20, 1e-30};
+    for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
+        Scene scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
+        array_push(scene.objects, wall);
+        point_light_add(&scene, (Vector3){0, 0, heights[i]}, 1);
+        size_t undecided = check_small(&scene, 0, "a light above a wall", heights[i]);
+        scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
+        array_push(scene.objects, wall);
+        array_push(scene.objects, ((Object){.kind = SHAPE_SPHERE, .as.sphere = {{0.5, 0, 0}, 0.25}}));
+        point_light_add(&scene, (Vector3){10, 0, heights[i]}, 1e6);
+        undecided += check_small(&scene, 0, "a light that grazes a wall", heights[i]);
+        if (heights[i] >= 1e-9) assert_int_equal(undecided, 0); // double tells them apart
+    }
+    for (double distance = 1e15; distance < 1e24; distance *= 100) {
+        Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
+        array_push(scene.objects,
+                   ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, -distance}, {0, 0, 1}}}));
+        point_light_add(&scene, (Vector3){0, 0, fmin(distance, 5e17)}, 1);
+        assert_int_equal(check_small(&scene, 0, "a wall far from the light", distance), 0);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(flat_shapes_are_decided), cmocka_unit_test(round_shapes_are_decided),
-        cmocka_unit_test(planets_are_decided), cmocka_unit_test(mirrors_glass_and_spots_are_decided),
-        cmocka_unit_test(hard_cases_are_decided)};
+        cmocka_unit_test(planets_are_decided),     cmocka_unit_test(mirrors_glass_and_spots_are_decided),
+        cmocka_unit_test(hard_cases_are_decided),  cmocka_unit_test(lights_on_surfaces_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

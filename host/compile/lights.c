@@ -17,7 +17,8 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
     FlatLight *lights = compiled->arrays[FLAT_LIGHTS].items;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
-        lights[i] = (FlatLight){.color = scalar4_of(light->color, 0), .kind.x = (uint32_t)light->kind};
+        lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
+                                .kind.x = (uint32_t)light->kind};
         if (light->kind != LIGHT_DIRECTIONAL)
             lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
         if (light->kind != LIGHT_POINT)

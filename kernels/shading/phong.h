@@ -76,8 +76,11 @@ typedef struct {
 // one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is in doubt.
 enum { SHADOW_ERROR_MAX = 1 << 9 };
 #define SHADOW_DOUBT_MAX ((real)(0x1p-6f))
-// Where the facing is open by no more than this, what the light adds is too faint to matter.
+// Where the facing is open by no more than this, in parts of full light, what the light adds is too faint to
+// matter.
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
+// The least fourth power of a light's distance for which cull_slack does not underflow.
+#define CULLED_DISTANCE_MIN ((real)(SMALLEST_RATIO * 0x1p30f))
 
 // Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes whose
 // errors are too large for cull spheres.
@@ -93,9 +96,14 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         // without another root: a unit vector is off by 14.5 u, a dot product by 3 u
         shadow_ray->length =
             vector_dot(visibility->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
-        real relative = place_error * ray_inverse_length(shadow_ray);
-        far_off = !(relative <= SHADOW_DOUBT_MAX) | !(shadow_ray->squared > zero);
-        skips_culling = relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF);
+        // nothing is known of a light so near that rounding moves it onto the surface, or too far away to
+        // square
+        real squared = shadow_ray->squared;
+        mask in_range = (squared >= (real)(SMALLEST_RATIO)) & (squared <= (real)(1 / SMALLEST_RATIO));
+        real relative = lanes_select(in_range, place_error * ray_inverse_length(shadow_ray), NEVER);
+        far_off = !(relative <= SHADOW_DOUBT_MAX);
+        skips_culling =
+            (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
         angle_error = angle_error + relative + relative;
         shadow_ray->ends_at_light = true;
     }
@@ -106,8 +114,11 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
     shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
     mask turned = (visibility->facing < -facing_error) | !surface_found(surface);
-    mask open = !turned & (visibility->facing <= facing_error);
-    mask faint = facing_error <= FACING_ERROR_MAX;
+    mask open = !turned & !(visibility->facing > facing_error);
+    Color3 diffuse = surface->diffuse;
+    real reflected = (real)(light->color.w) * real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
+    real brightness = real_max(reflected, (real)(1));
+    mask faint = facing_error * brightness <= FACING_ERROR_MAX;
     visibility->facing_doubt = open & faint;
     // a light in front of the shading normal but behind the surface is occluded by the surface itself
     mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
@@ -121,7 +132,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         real error = angle_error + (real)(16 * UNIT_ROUNDOFF);
         real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
         mask at_edge = !turned & (fabs(s - edge) <= s_error);
-        mask fades = s_error * (real)(light->cone.z) <= FACING_ERROR_MAX;
+        mask fades = s_error * (real)(light->cone.z) * brightness <= FACING_ERROR_MAX;
         if (light->cone.z == 0) fades = mask_none();
         self_doubt = self_doubt | (at_edge & !fades);
         visibility->facing_doubt = visibility->facing_doubt | (at_edge & fades);
