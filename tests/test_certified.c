@@ -501,12 +501,42 @@ static void lights_on_surfaces_are_decided(void **state)
     }
 }
 
+// Checkers around an eye far from the origin, for their size: on walls, level and tilted, and on a box.
+static void checkers_far_out_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    for (double far = 1e3; far < 1e13; far *= 100)
+        for (unsigned form = 0; form < 3; form++) {
+            const double size = far < 1e7 ? 1e-14 * far : 0.1; // of a view zoomed in, and of an ordinary one
+            const Vector3 from = {far + 0.3 * size, -3 * far - 0.4 * size, 7 * far};
+            Scene scene = scene_seen_from(from, 3 * size);
+            scene.camera.look_at.z = from.z - 1;
+            Material *material = &scene.materials.items[0];
+            material->checker = true;
+            material->checker_size = size;
+            material->checker_colors[0] = (Color){1, 1, 1};
+            scene.ambient = (Color){1, 1, 1};
+            material->ambient = 1;
+            const Vector3 point = {from.x, from.y, from.z - 1};
+            const Vector3 normal = {form, 0.5 * form, 3};
+            Object object = {.kind = SHAPE_PLANE, .as.plane = {point, normal}};
+            if (form == 2)
+                object = (Object){
+                    .kind = SHAPE_BOX,
+                    .as.box = {{from.x - 5, from.y - 5, from.z - 2}, {from.x + 5, from.y + 5, from.z - 1}}};
+            array_push(scene.objects, object);
+            assert_true(check_small(&scene, 0, "a checker far out", far) < 2 * SMALL_SIDE);
+        }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(flat_shapes_are_decided), cmocka_unit_test(round_shapes_are_decided),
-        cmocka_unit_test(planets_are_decided),     cmocka_unit_test(mirrors_glass_and_spots_are_decided),
-        cmocka_unit_test(hard_cases_are_decided),  cmocka_unit_test(lights_on_surfaces_are_decided)};
+        cmocka_unit_test(flat_shapes_are_decided),     cmocka_unit_test(round_shapes_are_decided),
+        cmocka_unit_test(planets_are_decided),         cmocka_unit_test(mirrors_glass_and_spots_are_decided),
+        cmocka_unit_test(hard_cases_are_decided),      cmocka_unit_test(lights_on_surfaces_are_decided),
+        cmocka_unit_test(checkers_far_out_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

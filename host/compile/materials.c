@@ -24,9 +24,9 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             .reflection_transmission_ior = {material->reflection, material->transmission, material->ior, 0},
             .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
         };
-        if (material->checker)
-            materials[i].grid =
-                (scalar4){fmod(eye.x / size, 2), fmod(eye.y / size, 2), fmod(eye.z / size, 2), 1 / size};
+        if (material->checker) // the remainders are exact, quotients far from the origin are not
+            materials[i].grid = (scalar4){fmod(eye.x, 2 * size) / size, fmod(eye.y, 2 * size) / size,
+                                          fmod(eye.z, 2 * size) / size, 1 / size};
         if (material->texture == 0) continue;
         const CompiledTexture *texture = &compiled->textures[material->texture - 1];
         materials[i].texture = (uint4){1 + texture->first_level, texture->level_count, 0, 0};

@@ -1,50 +1,51 @@
 #include "host/compile/texture_mapping.h"
 
-// Where the eye is along a direction, in squares or textures of `size`, modulo `period`, which keeps the bits
-// far from the origin.
-static double eye_phase(const Flattening *flattening, Vector3 direction, double size, double period)
+// Where the eye is along a unit direction, in squares or textures of `size`, modulo `period` of them. The
+// remainder is exact, and only then divided: far from the origin a rounded quotient has no bits left within
+// the period.
+static double eye_phase(const Flattening *flattening, Quad3 direction, double size, double period)
 {
-    return fmod(vector_dot(flattening->rounding.eye, direction) / size, period);
+    const Quad along = quad3_dot(quad3(flattening->rounding.eye), direction);
+    const long double length = (long double)period * (long double)size, high = (long double)along,
+                      low = (long double)(along - high);
+    return (double)(fmodl(fmodl(high, length) + fmodl(low, length), length) / (long double)size);
 }
 
-static scalar4 texture_axis(const Flattening *flattening, Vector3 direction, double size)
+static scalar4 grid_axis(const Flattening *flattening, Quad3 direction, double size, double period)
 {
-    return (scalar4){direction.x / size, direction.y / size, direction.z / size,
-                     eye_phase(flattening, direction, size, 1)};
-}
-
-static scalar4 checker_axis(const Flattening *flattening, Vector3 direction, double size)
-{
-    return scalar4_of(vector_scale(direction, 1 / size), eye_phase(flattening, direction, size, 2));
+    return scalar4_of(quad3_rounded(quad3_scale(direction, 1 / (Quad)size)),
+                      eye_phase(flattening, direction, size, period));
 }
 
 // The part of an axis across the unit normal, unit.
-static Vector3 axis_across(Vector3 axis, Vector3 unit_normal)
+static Quad3 axis_across(Vector3 axis, Quad3 unit_normal)
 {
-    return vector_normalize(vector_subtract(axis, vector_scale(unit_normal, vector_dot(axis, unit_normal))));
+    const Quad3 wide = quad3(axis);
+    return quad3_unit(quad3_subtract(wide, quad3_scale(unit_normal, quad3_dot(wide, unit_normal))));
 }
 
 // A texture stands upright on a wall; on a floor or a ceiling its top lies towards -z.
-static Vector3 texture_up(Vector3 unit_normal)
+static Quad3 texture_up(Vector3 normal, Quad3 unit_normal)
 {
-    bool level = fabs(unit_normal.y) >= fmax(fabs(unit_normal.x), fabs(unit_normal.z));
+    bool level = fabs(normal.y) >= fmax(fabs(normal.x), fabs(normal.z));
     return axis_across(level ? (Vector3){0, 0, -1} : (Vector3){0, 1, 0}, unit_normal);
 }
 
 void surface_grid(const Flattening *flattening, uint32_t material, Vector3 normal, scalar4 *u, scalar4 *v)
 {
     const Material *look = &flattening->scene->materials.items[material];
-    Vector3 unit = vector_normalize(normal);
+    if (look->texture == 0 && !look->checker) return;
+    const Quad3 unit = quad3_unit(quad3(axis_scaled(normal)));
     if (look->texture > 0) {
         const CompiledTexture *texture = &flattening->compiled->textures[look->texture - 1];
         double width = look->texture_size;
-        Vector3 up = texture_up(unit);
-        *u = texture_axis(flattening, vector_cross(up, unit), width);
-        *v = texture_axis(flattening, up, width * texture->height / texture->width);
-    } else if (look->checker) {
-        Vector3 across = axis_across(vector_least_aligned_axis(unit), unit);
-        *u = checker_axis(flattening, across, look->checker_size);
-        *v = checker_axis(flattening, vector_cross(unit, across), look->checker_size);
+        Quad3 up = texture_up(normal, unit);
+        *u = grid_axis(flattening, quad3_cross(up, unit), width, 1);
+        *v = grid_axis(flattening, up, width * texture->height / texture->width, 1);
+    } else {
+        Quad3 across = axis_across(vector_least_aligned_axis(vector_normalize(normal)), unit);
+        *u = grid_axis(flattening, across, look->checker_size, 2);
+        *v = grid_axis(flattening, quad3_cross(unit, across), look->checker_size, 2);
     }
 }
 
