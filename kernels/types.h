@@ -208,7 +208,8 @@ typedef struct {
     uint4 color; // xyz: the bits of red, green and blue as floats
 } Texel;
 
-enum { OPAQUE = 0x7fffffff }; // in optical_depth.x: no light passes
+enum { OPAQUE = 0x7fffffff };     // in optical_depth.x: no light passes
+enum { PASSING_DEPTH_MAX = 125 }; // the largest -log2(transmission) of which a float is normal after rounding
 
 // The largest bounce depth.
 enum { BOUNCES_MAX = 255 };

@@ -530,13 +530,39 @@ static void checkers_far_out_are_decided(void **state)
         }
 }
 
+// Mirrors and glass that leave so little of the light that a product of their parts underflows: no path ends
+// before it has all its bounces, and no shadow is full.
+static void faint_paths_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    const double parts[] = {0.5, 1e-3, 1e-20, 1e-50};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
+        scene.materials.items[0].reflection = parts[i];
+        for (int side = -1; side <= 1; side += 2)
+            array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, side}, {0, 0, 1}}}));
+        assert_true(check_small(&scene, 40, "facing mirrors", parts[i]) < SMALL_SIDE);
+        scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
+        point_light_add(&scene, (Vector3){0, 0, 3}, 1);
+        array_push(scene.materials, scene.materials.items[0]);
+        scene.materials.items[1].transmission = parts[i];
+        array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, -9}, {0, 0, 1}}}));
+        for (int k = 0; k < 8; k++) // one after another in view, and on the way to the light
+            array_push(scene.objects, ((Object){.kind = SHAPE_PLANE,
+                                                .material = 1,
+                                                .as.plane = {{0, 0, k < 4 ? -1 - k : k / 4.0}, {0, 0, 1}}}));
+        assert_true(check_small(&scene, 6, "panes of glass", parts[i]) < SMALL_SIDE);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(flat_shapes_are_decided),     cmocka_unit_test(round_shapes_are_decided),
-        cmocka_unit_test(planets_are_decided),         cmocka_unit_test(mirrors_glass_and_spots_are_decided),
-        cmocka_unit_test(hard_cases_are_decided),      cmocka_unit_test(lights_on_surfaces_are_decided),
-        cmocka_unit_test(checkers_far_out_are_decided)};
+        cmocka_unit_test(flat_shapes_are_decided),      cmocka_unit_test(round_shapes_are_decided),
+        cmocka_unit_test(planets_are_decided),          cmocka_unit_test(mirrors_glass_and_spots_are_decided),
+        cmocka_unit_test(hard_cases_are_decided),       cmocka_unit_test(lights_on_surfaces_are_decided),
+        cmocka_unit_test(checkers_far_out_are_decided), cmocka_unit_test(faint_paths_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

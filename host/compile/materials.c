@@ -1,11 +1,19 @@
 #include "host/compile/stages.h"
 
+#include <float.h>
+
 static uint4 optical_depth_of(double transmission)
 {
-    double log2_loss = transmission > 0 ? -log2(transmission) : INFINITY;
-    if (log2_loss >= 127) return (uint4){OPAQUE, 0, 0, 0};
+    if (transmission == 0) return (uint4){OPAQUE, 0, 0, 0};
+    const double log2_loss = fmin(-log2(transmission), PASSING_DEPTH_MAX);
     uint64_t fine = (uint64_t)llround(ldexp(log2_loss, 48));
     return (uint4){(uint32_t)llround(ldexp(log2_loss, 24)), (uint32_t)fine, (uint32_t)(fine >> 32), 0};
+}
+
+// A part that no precision rounds to 0, which would end the path.
+static double part_of_light(double part)
+{
+    return part > 0 ? fmax(part, FLT_MIN) : 0;
 }
 
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
@@ -21,7 +29,8 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
                                 material->ambient),
             .diffuse = scalar4_of(material->diffuse, material->specular),
             .other_color = scalar4_of(material->checker_colors[1], material->shininess),
-            .reflection_transmission_ior = {material->reflection, material->transmission, material->ior, 0},
+            .reflection_transmission_ior = {part_of_light(material->reflection),
+                                            part_of_light(material->transmission), material->ior, 0},
             .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
         };
         if (material->checker) // the remainders are exact, quotients far from the origin are not

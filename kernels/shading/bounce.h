@@ -230,6 +230,15 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     refracted->weight = vector_select(*doubt, none, refracted->weight);
 }
 
+// A part of the weight, which no product rounds to 0: paths end where nothing reflects or transmits.
+static inline Color3 weight_part(Color3 weight, real part)
+{
+    const real zero = (real)(0);
+    real least = lanes_select((part > zero) & (weight.x > zero), (real)(SMALLEST_RATIO), zero);
+    Color3 product = vector_scale(weight, part);
+    return (Color3){real_max(product.x, least), real_max(product.y, least), real_max(product.z, least)};
+}
+
 // The reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of total
 // internal reflection, whose reflected ray carries the transmission as well. Unless `all`, a ray that no lane
 // carries is not set.
@@ -244,13 +253,13 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
         real transmission = lanes_select(total, (real)(0), surface->transmission);
         reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
         refracted->origin = secondary_ray_origin(surface, true);
-        refracted->weight = vector_scale(weight, transmission);
+        refracted->weight = weight_part(weight, transmission);
         total = total & transparent;
     }
     if (all || lanes_any(reflection > (real)(0))) {
         reflected->direction = surface_reflect(surface, direction);
         reflected->origin = secondary_ray_origin(surface, false);
-        reflected->weight = vector_scale(weight, reflection);
+        reflected->weight = weight_part(weight, reflection);
     }
     if (HAS_IMAGES) reflected->travelled = refracted->travelled = surface->travelled;
     return total;

@@ -22,15 +22,18 @@ typedef struct {
     real rival;
 } Traversal;
 
-// Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_MAX is that of opaque objects.
+// Optical depths are -log2(transmission) in integer steps. OPTICAL_DEPTH_MAX is that of opaque objects;
+// transparent ones add up to no more than OPTICAL_DEPTH_PASSING, which still lets light pass.
 #if IS_DOUBLE
-#define OPTICAL_DEPTH_STEPS 0x1p48
-#define LN_2                0x1.62e42fefa39efp-1
-#define OPTICAL_DEPTH_MAX   0x7f000000000000L
+#define OPTICAL_DEPTH_STEPS   0x1p48
+#define LN_2                  0x1.62e42fefa39efp-1
+#define OPTICAL_DEPTH_MAX     0x7f000000000000L
+#define OPTICAL_DEPTH_PASSING ((long)PASSING_DEPTH_MAX << 48)
 #else
-#define OPTICAL_DEPTH_STEPS 0x1p24f
-#define LN_2                0x1.62e43p-1f
-#define OPTICAL_DEPTH_MAX   OPAQUE
+#define OPTICAL_DEPTH_STEPS   0x1p24f
+#define LN_2                  0x1.62e43p-1f
+#define OPTICAL_DEPTH_MAX     OPAQUE
+#define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
 
 static inline integer object_optical_depth(const Scene *scene, uint id)
@@ -56,11 +59,12 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
         return;
     }
     integer optical_depth = object_optical_depth(scene, id);
-    const integer largest = (integer)(OPTICAL_DEPTH_MAX);
+    const integer opaque = (integer)(OPTICAL_DEPTH_MAX);
+    integer largest = lanes_select(optical_depth < opaque, (integer)(OPTICAL_DEPTH_PASSING), opaque);
     integer saturated_sum = lanes_select(traversal->optical_depth < largest - optical_depth,
                                          traversal->optical_depth + optical_depth, largest);
     traversal->optical_depth = lanes_select(found, saturated_sum, traversal->optical_depth);
-    traversal->active = traversal->active & (traversal->optical_depth < largest);
+    traversal->active = traversal->active & (traversal->optical_depth < opaque);
 }
 
 // Records crossings in the lanes `found`. Of equally near ones the lowest id counts, so that the image does
