@@ -60,7 +60,7 @@ static void passes_give_the_bits_of_one_render(void **state)
 
 static unsigned stop_countdown;
 
-static bool stop(void)
+static bool stop_now(void)
 {
     return stop_countdown-- == 0;
 }
@@ -72,7 +72,7 @@ static void passes_stop(void **state)
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.sample_count = SAMPLES;
     settings.band_rows = 8;
-    settings.stop = stop;
+    settings.stop = stop_now;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
     for (unsigned launches = 0; launches < 9; launches++) {

@@ -45,7 +45,7 @@ static void sample_has_a_pixel_of_each_cell(void **state)
         for (uint32_t x = 0; x < sample.width; x++)
             counts[place_in_cell(&whole, sample.color + 3 * ((size_t)y * sample.width + x), x, y)]++;
     for (unsigned i = 0; i < CELL * CELL; i++)
-        assert_in_range(counts[i], 0, 24); // of 140; the background's first counts for all
+        assert_true(counts[i] <= 24); // of 140; the background's first counts for all
     film_free(&whole);
     film_free(&sample);
     film_free(&in_bands);

@@ -70,7 +70,7 @@ static void check_folder(void **state)
         count++;
     }
     closedir(entries);
-    assert_in_range(count, BROKEN_SCENES_MIN, SIZE_MAX);
+    assert_true(count >= BROKEN_SCENES_MIN);
 }
 
 // The longest literal part of a format, which identifies the message.
@@ -132,7 +132,7 @@ static void test_every_message_has_a_scene(void **state)
     text_appendf(&all_expected,
                  "a scene of more than 2 GiB"); // tests/test_scene_yaml.c has it, without a file
     size_t count = check_sources("host/import") + check_sources("host/import/yaml");
-    assert_in_range(count, 40, SIZE_MAX);
+    assert_true(count >= 40);
     text_free(&all_expected);
 }
 
