@@ -45,7 +45,7 @@ static void check_text(const char *value, const char *expected)
 static void check_key(const char *key, const char *expected)
 {
     Json *json = json_open();
-    json_null(json, key);
+    json_none(json, key);
     char *printed = json_printed(json), *whole;
     assert_true(asprintf(&whole, "{\n  %s: null\n}\n", expected) > 0);
     assert_string_equal(printed, whole);
@@ -156,10 +156,10 @@ static void test_number_words(void **state)
     json_number(json, NULL, 1e20);
     json_number(json, NULL, NAN);
     json_number(json, NULL, -INFINITY);
-    json_integer(json, NULL, INT64_MIN);
-    json_integer(json, NULL, INT64_MAX);
-    json_boolean(json, NULL, true);
-    json_boolean(json, NULL, false);
+    json_int64(json, NULL, INT64_MIN);
+    json_int64(json, NULL, INT64_MAX);
+    json_bool(json, NULL, true);
+    json_bool(json, NULL, false);
     json_text(json, NULL, NULL);
     json_end(json);
     char *printed = json_printed(json);
@@ -179,13 +179,13 @@ static void test_nesting(void **state)
     json_end(json);
     json_begin_array(json, "rows");
     json_begin_object(json, NULL);
-    json_integer(json, "a", 1);
+    json_int64(json, "a", 1);
     json_end(json);
     json_begin_array(json, NULL);
-    json_integer(json, NULL, 2);
+    json_int64(json, NULL, 2);
     json_end(json);
     json_end(json);
-    json_integer(json, "last", 3);
+    json_int64(json, "last", 3);
     char *printed = json_printed(json);
     spaces_remove(printed);
     assert_string_equal(printed, "{\"empty\":{},\"none\":[],\"rows\":[{\"a\":1},[2]],\"last\":3}");

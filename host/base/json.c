@@ -113,7 +113,7 @@ static void json_word(Json *json, const char *key, const char *word)
 void json_text(Json *json, const char *key, const char *value)
 {
     if (!value) {
-        json_null(json, key);
+        json_none(json, key);
         return;
     }
     json_emit_key(json, key);
@@ -134,19 +134,19 @@ void json_number(Json *json, const char *key, double value)
     json_word(json, key, word);
 }
 
-void json_integer(Json *json, const char *key, int64_t value)
+void json_int64(Json *json, const char *key, int64_t value)
 {
     char word[32];
     snprintf(word, sizeof word, "%" PRId64, value);
     json_word(json, key, word);
 }
 
-void json_boolean(Json *json, const char *key, bool value)
+void json_bool(Json *json, const char *key, bool value)
 {
     json_word(json, key, value ? "true" : "false");
 }
 
-void json_null(Json *json, const char *key)
+void json_none(Json *json, const char *key)
 {
     json_word(json, key, "null");
 }

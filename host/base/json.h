@@ -16,8 +16,8 @@ void json_begin_array(Json *json, const char *key);
 void json_end(Json *json);                                      // of the innermost object or array
 void json_text(Json *json, const char *key, const char *value); // NULL value: null
 void json_number(Json *json, const char *key, double value);    // shortest that reads back; NaN, inf: null
-void json_integer(Json *json, const char *key, int64_t value);
-void json_boolean(Json *json, const char *key, bool value);
-void json_null(Json *json, const char *key);
+void json_int64(Json *json, const char *key, int64_t value);
+void json_bool(Json *json, const char *key, bool value);
+void json_none(Json *json, const char *key);
 // Prints the document and one newline, and frees it.
 void json_print(Json *json, FILE *stream);

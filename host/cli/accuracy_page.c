@@ -77,7 +77,7 @@ static void image_json(Json *json, const AccuracyScene *scene, float *values)
     json_begin_object(json, NULL);
     json_begin_array(json, "variants");
     for (size_t i = 0; i < scene->variant_count; i++)
-        if (same_image(scene, scene->variants[i].image, values)) json_integer(json, NULL, (int64_t)i);
+        if (same_image(scene, scene->variants[i].image, values)) json_int64(json, NULL, (int64_t)i);
     json_end(json);
     uint8_t *colors = memory_allocate(count, 1);
     transfer_quantize(colors, values, count, scene->display_values ? TRANSFER_NONE : TRANSFER_SRGB, 8);
@@ -120,7 +120,7 @@ static void scene_json(Json *json, const AccuracyScene *scene)
 Json *accuracy_page_extras(const AccuracyReport *report)
 {
     Json *json = json_open();
-    json_integer(json, "difference_decades", DECADES);
+    json_int64(json, "difference_decades", DECADES);
     json_begin_array(json, "difference_colors");
     Rgb8 colors[STEP_COUNT];
     step_colors(colors);

@@ -230,13 +230,13 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
         json_text(json, "file", scene->reference.file);
     } else {
         json_text(json, "precision", scene->reference.precision);
-        json_integer(json, "lanes", scene->reference.lanes);
+        json_int64(json, "lanes", scene->reference.lanes);
         json_text(json, "bvh", scene->reference.bvh);
-        json_integer(json, "samples", scene->reference.samples);
+        json_int64(json, "samples", scene->reference.samples);
         hash_json(json, "kernel_hash", scene->reference.kernel_hash);
     }
-    json_integer(json, "nonfinite", (int64_t)scene->reference.nonfinite);
-    json_integer(json, "negative", (int64_t)scene->reference.negative);
+    json_int64(json, "nonfinite", (int64_t)scene->reference.nonfinite);
+    json_int64(json, "negative", (int64_t)scene->reference.negative);
     saved_json(json, report, index, NULL);
     json_end(json);
 
@@ -244,12 +244,12 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
     if (scene->reference.file) {
         unavailable_json(json, "the reference has colors only");
     } else {
-        json_integer(json, "silhouette", (int64_t)scene->edges.silhouette_pixels);
+        json_int64(json, "silhouette", (int64_t)scene->edges.silhouette_pixels);
         json_begin_array(json, "shadow");
         for (uint32_t i = 0; i < scene->light_count; i++)
-            json_integer(json, NULL, (int64_t)scene->edges.shadow_edge_pixels[i]);
+            json_int64(json, NULL, (int64_t)scene->edges.shadow_edge_pixels[i]);
         json_end(json);
-        json_integer(json, "path", (int64_t)scene->edges.path_pixels);
+        json_int64(json, "path", (int64_t)scene->edges.path_pixels);
     }
     json_end(json);
 }
@@ -257,8 +257,8 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
 static void count_json(Json *json, const char *key, EdgeCount count)
 {
     json_begin_object(json, key);
-    json_integer(json, "edge", (int64_t)count.edge);
-    json_integer(json, "away", (int64_t)count.away);
+    json_int64(json, "edge", (int64_t)count.edge);
+    json_int64(json, "away", (int64_t)count.away);
     json_end(json);
 }
 
@@ -277,7 +277,7 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
     count_json(json, "path", errors->path);
     if (errors->shading_pixels > 0) {
         json_begin_object(json, "shading");
-        json_integer(json, "pixels", (int64_t)errors->shading_pixels);
+        json_int64(json, "pixels", (int64_t)errors->shading_pixels);
         json_number(json, "max", errors->shading.largest);
         json_number(json, "rmse", errors->shading.rmse);
         json_number(json, "p99_9", errors->shading.percentile_999);
@@ -288,12 +288,12 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
     }
     if (errors->surface_pixels > 0) {
         json_begin_object(json, "t");
-        json_integer(json, "pixels", (int64_t)errors->surface_pixels);
+        json_int64(json, "pixels", (int64_t)errors->surface_pixels);
         extremes_json(json, "relative", errors->t_relative);
         extremes_json(json, "ulps", errors->t_ulps);
         json_end(json);
         json_begin_object(json, "normal");
-        json_integer(json, "pixels", (int64_t)errors->surface_pixels);
+        json_int64(json, "pixels", (int64_t)errors->surface_pixels);
         extremes_json(json, NULL, errors->normal);
         json_end(json);
     } else {
@@ -305,8 +305,8 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
 static void errors_json(Json *json, const AccuracyErrors *errors)
 {
     json_begin_object(json, "errors");
-    json_integer(json, "nonfinite", (int64_t)errors->nonfinite);
-    json_integer(json, "negative", (int64_t)errors->negative);
+    json_int64(json, "nonfinite", (int64_t)errors->nonfinite);
+    json_int64(json, "negative", (int64_t)errors->negative);
     if (errors->why_colors_only)
         for (unsigned kind = 0; kind < ACCURACY_IMAGE; kind++)
             absent_json(json, accuracy_kind_names[kind], errors->why_colors_only);
@@ -318,8 +318,8 @@ static void errors_json(Json *json, const AccuracyErrors *errors)
     json_number(json, "psnr", errors->image.psnr);
     json_number(json, "rel_mse", errors->image.rel_mse);
     json_number(json, "srgb_psnr", display->srgb_psnr);
-    json_integer(json, "off_by_1", (int64_t)display->off_by_1);
-    json_integer(json, "off_by_more", (int64_t)display->off_by_more);
+    json_int64(json, "off_by_1", (int64_t)display->off_by_1);
+    json_int64(json, "off_by_more", (int64_t)display->off_by_more);
     json_number(json, "flip_mean", display->flip_mean);
     json_number(json, "flip_max", display->flip_max);
     json_end(json);
@@ -330,14 +330,14 @@ static void worst_json(Json *json, AccuracyKind kind, const AccuracyWorst *worst
 {
     const char *name = accuracy_kind_names[kind];
     if (!worst->found) {
-        json_null(json, name);
+        json_none(json, name);
         return;
     }
     json_begin_object(json, name);
-    json_integer(json, "x", worst->x);
-    json_integer(json, "y", worst->y);
-    if (kind <= ACCURACY_PATH) json_boolean(json, "away", worst->away);
-    if (kind == ACCURACY_SHADOW) json_integer(json, "light", worst->light);
+    json_int64(json, "x", worst->x);
+    json_int64(json, "y", worst->y);
+    if (kind <= ACCURACY_PATH) json_bool(json, "away", worst->away);
+    if (kind == ACCURACY_SHADOW) json_int64(json, "light", worst->light);
     json_number(json, "error", worst->error);
     if (kind != ACCURACY_NORMAL) {
         json_number(json, "reference", worst->reference);
@@ -350,7 +350,7 @@ static void worst_json(Json *json, AccuracyKind kind, const AccuracyWorst *worst
 
 static void measured_json(Json *json, const AccuracyVariant *variant)
 {
-    json_boolean(json, "crossed_out", variant->disqualified != 0);
+    json_bool(json, "crossed_out", variant->disqualified != 0);
     json_begin_array(json, "why");
     const char *words;
     for (size_t i = 0; (words = crossed_words(variant, i)); i++)
@@ -364,7 +364,7 @@ static void measured_json(Json *json, const AccuracyVariant *variant)
     json_begin_object(json, "pareto");
     for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
         if (!accuracy_figure(variant, (AccuracyKind)kind).why_not)
-            json_boolean(json, accuracy_kind_names[kind], variant->pareto >> kind & 1);
+            json_bool(json, accuracy_kind_names[kind], variant->pareto >> kind & 1);
     json_end(json);
 }
 
@@ -374,9 +374,9 @@ static void variant_json(Json *json, const AccuracyReport *report, size_t scene,
     const BenchKey *key = &variant->row->key;
     json_begin_object(json, NULL);
     json_text(json, "precision", key->precision);
-    json_integer(json, "lanes", key->lanes);
+    json_int64(json, "lanes", key->lanes);
     json_text(json, "bvh", key->bvh);
-    json_integer(json, "samples", variant->samples);
+    json_int64(json, "samples", variant->samples);
     json_text(json, "status", accuracy_status_names[variant->status]);
     if (variant->status == ACCURACY_UNAVAILABLE) json_text(json, "reason", variant->row->failure);
     if (variant->status == ACCURACY_REFERENCE) json_text(json, "reason", is_reference);
@@ -397,13 +397,13 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
     json_number(json, "budget", pick->budget);
     json_text(json, "measure", accuracy_kind_names[pick->measure]);
     if (pick->variant == SIZE_MAX) {
-        json_null(json, "variant");
+        json_none(json, "variant");
     } else {
         const AccuracyVariant *variant = &scene->variants[pick->variant];
         Figure error = accuracy_figure(variant, pick->measure);
-        json_integer(json, "variant", (int64_t)pick->variant);
+        json_int64(json, "variant", (int64_t)pick->variant);
         if (error.why_not)
-            json_null(json, "error");
+            json_none(json, "error");
         else
             json_number(json, "error", error.value);
         json_number(json, "frame_ms", frame_ms(variant));
@@ -421,9 +421,9 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
     json_begin_object(json, NULL);
     json_text(json, "scene", scene->path);
     size_json(json, scene->width, scene->height);
-    json_integer(json, "pixels", (int64_t)scene->width * scene->height);
-    json_integer(json, "bounces", scene->bounce_count);
-    json_integer(json, "lights", scene->light_count);
+    json_int64(json, "pixels", (int64_t)scene->width * scene->height);
+    json_int64(json, "bounces", scene->bounce_count);
+    json_int64(json, "lights", scene->light_count);
     reference_json(json, report, index);
     json_begin_array(json, "variants");
     for (size_t i = 0; i < scene->variant_count; i++)
@@ -439,7 +439,7 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
 Json *accuracy_json(const AccuracyReport *report)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 1);
+    json_int64(json, "schema", 1);
     json_text(json, "glint", glint_version());
     json_begin_object(json, "device");
     device_json(json, report->device);

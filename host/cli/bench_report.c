@@ -178,7 +178,7 @@ static void report_device_json(Json *json, const BenchReport *report)
                          peak->flops_per_second[1] > 0 ? NULL : "no row computes in double"});
     json_number(json, "gigabytes_per_s", peak->bytes_per_second / 1e9);
     json_text(json, "clock", peak->by_events ? "event" : "host");
-    json_boolean(json, "stable", peak->is_stable);
+    json_bool(json, "stable", peak->is_stable);
     json_end(json);
     json_end(json);
 }
@@ -221,7 +221,7 @@ void samples_json(Json *json, const char *key, const Series *seconds)
 
 void report_start_json(Json *json)
 {
-    json_integer(json, "schema", BENCH_SCHEMA);
+    json_int64(json, "schema", BENCH_SCHEMA);
     json_text(json, "glint", glint_version());
     time_t now = time(NULL);
     struct tm utc;
@@ -235,7 +235,7 @@ void report_start_json(Json *json)
     json_text(json, "system", host.sysname);
     json_text(json, "release", host.release);
     json_text(json, "machine", host.machine);
-    json_integer(json, "processors", sysconf(_SC_NPROCESSORS_ONLN));
+    json_int64(json, "processors", sysconf(_SC_NPROCESSORS_ONLN));
     json_end(json);
     json_begin_object(json, "build");
     json_text(json, "commit", glint_commit());
@@ -248,11 +248,11 @@ void key_json(Json *json, const BenchKey *key)
     json_text(json, "scene", key->scene);
     hash_json(json, "scene_hash", key->scene_hash);
     json_text(json, "precision", key->precision);
-    json_integer(json, "lanes", key->lanes);
+    json_int64(json, "lanes", key->lanes);
     json_text(json, "bvh", key->bvh);
     size_json(json, key->width, key->height);
-    json_integer(json, "samples", key->samples);
-    json_integer(json, "bounces", key->bounces);
+    json_int64(json, "samples", key->samples);
+    json_int64(json, "bounces", key->bounces);
 }
 
 static void results_json(Json *json, const BenchReport *report, size_t i)
@@ -268,7 +268,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     figure_json(json, "cached", 1e3, row->build_cached);
     json_end(json);
     rays_json(json, row);
-    json_boolean(json, "traverses_bvh", row->traverses_bvh);
+    json_bool(json, "traverses_bvh", row->traverses_bvh);
     figure_json(json, "peak_fraction", 1, bench_peak_fraction(row, report->peak));
     json_number(json, "bandwidth_fraction", bench_bandwidth_fraction(row, report->peak));
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);

@@ -140,27 +140,27 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
 {
     json_begin_object(json, NULL);
     json_text(json, "precision", precision_names[precision]);
-    json_integer(json, "compared", (int64_t)errors->compared);
+    json_int64(json, "compared", (int64_t)errors->compared);
     json_begin_object(json, "wrong");
-    json_integer(json, "object", (int64_t)errors->object);
-    json_integer(json, "shadow", (int64_t)errors->shadow);
-    json_integer(json, "path", (int64_t)errors->path);
+    json_int64(json, "object", (int64_t)errors->object);
+    json_int64(json, "shadow", (int64_t)errors->shadow);
+    json_int64(json, "path", (int64_t)errors->path);
     json_number(json, "margin", errors->margin);
     json_end(json);
     json_begin_object(json, "color");
-    json_integer(json, "pixels", (int64_t)errors->colors);
+    json_int64(json, "pixels", (int64_t)errors->colors);
     json_number(json, "max_right", errors->color);
     json_number(json, "max_wrong", errors->wrong_color);
-    json_integer(json, "x", errors->worst[0]);
-    json_integer(json, "y", errors->worst[1]);
+    json_int64(json, "x", errors->worst[0]);
+    json_int64(json, "y", errors->worst[1]);
     json_end(json);
     if (precision == PRECISION_CERTIFIED) {
-        json_integer(json, "wrong_decided", (int64_t)errors->wrong_decided);
+        json_int64(json, "wrong_decided", (int64_t)errors->wrong_decided);
         json_begin_object(json, "undecided");
-        json_integer(json, "pixels", (int64_t)doubts->count);
-        json_integer(json, "examined", (int64_t)doubts->examined);
-        json_integer(json, "witnessed", (int64_t)doubts->witnessed);
-        json_integer(json, "close", (int64_t)doubts->close);
+        json_int64(json, "pixels", (int64_t)doubts->count);
+        json_int64(json, "examined", (int64_t)doubts->examined);
+        json_int64(json, "witnessed", (int64_t)doubts->witnessed);
+        json_int64(json, "close", (int64_t)doubts->close);
         json_end(json);
     }
     json_end(json);
@@ -170,7 +170,7 @@ static void json_report(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
     Json *json = json_open();
-    json_integer(json, "schema", 1);
+    json_int64(json, "schema", 1);
     json_text(json, "glint", glint_version());
     json_begin_object(json, "device");
     device_json(json, certification->compute->device);
@@ -179,14 +179,14 @@ static void json_report(const Certification *certification)
                  certification->options->common.perturb_scale);
     json_text(json, "scene", certification->options->scene);
     size_json(json, sample->width, sample->height);
-    json_integer(json, "bounces", certification->options->bounce_count);
-    json_integer(json, "pixels", (int64_t)sample->count);
-    json_integer(json, "reference_bits", QUAD_BITS);
+    json_int64(json, "bounces", certification->options->bounce_count);
+    json_int64(json, "pixels", (int64_t)sample->count);
+    json_int64(json, "reference_bits", QUAD_BITS);
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
     size_t undecided = 0;
     for (size_t i = 0; i < sample->count; i++)
         undecided += reference_is_undecided(&sample->pixels[i]);
-    json_integer(json, "reference_undecided", (int64_t)undecided);
+    json_int64(json, "reference_undecided", (int64_t)undecided);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured)

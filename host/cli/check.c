@@ -105,8 +105,8 @@ static void messages_json(Json *json, const MessageList *messages)
             if (message->severity != severity) continue;
             json_begin_object(json, NULL);
             json_text(json, "file", message->file);
-            json_integer(json, "line", message->line);
-            json_integer(json, "column", message->column);
+            json_int64(json, "line", message->line);
+            json_int64(json, "column", message->column);
             json_text(json, "text", message->text);
             json_end(json);
         }
@@ -117,22 +117,22 @@ static void messages_json(Json *json, const MessageList *messages)
 static void json_report(const char *path, const Scene *scene, bool loaded, const MessageList *messages)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 1);
+    json_int64(json, "schema", 1);
     json_text(json, "scene", path);
-    json_boolean(json, "valid", loaded);
+    json_bool(json, "valid", loaded);
     if (loaded) {
         SceneFacts facts = facts_of(scene);
-        json_integer(json, "objects", (int64_t)scene->objects.count);
+        json_int64(json, "objects", (int64_t)scene->objects.count);
         json_begin_object(json, "shapes");
         for (size_t kind = 0; kind < SHAPE_COUNT; kind++)
-            json_integer(json, shape_names[kind], (int64_t)facts.shapes[kind]);
+            json_int64(json, shape_names[kind], (int64_t)facts.shapes[kind]);
         json_end(json);
-        json_integer(json, "mesh_triangles", (int64_t)facts.mesh_triangle_count);
-        json_integer(json, "unbounded", (int64_t)facts.unbounded_count);
-        json_integer(json, "lights", (int64_t)scene->lights.count);
-        json_integer(json, "materials", (int64_t)scene->materials.count);
+        json_int64(json, "mesh_triangles", (int64_t)facts.mesh_triangle_count);
+        json_int64(json, "unbounded", (int64_t)facts.unbounded_count);
+        json_int64(json, "lights", (int64_t)scene->lights.count);
+        json_int64(json, "materials", (int64_t)scene->materials.count);
         if (bounds_is_empty(&facts.bounds)) {
-            json_null(json, "bounds");
+            json_none(json, "bounds");
         } else {
             json_begin_object(json, "bounds");
             vector_json(json, "min", facts.bounds.min);

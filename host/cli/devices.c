@@ -26,18 +26,18 @@ static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 1);
-    json_integer(json, "platforms", list->platform_count);
-    json_integer(json, "platforms_without_device", list->empty_platform_count);
+    json_int64(json, "schema", 1);
+    json_int64(json, "platforms", list->platform_count);
+    json_int64(json, "platforms_without_device", list->empty_platform_count);
     json_begin_array(json, "devices");
     for (size_t i = 0; i < list->count; i++) {
         const Device *device = &list->items[i];
         const char *why;
         json_begin_object(json, NULL);
-        json_integer(json, "index", device->index);
-        json_integer(json, "twin", device->same_name_index);
-        json_boolean(json, "default", device == chosen);
-        json_boolean(json, "usable", device_usable(device, &why));
+        json_int64(json, "index", device->index);
+        json_int64(json, "twin", device->same_name_index);
+        json_bool(json, "default", device == chosen);
+        json_bool(json, "usable", device_usable(device, &why));
         json_text(json, "unusable_because", why);
         json_text(json, "name", device->name);
         json_text(json, "type", device_type_name(device->type));
@@ -47,20 +47,20 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_text(json, "platform_version", device->platform_version);
         json_text(json, "version", device->version);
         json_text(json, "driver", device->driver);
-        json_integer(json, "units", device->compute_units);
-        json_integer(json, "clock_mhz", device->clock_mhz);
-        json_integer(json, "lanes", device_lanes(device, false));
-        json_integer(json, "native_float_width", device->native_float_width);
-        json_integer(json, "native_double_width", device->native_double_width);
-        json_boolean(json, "fp64", device->fp64);
-        json_boolean(json, "denormals", device->denormals);
-        json_boolean(json, "fma", device->fma_in_hardware);
-        json_boolean(json, "correctly_rounded_divide_sqrt", device->correctly_rounded);
-        json_boolean(json, "compiler", device->compiler);
-        json_integer(json, "memory_bytes", (int64_t)device->memory_bytes);
-        json_integer(json, "largest_buffer_bytes", (int64_t)device->largest_buffer_bytes);
-        json_integer(json, "local_memory_bytes", (int64_t)device->local_memory_bytes);
-        json_integer(json, "largest_work_group", (int64_t)device->largest_work_group);
+        json_int64(json, "units", device->compute_units);
+        json_int64(json, "clock_mhz", device->clock_mhz);
+        json_int64(json, "lanes", device_lanes(device, false));
+        json_int64(json, "native_float_width", device->native_float_width);
+        json_int64(json, "native_double_width", device->native_double_width);
+        json_bool(json, "fp64", device->fp64);
+        json_bool(json, "denormals", device->denormals);
+        json_bool(json, "fma", device->fma_in_hardware);
+        json_bool(json, "correctly_rounded_divide_sqrt", device->correctly_rounded);
+        json_bool(json, "compiler", device->compiler);
+        json_int64(json, "memory_bytes", (int64_t)device->memory_bytes);
+        json_int64(json, "largest_buffer_bytes", (int64_t)device->largest_buffer_bytes);
+        json_int64(json, "local_memory_bytes", (int64_t)device->local_memory_bytes);
+        json_int64(json, "largest_work_group", (int64_t)device->largest_work_group);
         json_number(json, "timer_resolution_seconds", device->timer_resolution_seconds);
         json_end(json);
     }

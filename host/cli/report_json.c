@@ -10,7 +10,7 @@ void summary_json(Json *json, const char *key, Summary seconds)
     json_number(json, "median", 1e3 * seconds.median);
     json_number(json, "max", 1e3 * seconds.max);
     json_number(json, "quartile_range", 1e3 * seconds.quartile_range);
-    json_integer(json, "runs", (int64_t)seconds.count);
+    json_int64(json, "runs", (int64_t)seconds.count);
     json_end(json);
 }
 
@@ -38,15 +38,15 @@ void device_json(Json *json, const Device *device)
     json_text(json, "platform_version", device->platform_version);
     json_text(json, "driver", device->driver);
     json_text(json, "type", device_type_name(device->type));
-    json_integer(json, "units", device->compute_units);
-    json_integer(json, "clock_mhz", device->clock_mhz);
+    json_int64(json, "units", device->compute_units);
+    json_int64(json, "clock_mhz", device->clock_mhz);
 }
 
 void size_json(Json *json, uint32_t width, uint32_t height)
 {
     json_begin_array(json, "size");
-    json_integer(json, NULL, width);
-    json_integer(json, NULL, height);
+    json_int64(json, NULL, width);
+    json_int64(json, NULL, height);
     json_end(json);
 }
 
@@ -61,8 +61,8 @@ void perturb_json(Json *json, uint32_t seed, uint32_t scale)
 {
     if (seed == 0) return;
     json_begin_object(json, "perturb");
-    json_integer(json, "seed", seed);
-    json_integer(json, "scale", scale);
+    json_int64(json, "seed", seed);
+    json_int64(json, "scale", scale);
     json_end(json);
 }
 
@@ -79,7 +79,7 @@ void rays_json(Json *json, const BenchRow *row)
 {
     json_begin_object(json, "rays");
     for (int kind = 0; kind < RAYS_COUNT; kind++)
-        json_integer(json, bench_ray_names[kind], (int64_t)row->rays[kind]);
+        json_int64(json, bench_ray_names[kind], (int64_t)row->rays[kind]);
     json_end(json);
     json_number(json, "mrays_per_s", bench_rays_per_second(row) / 1e6);
 }

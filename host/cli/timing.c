@@ -152,7 +152,7 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
         if (time->trusted)
             json_number(json, "event_ms", 1e3 * time->event_seconds);
         else
-            json_null(json, "event_ms");
+            json_none(json, "event_ms");
         json_number(json, "host_ms", 1e3 * time->host_seconds);
         if (!time->trusted) json_text(json, "doubt", launch_time_doubt(time));
         json_end(json);
@@ -163,7 +163,7 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
 static void share_json(Json *json, const WorkerShare *share, const RenderSettings *settings)
 {
     json_number(json, "share", (double)share->rows / settings->region_height);
-    json_integer(json, "bands", share->bands);
+    json_int64(json, "bands", share->bands);
     json_number(json, "busy_ms", 1e3 * share->busy_seconds);
     json_number(json, "idle_ms", 1e3 * share->idle_seconds);
 }
@@ -176,7 +176,7 @@ static void ranks_json(Json *json, const Ranks *ranks, const RenderSettings *set
         json_text(json, "host", ranks->items[i].host);
         json_text(json, "name", ranks->items[i].device);
         json_text(json, "driver", ranks->items[i].driver);
-        json_integer(json, "lanes", ranks->items[i].lanes[PASS_ALL]);
+        json_int64(json, "lanes", ranks->items[i].lanes[PASS_ALL]);
         share_json(json, &ranks->shares[i], settings);
         json_end(json);
     }
@@ -189,15 +189,15 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_text(json, "name", report->device->name);
     json_text(json, "platform", report->device->platform_name);
     json_text(json, "driver", report->device->driver);
-    json_integer(json, "lanes", report->lanes);
+    json_int64(json, "lanes", report->lanes);
     hash_json(json, "kernel_hash", report->kernel_hash);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
     if (report->features & FEATURE_BVH)
         json_number(json, "bvh_ms", 1e3 * report->bvh_seconds);
     else
-        json_null(json, "bvh_ms");
+        json_none(json, "bvh_ms");
     json_number(json, "build_ms", 1e3 * report->build_seconds);
-    json_boolean(json, "build_from_cache", report->build_from_cache);
+    json_bool(json, "build_from_cache", report->build_from_cache);
     json_number(json, "upload_ms", 1e3 * report->upload_seconds);
     share_json(json, &report->share, settings);
     launches_json(json, "launches", report->launches.items, report->launches.count);
@@ -215,7 +215,7 @@ static void candidate_json(Json *json, const Pilot *pilot, Precision precision)
     if (candidate->status == PILOT_MEASURED) {
         json_number(json, "error", candidate->verdict.error);
         json_number(json, "bound", candidate->verdict.bound);
-        json_boolean(json, "keeps", candidate->verdict.keeps);
+        json_bool(json, "keeps", candidate->verdict.keeps);
         json_number(json, "pixel_ns", 1e9 * candidate->pixel_seconds);
     }
     json_end(json);
@@ -227,7 +227,7 @@ static void pilot_json(Json *json, const Pilot *pilot)
     json_number(json, "limit", pilot->budget.limit);
     json_text(json, "metric", error_metric_names[pilot->budget.metric]);
     json_number(json, "confidence", pilot->confidence);
-    json_integer(json, "pixels", (int64_t)pilot->pixels);
+    json_int64(json, "pixels", (int64_t)pilot->pixels);
     json_number(json, "total_ms", 1e3 * pilot->seconds);
     json_number(json, "build_ms", 1e3 * pilot->build_seconds);
     json_begin_array(json, "candidates");
@@ -241,14 +241,14 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
                         const RenderSettings *settings, const HostTimes *host)
 {
     Json *json = json_open();
-    json_integer(json, "schema", 3);
+    json_int64(json, "schema", 3);
     json_text(json, "glint", glint_version());
     size_json(json, settings->region_width, settings->region_height);
-    json_integer(json, "samples", settings->sample_count);
+    json_int64(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     if (settings->precision == PRECISION_CERTIFIED) {
-        json_integer(json, "repeated_samples", (int64_t)host->repeats.repeated);
-        json_integer(json, "undecided_samples", (int64_t)host->repeats.undecided);
+        json_int64(json, "repeated_samples", (int64_t)host->repeats.repeated);
+        json_int64(json, "undecided_samples", (int64_t)host->repeats.undecided);
     }
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);

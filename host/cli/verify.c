@@ -79,14 +79,14 @@ static void result_add_json(Json *json, const VerifyResult *result, double secon
     json_begin_object(json, NULL);
     json_text(json, "name", result->name);
     json_text(json, "title", result->title);
-    json_boolean(json, "passed", verify_holds(result));
-    json_integer(json, "rays", (int64_t)result->ray_count);
-    json_integer(json, "wrong", (int64_t)result->wrong);
-    json_integer(json, "leaks", (int64_t)result->leaks);
-    json_integer(json, "unsound", (int64_t)result->unsound);
-    json_integer(json, "off", (int64_t)result->off_surface);
-    json_integer(json, "turned", (int64_t)result->wrong_normals);
-    json_integer(json, "differing", (int64_t)result->differing);
+    json_bool(json, "passed", verify_holds(result));
+    json_int64(json, "rays", (int64_t)result->ray_count);
+    json_int64(json, "wrong", (int64_t)result->wrong);
+    json_int64(json, "leaks", (int64_t)result->leaks);
+    json_int64(json, "unsound", (int64_t)result->unsound);
+    json_int64(json, "off", (int64_t)result->off_surface);
+    json_int64(json, "turned", (int64_t)result->wrong_normals);
+    json_int64(json, "differing", (int64_t)result->differing);
     json_number(json, "surface_part", result->worst_position_ratio);
     json_number(json, "normal_part", result->worst_normal_ratio);
     json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
@@ -142,11 +142,11 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
     double seconds = clock_seconds() - start;
     if (json) {
         json_end(json);
-        json_integer(json, "lanes", kernels.lanes);
+        json_int64(json, "lanes", kernels.lanes);
         hash_json(json, "trace_kernel", kernels.trace_hash);
         hash_json(json, "render_kernel", kernels.render_hash);
-        json_integer(json, "passed", (int64_t)report.passed);
-        json_integer(json, "failed", (int64_t)report.failed);
+        json_int64(json, "passed", (int64_t)report.passed);
+        json_int64(json, "failed", (int64_t)report.failed);
         json_number(json, "seconds", seconds);
         json_end(json);
     } else if (compute_ok(compute)) {
@@ -161,9 +161,9 @@ static size_t precision_verify(Compute *compute, const VerifyOptions *options, P
 // What the results are of.
 static void origin_add_json(Json *json, const Device *device, const CommonOptions *common)
 {
-    json_integer(json, "schema", 3);
+    json_int64(json, "schema", 3);
     json_text(json, "glint", glint_version());
-    json_integer(json, "reference_bits", verify_reference_bits());
+    json_int64(json, "reference_bits", verify_reference_bits());
     json_begin_object(json, "device");
     device_json(json, device);
     json_end(json);
