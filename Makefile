@@ -7,7 +7,7 @@ BUILD  ?= build
 CFLAGS ?= $(if $(filter %-sanitize,$(BUILD)),-O1,-O2) -g
 PKG_CONFIG ?= pkg-config
 
-packages := libfyaml libpng libturbojpeg OpenEXR assimp libsodium OpenCL
+packages := libfyaml jansson libpng libturbojpeg OpenEXR assimp libsodium OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
 ifneq ($(shell $(PKG_CONFIG) --exists $(packages) && echo found),found)
 $(error Libraries are missing; tools/setup installs or lists them)
@@ -31,7 +31,7 @@ OURS     := -std=c11 -D_GNU_SOURCE -I. -Wall -Wextra -Wpedantic -Wshadow -Wconve
             $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
             -DHAS_WINDOW=$(or $(has_window),0) $(sanitize) $(reproducible)
 # Of OpenEXR only the library with the C interface.
-LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml libpng libturbojpeg assimp libsodium OpenCL) \
+LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson libpng libturbojpeg assimp libsodium OpenCL) \
             $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail
@@ -112,6 +112,9 @@ $(failing_tests): $(failing_objects)
 
 # The paces of its workers are exact.
 $(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds
+
+# An allocation fails.
+$(BUILD)/tests/test_bench: private LDFLAGS += -Wl,--wrap=malloc
 
 # A file is removed before it is locked, or cannot be removed.
 $(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock -Wl,--wrap=unlink

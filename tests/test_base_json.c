@@ -1,7 +1,10 @@
 // JSON out: every text and number must read back as it was, with its type.
+#include "host/base/fault.h"
 #include "host/base/json.h"
+#include "tests/child.h"
 
 #include <float.h>
+#include <jansson.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,16 +22,6 @@ static char *json_printed(Json *json)
     json_print(json, stream);
     assert_int_equal(fclose(stream), 0);
     return bytes;
-}
-
-// Where a layout is libfyaml's own affair.
-static void spaces_remove(char *text)
-{
-    char *to = text;
-    for (const char *from = text; *from; from++) {
-        if (*from != ' ' && *from != '\n') *to++ = *from;
-    }
-    *to = '\0';
 }
 
 static void check_text(const char *value, const char *expected)
@@ -99,17 +92,24 @@ static void test_escapes(void **state)
     check_text("a\"b\\c/", "\"a\\\"b\\\\c/\"");
     check_text("\n\t\r", "\"\\n\\t\\r\"");
     check_text("a\nb\n\n c\n", "\"a\\nb\\n\\n c\\n\"");
-    check_text("\x01\x1f", "\"\\u0001\\u001F\"");
+    check_text("\b\f", "\"\\b\\f\"");
+    check_text("\x01\x1f\x7f", "\"\\u0001\\u001F\x7f\"");
     check_text("\\n", "\"\\\\n\"");
 }
+
+#define REPLACED "\xEF\xBF\xBD" // U+FFFD
 
 static void test_utf8(void **state)
 {
     (void)state;
     check_text("\xC3\xA9\xE2\x98\x83", "\"\xC3\xA9\xE2\x98\x83\"");
-    check_text("\xF0\x9F\x98\x80", "\"\\uD83D\\uDE00\"");
-    check_text("a\xFF\xC3", "\"a\xEF\xBF\xBD\xEF\xBF\xBD\"");
-    check_text("\xEF\xB7\x90", "\"\xEF\xBF\xBD\"");
+    check_text("\xF0\x9F\x98\x80", "\"\xF0\x9F\x98\x80\"");
+    check_text("\xEF\xB7\x90\xEF\xBF\xBF", "\"\xEF\xB7\x90\xEF\xBF\xBF\""); // noncharacters
+    check_text("a\xFF\xC3", "\"a" REPLACED REPLACED "\"");
+    check_text("\xC0\x80", "\"" REPLACED REPLACED "\"");                    // an overlong NUL
+    check_text("\xED\xA0\x80", "\"" REPLACED REPLACED REPLACED "\"");       // a surrogate
+    check_text("\xF0\x9F\x98\"", "\"" REPLACED REPLACED REPLACED "\\\"\""); // cut short
+    check_text(" \xFF ", "\" " REPLACED " \"");
 }
 
 static void test_long_text_stays_on_its_line(void **state)
@@ -154,6 +154,10 @@ static void test_number_words(void **state)
     json_begin_array(json, "all");
     json_number(json, NULL, 0.1);
     json_number(json, NULL, 1e20);
+    json_number(json, NULL, 1e308);
+    json_number(json, NULL, -DBL_MAX);
+    json_number(json, NULL, DBL_TRUE_MIN);
+    json_number(json, NULL, -0.0);
     json_number(json, NULL, NAN);
     json_number(json, NULL, -INFINITY);
     json_int64(json, NULL, INT64_MIN);
@@ -163,9 +167,23 @@ static void test_number_words(void **state)
     json_text(json, NULL, NULL);
     json_end(json);
     char *printed = json_printed(json);
-    spaces_remove(printed);
-    assert_string_equal(printed, "{\"all\":[0.1,1e+20,null,null,-9223372036854775808,9223372036854775807,"
-                                 "true,false,null]}");
+    assert_string_equal(printed, "{\n"
+                                 "  \"all\": [\n"
+                                 "    0.1,\n"
+                                 "    1e+20,\n"
+                                 "    1e+308,\n"
+                                 "    -1.7976931348623157e+308,\n"
+                                 "    5e-324,\n"
+                                 "    -0,\n"
+                                 "    null,\n"
+                                 "    null,\n"
+                                 "    -9223372036854775808,\n"
+                                 "    9223372036854775807,\n"
+                                 "    true,\n"
+                                 "    false,\n"
+                                 "    null\n"
+                                 "  ]\n"
+                                 "}\n");
     free(printed);
 }
 
@@ -187,13 +205,76 @@ static void test_nesting(void **state)
     json_end(json);
     json_int64(json, "last", 3);
     char *printed = json_printed(json);
-    spaces_remove(printed);
-    assert_string_equal(printed, "{\"empty\":{},\"none\":[],\"rows\":[{\"a\":1},[2]],\"last\":3}");
+    assert_string_equal(printed, "{\n"
+                                 "  \"empty\": {},\n"
+                                 "  \"none\": [],\n"
+                                 "  \"rows\": [\n"
+                                 "    {\n"
+                                 "      \"a\": 1\n"
+                                 "    },\n"
+                                 "    [\n"
+                                 "      2\n"
+                                 "    ]\n"
+                                 "  ],\n"
+                                 "  \"last\": 3\n"
+                                 "}\n");
     free(printed);
 
     printed = json_printed(json_open());
     assert_string_equal(printed, "{}\n");
     free(printed);
+}
+
+static void test_deep_nesting(void **state)
+{
+    (void)state;
+    enum { DEPTH = 1000 };
+    Json *json = json_open();
+    json_begin_array(json, "deep");
+    for (int i = 0; i < DEPTH; i++)
+        json_begin_array(json, NULL);
+    char *printed = json_printed(json);
+    json_error_t error;
+    json_t *root = json_loads(printed, 0, &error);
+    const json_t *innermost = json_object_get(root, "deep");
+    int depth = 0;
+    for (; json_array_size(innermost) == 1; depth++)
+        innermost = json_array_get(innermost, 0);
+    assert_int_equal(depth, DEPTH);
+    json_decref(root);
+    free(printed);
+}
+
+static long allocations_left; // before one of jansson's fails
+
+static void *allocate(size_t size)
+{
+    return allocations_left-- == 0 ? NULL : malloc(size);
+}
+
+static void text_write(void *left)
+{
+    json_set_alloc_funcs(allocate, free);
+    allocations_left = *(long *)left;
+    Json *json = json_open();
+    json_text(json, "key", "value");
+    free(json_printed(json));
+    *(long *)left = allocations_left;
+}
+
+static void test_without_memory(void **state)
+{
+    (void)state;
+    long left = 0, failed = 0;
+    ChildEnd end = child_run(text_write, &left, sizeof left);
+    for (; end.status != 0; failed++) {
+        assert_int_equal(end.status, EXIT_MACHINE);
+        assert_non_null(strstr(end.errors, "out of memory"));
+        left = failed + 1;
+        end = child_run(text_write, &left, sizeof left);
+    }
+    assert_true(left >= 0);   // none failed unseen
+    assert_true(failed >= 2); // the key and the value
 }
 
 int main(void)
@@ -208,6 +289,8 @@ int main(void)
         cmocka_unit_test(test_numbers_read_back),
         cmocka_unit_test(test_number_words),
         cmocka_unit_test(test_nesting),
+        cmocka_unit_test(test_deep_nesting),
+        cmocka_unit_test(test_without_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,10 @@
 // What glint bench makes of times, worked out by hand: quantiles, which clock is believed, when runs suffice,
 // when a peak is stable, and the rows of an earlier report.
+#include "host/base/fault.h"
 #include "host/measure/baseline.h"
 #include "host/measure/bench.h"
 #include "host/measure/work.h"
+#include "tests/child.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
@@ -11,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -151,18 +154,34 @@ static void test_work_of_a_scene(void **state)
     assert_near(work_flops_per_ray(&scene), triangle + sphere + 10 * triangle, 0);
 }
 
+static long allocations_left = -1; // before one fails
+
+void *__real_malloc(size_t size);
+void *__wrap_malloc(size_t size);
+
+void *__wrap_malloc(size_t size)
+{
+    return allocations_left >= 0 && allocations_left-- == 0 ? NULL : __real_malloc(size);
+}
+
 static Baseline *baseline_of(const char *text, size_t *error_count)
 {
-    char path[] = "/tmp/glint-baseline-XXXXXX";
-    int descriptor = mkstemp(path);
+    char path[32];
+    int descriptor = memfd_create("baseline", 0);
     assert_true(descriptor >= 0);
     assert_int_equal(write(descriptor, text, strlen(text)), strlen(text));
-    close(descriptor);
+    snprintf(path, sizeof path, "/proc/self/fd/%d", descriptor);
     MessageList messages = {0};
     Baseline *baseline = baseline_open(path, &messages);
     *error_count = message_count(&messages, MESSAGE_ERROR);
+    if (*error_count) {
+        char *expected;
+        assert_true(asprintf(&expected, "'%s' is no report of glint bench --json with schema 5", path) > 0);
+        assert_string_equal(messages.items[0].text, expected);
+        free(expected);
+    }
     message_list_free(&messages);
-    unlink(path);
+    close(descriptor);
     return baseline;
 }
 
@@ -205,6 +224,13 @@ static void test_baseline(void **state)
     bench_row_free(&row);
 }
 
+static void check_refused(const char *text)
+{
+    size_t errors;
+    assert_null(baseline_of(text, &errors));
+    assert_int_equal(errors, 1);
+}
+
 static void test_broken_baselines(void **state)
 {
     (void)state;
@@ -213,20 +239,44 @@ static void test_broken_baselines(void **state)
                              "no json: [",
                              "[1, 2]",
                              "{\"schema\": 4, \"runs\": []}",
+                             "{\"schema\": \"5\", \"runs\": []}",
                              "{\"runs\": []}",
                              "\"",
+                             "4",
+                             "null",
                              "{\"schema\": 5}",
-                             "{\"schema\": 5, \"runs\": 3}"};
-    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
-        size_t errors;
-        assert_null(baseline_of(refused[i], &errors));
-        assert_int_equal(errors, 1);
+                             "{\"schema\": 5, \"runs\": 3}",
+                             "{\"schema\": 5, \"runs\": {}}",
+                             "{\"schema\": 5, \"runs\": []} {}",
+                             "{\"schema\": 5, \"runs\": [],}",
+                             "{'schema': 5, 'runs': []}",
+                             "{\"schema\": 5, \"schema\": 5, \"runs\": []}",
+                             "{\"schema\": 5, \"runs\": [1e999]}",
+                             "{\"schema\": 5, \"runs\": [99999999999999999999]}",
+                             "{\"schema\": 5, \"runs\": [NaN]}",
+                             "{\"schema\": 5, \"runs\": [\"\xFF\"]}",
+                             "{\"schema\": 5, \"runs\": [\"\n\"]}",
+                             "{\"schema\": 5, \"runs\": [\"\\u0000\"]}",
+                             "{\"schema\": 5, \"runs\": [\"\\uD800\"]}"};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+        check_refused(refused[i]);
+    // cut short anywhere
+    char whole[] = "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1.5e0, 2]") "]}";
+    for (size_t i = sizeof whole - 1; i-- > 0;) {
+        whole[i] = '\0';
+        check_refused(whole);
     }
+    // nested 100,000 levels deep
+    char deep[100001] = "";
+    memset(deep, '[', sizeof deep - 1);
+    check_refused(deep);
     // rows that say nothing are never found
     const char *empty[] = {"{\"schema\": 5, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
                            "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "{}") "]}",
                            "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[]") "]}",
                            "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 0]") "]}",
+                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, -1e308]") "]}",
+                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, \"2\"]") "]}",
                            "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
     for (size_t i = 0; i < sizeof empty / sizeof *empty; i++) {
         size_t errors;
@@ -238,6 +288,29 @@ static void test_broken_baselines(void **state)
         baseline_close(baseline);
     }
     bench_row_free(&row);
+}
+
+static void baseline_read(void *left)
+{
+    size_t errors;
+    allocations_left = *(long *)left;
+    baseline_close(baseline_of("{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 2]") "]}", &errors));
+    *(long *)left = allocations_left;
+}
+
+static void test_baseline_without_memory(void **state)
+{
+    (void)state;
+    long left = 0, failed = 0;
+    ChildEnd end = child_run(baseline_read, &left, sizeof left);
+    for (; end.status != 0; failed++) {
+        assert_int_equal(end.status, EXIT_MACHINE);
+        assert_non_null(strstr(end.errors, "out of memory"));
+        left = failed + 1;
+        end = child_run(baseline_read, &left, sizeof left);
+    }
+    assert_true(left >= 0);    // none failed unseen
+    assert_true(failed >= 25); // values and keys of the report
 }
 
 static void test_peak_that_repeats(void **state)
@@ -261,7 +334,8 @@ int main(void)
         cmocka_unit_test(test_clock_that_drifts), cmocka_unit_test(test_event_without_times),
         cmocka_unit_test(test_runs_that_scatter), cmocka_unit_test(test_figures),
         cmocka_unit_test(test_work_of_a_scene),   cmocka_unit_test(test_baseline),
-        cmocka_unit_test(test_broken_baselines),  cmocka_unit_test(test_peak_that_repeats),
+        cmocka_unit_test(test_broken_baselines),  cmocka_unit_test(test_baseline_without_memory),
+        cmocka_unit_test(test_peak_that_repeats),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

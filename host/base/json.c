@@ -5,109 +5,97 @@
 #include "host/base/text.h"
 
 #include <inttypes.h>
-#include <libfyaml.h>
+#include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct Json {
-    struct fy_emitter *emitter;
     Text text;
-    bool *items; // whether each open container is an object
+    bool is_empty; // whether the innermost open container is
+    bool *items;   // whether each open container is an object
     size_t count, capacity;
 };
 
-// libfyaml (0.7, 0.8) drops spaces at the ends of a text that YAML could write plainly, even in quotes. They
-// are passed as a noncharacter (The Unicode Standard 15.0, section 23.7), which no text has.
-static const char space_stand_in[] = "\xEF\xB7\x90", replacement_character[] = "\xEF\xBF\xBD";
-
-static int json_output(struct fy_emitter *emitter, enum fy_emitter_write_type type, const char *text,
-                       int length, void *json)
+static int json_output(const char *bytes, size_t length, void *text)
 {
-    (void)emitter, (void)type;
-    text_append(&((Json *)json)->text, text, (size_t)length);
-    return length;
+    text_append(text, bytes, length);
+    return 0;
 }
 
-static void json_emit(Json *json, struct fy_event *event)
+// jansson writes the texts only: 2.14 prints numbers with 17 digits, or all with the same number of them.
+static void json_quote(Json *json, const char *value)
 {
-    if (!event || fy_emit_event(json->emitter, event) != 0) fault("libfyaml cannot write JSON");
-}
-
-static void json_emit_scalar(Json *json, enum fy_scalar_style style, const char *value, size_t length)
-{
-    json_emit(json, fy_emit_event_create(json->emitter, FYET_SCALAR, style, value, length, NULL, NULL));
-}
-
-static void json_emit_text(Json *json, const char *value)
-{
-    Text passed = {0};
-    size_t length = strlen(value), first = strspn(value, " "), last = length;
-    while (last > first && value[last - 1] == ' ')
-        last--;
-    for (size_t i = 0, size; i < length; i += size ? size : 1) {
-        size = text_character_size(value + i, length - i);
-        if (i < first || i >= last)
-            text_append(&passed, space_stand_in, 3);
-        else if (size == 0 || strncmp(value + i, space_stand_in, 3) == 0)
-            text_append(&passed, replacement_character, 3);
-        else
-            text_append(&passed, value + i, size);
+    Text utf8 = {0};
+    for (size_t left = strlen(value), size; left; value += size, left -= size) {
+        size = text_character_size(value, left);
+        text_append(&utf8, size ? value : "\xEF\xBF\xBD", size ? size : 3);
+        if (size == 0) size = 1;
     }
-    json_emit_scalar(json, FYSS_DOUBLE_QUOTED, text_c(&passed), passed.count);
-    text_free(&passed);
+    json_t *string = json_stringn_nocheck(text_c(&utf8), utf8.count);
+    if (!string || json_dump_callback(string, json_output, &json->text, JSON_ENCODE_ANY) != 0)
+        fault("out of memory: JSON");
+    json_decref(string);
+    text_free(&utf8);
 }
 
-static void json_emit_key(Json *json, const char *key)
+static void json_line(Json *json)
+{
+    text_appendf(&json->text, "\n%*s", (int)(2 * json->count), "");
+}
+
+// Writes what precedes a value.
+static void json_next(Json *json, const char *key)
 {
     if (json->count == 0 || json->items[json->count - 1] != (key != NULL))
         fault("JSON: %s", key ? "a key outside an object" : "an object's value without a key");
-    if (key) json_emit_text(json, key);
+    if (!json->is_empty) text_append(&json->text, ",", 1);
+    json->is_empty = false;
+    json_line(json);
+    if (!key) return;
+    json_quote(json, key);
+    text_append(&json->text, ": ", 2);
 }
 
 static void json_begin(Json *json, bool is_object)
 {
-    enum fy_event_type type = is_object ? FYET_MAPPING_START : FYET_SEQUENCE_START;
-    json_emit(json, fy_emit_event_create(json->emitter, type, FYNS_ANY, NULL, NULL));
+    text_append(&json->text, is_object ? "{" : "[", 1);
     array_push(*json, is_object);
+    json->is_empty = true;
 }
 
 Json *json_open(void)
 {
     Json *json = memory_allocate_zeroed(1, sizeof *json);
-    struct fy_emitter_cfg settings = {
-        .flags = FYECF_MODE_JSON | FYECF_WIDTH_INF, .output = json_output, .userdata = json};
-    json->emitter = fy_emitter_create(&settings);
-    if (!json->emitter) fault("libfyaml cannot write JSON");
-    json_emit(json, fy_emit_event_create(json->emitter, FYET_STREAM_START));
-    json_emit(json, fy_emit_event_create(json->emitter, FYET_DOCUMENT_START, 1, NULL, NULL));
     json_begin(json, true);
     return json;
 }
 
 void json_begin_object(Json *json, const char *key)
 {
-    json_emit_key(json, key);
+    json_next(json, key);
     json_begin(json, true);
 }
 
 void json_begin_array(Json *json, const char *key)
 {
-    json_emit_key(json, key);
+    json_next(json, key);
     json_begin(json, false);
 }
 
 void json_end(Json *json)
 {
     if (json->count == 0) fault("JSON: nothing is open");
-    enum fy_event_type type = json->items[--json->count] ? FYET_MAPPING_END : FYET_SEQUENCE_END;
-    json_emit(json, fy_emit_event_create(json->emitter, type));
+    bool is_object = json->items[--json->count];
+    if (!json->is_empty) json_line(json);
+    json->is_empty = false;
+    text_append(&json->text, is_object ? "}" : "]", 1);
 }
 
 static void json_word(Json *json, const char *key, const char *word)
 {
-    json_emit_key(json, key);
-    json_emit_scalar(json, FYSS_PLAIN, word, strlen(word));
+    json_next(json, key);
+    text_append(&json->text, word, strlen(word));
 }
 
 void json_text(Json *json, const char *key, const char *value)
@@ -116,8 +104,8 @@ void json_text(Json *json, const char *key, const char *value)
         json_none(json, key);
         return;
     }
-    json_emit_key(json, key);
-    json_emit_text(json, value);
+    json_next(json, key);
+    json_quote(json, value);
 }
 
 void json_number(Json *json, const char *key, double value)
@@ -155,20 +143,8 @@ void json_print(Json *json, FILE *stream)
 {
     while (json->count)
         json_end(json);
-    json_emit(json, fy_emit_event_create(json->emitter, FYET_DOCUMENT_END, 1));
-    json_emit(json, fy_emit_event_create(json->emitter, FYET_STREAM_END));
-    fy_emitter_destroy(json->emitter);
-
-    const char *from = text_c(&json->text), *end = from + json->text.count, *at;
-    while (end > from && end[-1] == '\n')
-        end--;
-    while ((at = memmem(from, (size_t)(end - from), space_stand_in, 3))) {
-        fwrite(from, 1, (size_t)(at - from), stream);
-        fputc(' ', stream);
-        from = at + 3;
-    }
-    fwrite(from, 1, (size_t)(end - from), stream);
-    fputc('\n', stream);
+    text_append(&json->text, "\n", 1);
+    fwrite(json->text.items, 1, json->text.count, stream);
     text_free(&json->text);
     free(json->items);
     free(json);

@@ -1,7 +1,5 @@
-// Writes JSON through libfyaml, which escapes strings.
+// Writes JSON. Bytes of a text or key that are not UTF-8 become U+FFFD.
 // Calls nest: json_begin_object ... json_end.
-// A key has no control characters; a text may have any bytes, of which those that are not UTF-8 become
-// U+FFFD.
 #pragma once
 
 #include <stdbool.h>

@@ -4,13 +4,13 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include <inttypes.h>
-#include <libfyaml.h>
+#include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct {
-    char *scene_hash, *precision, *bvh;
+    const char *scene_hash, *precision, *bvh;
     uint32_t lanes, width, height, samples, bounces;
     Series frame;
 } BaselineRow;
@@ -20,51 +20,33 @@ enum { HASH_DIGITS = 16 };
 struct Baseline {
     BaselineRow *items;
     size_t count, capacity;
-    char *device, *host;
+    json_t *report; // owns the rows' texts
     Series calibration;
 };
 
-static struct fy_node *member(struct fy_node *node, const char *key)
+// Returns "" where there is no text.
+static const char *text_of(const json_t *value)
 {
-    return node && fy_node_is_mapping(node) ? fy_node_mapping_lookup_by_string(node, key, FY_NT) : NULL;
+    const char *text = json_string_value(value);
+    return text ? text : "";
 }
 
-// The scalar's text, or "" where there is none. Caller frees.
-static char *text_of(struct fy_node *node)
+// Returns 0 where there is no count.
+static uint32_t count_of(const json_t *value)
 {
-    size_t length = 0;
-    const char *text = node && fy_node_is_scalar(node) ? fy_node_get_scalar(node, &length) : NULL;
-    return memory_copy_part(text ? text : "", length);
-}
-
-// 0 where there is no number.
-static double number_of(struct fy_node *node)
-{
-    char *text = text_of(node);
-    double number = strtod(text, NULL);
-    free(text);
-    return number;
-}
-
-static uint32_t count_of(struct fy_node *node)
-{
-    double number = number_of(node);
+    double number = json_number_value(value);
     return number >= 0 && number <= UINT32_MAX ? (uint32_t)number : 0;
 }
 
-static struct fy_node *element(struct fy_node *node, int index)
-{
-    return node && fy_node_is_sequence(node) ? fy_node_sequence_get_by_index(node, index) : NULL;
-}
-
 // Milliseconds become seconds. Empty where an element is no time.
-static Series times_of(struct fy_node *node)
+static Series times_of(const json_t *values)
 {
     Series times = {0};
-    void *place = NULL;
-    if (!node || !fy_node_is_sequence(node)) return times;
-    for (struct fy_node *item; (item = fy_node_sequence_iterate(node, &place));) {
-        double seconds = 1e-3 * number_of(item);
+    size_t i;
+    json_t *value;
+    json_array_foreach(values, i, value)
+    {
+        double seconds = 1e-3 * json_number_value(value);
         if (!(seconds > 0 && seconds < HUGE_VAL)) {
             series_free(&times);
             return times;
@@ -74,90 +56,77 @@ static Series times_of(struct fy_node *node)
     return times;
 }
 
-static void rows_read(Baseline *baseline, struct fy_node *runs)
+static void rows_read(Baseline *baseline, const json_t *runs)
 {
-    void *place = NULL;
-    for (struct fy_node *run; (run = fy_node_sequence_iterate(runs, &place));) {
+    size_t i;
+    json_t *run;
+    json_array_foreach(runs, i, run)
+    {
+        const json_t *size = json_object_get(run, "size");
         BaselineRow row = {
-            .scene_hash = text_of(member(run, "scene_hash")),
-            .precision = text_of(member(run, "precision")),
-            .bvh = text_of(member(run, "bvh")),
-            .lanes = count_of(member(run, "lanes")),
-            .width = count_of(element(member(run, "size"), 0)),
-            .height = count_of(element(member(run, "size"), 1)),
-            .samples = count_of(member(run, "samples")),
-            .bounces = count_of(member(run, "bounces")),
-            .frame = times_of(member(run, "frame_samples_ms")),
+            .scene_hash = text_of(json_object_get(run, "scene_hash")),
+            .precision = text_of(json_object_get(run, "precision")),
+            .bvh = text_of(json_object_get(run, "bvh")),
+            .lanes = count_of(json_object_get(run, "lanes")),
+            .width = count_of(json_array_get(size, 0)),
+            .height = count_of(json_array_get(size, 1)),
+            .samples = count_of(json_object_get(run, "samples")),
+            .bounces = count_of(json_object_get(run, "bounces")),
+            .frame = times_of(json_object_get(run, "frame_samples_ms")),
         };
         array_push(*baseline, row);
     }
 }
 
-static Baseline *baseline_read(struct fy_document *document, const char *path, MessageList *messages)
+static void *json_allocate(size_t size)
 {
-    struct fy_node *root = document ? fy_document_root(document) : NULL;
-    struct fy_node *runs = member(root, "runs");
-    if (!runs || !fy_node_is_sequence(runs) || number_of(member(root, "schema")) != BENCH_SCHEMA) {
-        message_error(messages, "'%s' is no report of glint bench --json with schema %d", path, BENCH_SCHEMA);
-        return NULL;
-    }
-    Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);
-    baseline->device = text_of(member(member(root, "device"), "name"));
-    baseline->host = text_of(member(member(root, "host"), "name"));
-    baseline->calibration = times_of(member(root, "calibration_ms"));
-    rows_read(baseline, runs);
-    return baseline;
-}
-
-static void diagnostic_ignore(struct fy_diag *diag, void *user, const char *text, size_t length)
-{
-    (void)diag, (void)user, (void)text, (void)length;
+    return memory_allocate(size, 1);
 }
 
 Baseline *baseline_open(const char *path, MessageList *messages)
 {
     Text text = {0};
-    Baseline *baseline = NULL;
-    if (text_read_file(&text, path, messages)) {
-        struct fy_diag_cfg quiet;
-        fy_diag_cfg_default(&quiet);
-        quiet.fp = NULL;
-        quiet.output_fn = diagnostic_ignore;
-        struct fy_diag *diagnostics = fy_diag_create(&quiet);
-        struct fy_parse_cfg settings = {.flags = FYPCF_JSON_FORCE, .diag = diagnostics};
-        struct fy_document *document = fy_document_build_from_string(&settings, text_c(&text), text.count);
-        baseline = baseline_read(document, path, messages);
-        if (document) fy_document_destroy(document);
-        fy_diag_destroy(diagnostics);
+    if (!text_read_file(&text, path, messages)) {
+        text_free(&text);
+        return NULL;
     }
+    // When an allocation fails, jansson 2.14 may lose bytes of a text; memory_allocate ends the process
+    // instead.
+    json_set_alloc_funcs(json_allocate, free);
+    json_t *report = json_loadb(text_c(&text), text.count, JSON_REJECT_DUPLICATES, NULL);
     text_free(&text);
+    const json_t *runs = json_object_get(report, "runs");
+    if (!json_is_array(runs) || json_number_value(json_object_get(report, "schema")) != BENCH_SCHEMA) {
+        message_error(messages, "'%s' is no report of glint bench --json with schema %d", path, BENCH_SCHEMA);
+        json_decref(report);
+        return NULL;
+    }
+    Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);
+    baseline->report = report;
+    baseline->calibration = times_of(json_object_get(report, "calibration_ms"));
+    rows_read(baseline, runs);
     return baseline;
 }
 
 void baseline_close(Baseline *baseline)
 {
     if (!baseline) return;
-    for (size_t i = 0; i < baseline->count; i++) {
-        free(baseline->items[i].scene_hash);
-        free(baseline->items[i].precision);
-        free(baseline->items[i].bvh);
+    for (size_t i = 0; i < baseline->count; i++)
         series_free(&baseline->items[i].frame);
-    }
     free(baseline->items);
-    free(baseline->device);
-    free(baseline->host);
     series_free(&baseline->calibration);
+    json_decref(baseline->report);
     free(baseline);
 }
 
 const char *baseline_device(const Baseline *baseline)
 {
-    return baseline->device;
+    return text_of(json_object_get(json_object_get(baseline->report, "device"), "name"));
 }
 
 const char *baseline_host(const Baseline *baseline)
 {
-    return baseline->host;
+    return text_of(json_object_get(json_object_get(baseline->report, "host"), "name"));
 }
 
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *times)
