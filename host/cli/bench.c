@@ -41,7 +41,7 @@ static const char help_text[] =
     "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 same or "
     "faster,\n3 slower, 4 too noisy to say.\n\n"
     "      --against GLINT   compare with another build, run alternately; default of --seconds: 30 per row\n"
-    "      --compare FILE    compare with an earlier report (--json), which allows to claim less\n"
+    "      --compare FILE    compare with an earlier report (--json); claims less than --against\n"
     "      --tolerance R     ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 "
     "with --compare)\n"
     "      --worker          answer another glint's --against\n"
