@@ -556,13 +556,54 @@ static void faint_paths_are_decided(void **state)
     }
 }
 
+// Triangles whose edges round to one line, though they have an area: strips across the view from corners far
+// away, and needles.
+static void needles_have_an_area(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    for (double far = 1e3; far < 1e31; far *= 1e3) {
+        Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
+        scene.materials.items[0].ambient = 1;
+        array_push(scene.objects,
+                   ((Object){.kind = SHAPE_TRIANGLE,
+                             .as.triangle.vertices = {{far, far, -1}, {0, 0, -1}, {0.25, 0, -1}}}));
+        const RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_DOUBLE);
+        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        size_t seen = 0;
+        for (size_t i = 0; i < SMALL_SIDE * SMALL_SIDE; i++)
+            seen += film.color[3 * i] != 0.25; // not the background
+        film_free(&film);
+        assert_int_not_equal(seen, 0);
+        check_small(&scene, 0, "a strip", far);
+    }
+    for (unsigned seed = 0; seed < 20; seed++) {
+        random_state.state = seed;
+        Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
+        for (int i = 0; i < 20; i++) {
+            const Vector3 way = random_unit_vector(&random_state), end = {way.x, way.y, -2 + way.z},
+                          middle = vector_scale(end, random_between(&random_state, 0.2, 0.8));
+            const double off = random_power(&random_state, -20, -3);
+            const Vector3 beyond = {nextafter(2 * end.x, 9), 2 * end.y, 2 * end.z};
+            array_push(scene.objects,
+                       ((Object){.kind = SHAPE_TRIANGLE,
+                                 .as.triangle.vertices = {
+                                     vector_add(middle, vector_scale(random_unit_vector(&random_state), off)),
+                                     end, beyond}}));
+        }
+        point_light_add(&scene, (Vector3){3, 3, 3}, 1);
+        check_small(&scene, 0, "needles", seed);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(flat_shapes_are_decided),      cmocka_unit_test(round_shapes_are_decided),
         cmocka_unit_test(planets_are_decided),          cmocka_unit_test(mirrors_glass_and_spots_are_decided),
         cmocka_unit_test(hard_cases_are_decided),       cmocka_unit_test(lights_on_surfaces_are_decided),
-        cmocka_unit_test(checkers_far_out_are_decided), cmocka_unit_test(faint_paths_are_decided)};
+        cmocka_unit_test(checkers_far_out_are_decided), cmocka_unit_test(faint_paths_are_decided),
+        cmocka_unit_test(needles_have_an_area)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -1,6 +1,7 @@
 #include "host/scene/mesh.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
+#include "host/scene/polygon.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -166,7 +167,7 @@ size_t mesh_degenerate_count(const Mesh *mesh)
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         Vector3 corners[3];
         corners_of(mesh, i, corners);
-        count += vector_is_zero(triangle_normal(corners[0], corners[1], corners[2]));
+        count += !triangle_has_area(corners[0], corners[1], corners[2]);
     }
     return count;
 }

@@ -55,6 +55,29 @@ int plane_orientation(const double a[2], const double b[2], const double c[2])
     return orientation_exact(a, b, c);
 }
 
+// Scales values by a power of two, which changes no sign, so that products of their products neither vanish
+// nor overflow.
+static void scale_to_middle(double values[3])
+{
+    int exponent;
+    frexp(fmax(fabs(values[0]), fmax(fabs(values[1]), fabs(values[2]))), &exponent);
+    for (int i = 0; i < 3; i++)
+        values[i] = ldexp(values[i], 400 - exponent);
+}
+
+Vector3 triangle_normal_signs(Vector3 a, Vector3 b, Vector3 c)
+{
+    double axes[3][3] = {{a.x, b.x, c.x}, {a.y, b.y, c.y}, {a.z, b.z, c.z}}, signs[3];
+    for (int axis = 0; axis < 3; axis++)
+        scale_to_middle(axes[axis]);
+    for (int axis = 0; axis < 3; axis++) {
+        const double *u = axes[(axis + 1) % 3], *v = axes[(axis + 2) % 3];
+        signs[axis] =
+            plane_orientation((double[]){u[0], v[0]}, (double[]){u[1], v[1]}, (double[]){u[2], v[2]});
+    }
+    return (Vector3){signs[0], signs[1], signs[2]};
+}
+
 // What is left of the polygon: a ring of corners, projected to a coordinate plane so that it turns left.
 typedef struct {
     double (*points)[2];
@@ -273,6 +296,8 @@ PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonT
 {
     triangles->count = 0;
     Vector3 normal = polygon_normal(corners, count);
+    if (count == 3 && vector_is_zero(normal))
+        normal = triangle_normal_signs(corners[0], corners[1], corners[2]);
     if (vector_is_zero(normal)) return POLYGON_WITHOUT_AREA;
     Ring ring;
     ring_open(&ring, corners, count, normal);

@@ -23,3 +23,22 @@ PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonT
 
 // The sign of the area of a, b, c in the plane, positive where they turn left: exact.
 int plane_orientation(const double a[2], const double b[2], const double c[2]);
+
+// The signs of a triangle's normal, (b - a) x (c - a): exact, unless within one axis coordinates differ by
+// more than 2^500 times.
+Vector3 triangle_normal_signs(Vector3 a, Vector3 b, Vector3 c);
+
+// Whether a component a - b of a normal is not 0 whatever its factors' roundings.
+static inline bool is_certainly_nonzero(double a, double b)
+{
+    const double size = fabs(a) + fabs(b);
+    return size > 0x1p-900 && fabs(a - b) > 0x1p-49 * size;
+}
+
+// Whether a triangle's corners are not on one line, exactly, where triangle_normal may round to 0.
+static inline bool triangle_has_area(Vector3 a, Vector3 b, Vector3 c)
+{
+    const Vector3 ab = vector_subtract(b, a), ac = vector_subtract(c, a);
+    return is_certainly_nonzero(ab.y * ac.z, ab.z * ac.y) || is_certainly_nonzero(ab.z * ac.x, ab.x * ac.z) ||
+           is_certainly_nonzero(ab.x * ac.y, ab.y * ac.x) || !vector_is_zero(triangle_normal_signs(a, b, c));
+}

@@ -4,6 +4,7 @@
 #endif
 #include "host/compile/shapes.h"
 #include "host/compile/texture_mapping.h"
+#include "host/scene/polygon.h"
 #include <math.h>
 #include <string.h>
 
@@ -21,9 +22,14 @@ static inline __attribute__((always_inline)) Vector3 cross_product(Vector3 a, Ve
                      product_difference(a.x, b.y, a.y, b.x)};
 }
 
-static inline bool has_area(Vector3 a, Vector3 b, Vector3 c)
+// A needle's normal, which its rounded corners do not have.
+static Vector3 needle_normal(Vector3 a, Vector3 b, Vector3 c)
 {
-    return !vector_is_zero(triangle_normal(a, b, c));
+    const Quad3 from = quad3(a),
+                across = quad3_cross(quad3_subtract(quad3(b), from), quad3_subtract(quad3(c), from));
+    const Quad largest =
+        quad_maximum(quad_absolute(across.x), quad_maximum(quad_absolute(across.y), quad_absolute(across.z)));
+    return quad3_rounded(largest > 0 ? quad3_scale(across, 1 / largest) : across);
 }
 
 // One without area shrinks to a point, which no ray meets: the kernels rotate vertices, and what was a line
@@ -31,7 +37,8 @@ static inline bool has_area(Vector3 a, Vector3 b, Vector3 c)
 static inline __attribute__((always_inline)) Triangle triangle_of(const Rounding *rounding, Vector3 a,
                                                                   Vector3 b, Vector3 c)
 {
-    if (!has_area(a, b, c)) b = c = a;
+    const bool has_area = triangle_has_area(a, b, c);
+    if (!has_area) b = c = a;
     Vector3 seen_a = point_from_eye(rounding, a), seen_b = point_from_eye(rounding, b),
             seen_c = point_from_eye(rounding, c);
     Vector3 ab = vector_subtract(seen_b, seen_a), ac = vector_subtract(seen_c, seen_a);
@@ -39,7 +46,9 @@ static inline __attribute__((always_inline)) Triangle triangle_of(const Rounding
         ab = axis_scaled(ab);
         ac = axis_scaled(ac);
     }
-    Vector3 normal = vector_rounded(rounding, axis_scaled(cross_product(ab, ac)));
+    Vector3 across = cross_product(ab, ac);
+    if (has_area && vector_is_zero(across)) across = needle_normal(a, b, c);
+    Vector3 normal = vector_rounded(rounding, axis_scaled(across));
     return (Triangle){
         scalar4_of(seen_a, normal.x), scalar4_of(seen_b, normal.y), scalar4_of(seen_c, normal.z), {0}};
 }

@@ -6,6 +6,7 @@
 #include "host/import/mesh/affine.h"
 #include "host/import/mesh/assimp_process.h"
 #include "host/import/number.h"
+#include "host/scene/polygon.h"
 
 #include <assimp/cimport.h>
 #include <assimp/scene.h>
@@ -135,7 +136,7 @@ static bool face_has_area(const struct aiMesh *mesh, const struct aiFace *face)
     const Vector3 a = vector_of(&mesh->mVertices[face->mIndices[0]]),
                   b = vector_of(&mesh->mVertices[face->mIndices[1]]),
                   c = vector_of(&mesh->mVertices[face->mIndices[2]]);
-    return !vector_is_zero(triangle_normal(a, b, c));
+    return triangle_has_area(a, b, c);
 }
 
 static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct aiFace *face, size_t first,

@@ -173,11 +173,10 @@ static void polygons_cut(MeshDraft *draft)
 }
 
 // Tested before the transform, whose rounding could give a degenerate triangle an area.
-static bool triangle_has_area(const MeshDraft *draft, const uint32_t *corners)
+static bool corners_have_area(const MeshDraft *draft, const uint32_t *corners)
 {
     const Vector3 *positions = draft->positions.items;
-    return !vector_is_zero(
-        triangle_normal(positions[corners[0]], positions[corners[1]], positions[corners[2]]));
+    return triangle_has_area(positions[corners[0]], positions[corners[1]], positions[corners[2]]);
 }
 
 // A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side. Degenerate
@@ -186,7 +185,7 @@ static void triangles_orient(MeshDraft *draft, bool mirrored)
 {
     const DraftIndices *positions = &draft->corners[DRAFT_POSITION];
     for (size_t i = 0; i < positions->count; i += 3) {
-        const bool has_area = triangle_has_area(draft, positions->items + i);
+        const bool has_area = corners_have_area(draft, positions->items + i);
         for (int part = 0; part < DRAFT_PART_COUNT && (mirrored || !has_area); part++) {
             if (draft->corners[part].count == 0) continue;
             uint32_t *corners = draft->corners[part].items + i;

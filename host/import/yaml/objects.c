@@ -1,6 +1,7 @@
 #include "host/base/array.h"
 #include "host/import/place.h"
 #include "host/import/yaml/yaml.h"
+#include "host/scene/polygon.h"
 
 #include <string.h>
 
@@ -129,7 +130,7 @@ static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form fo
     (void)form;
     const Vector3 *vertices = object->as.triangle.vertices;
     object->as.triangle.smooth = !vector_is_zero(object->as.triangle.normals[0]);
-    if (vector_is_zero(triangle_normal(vertices[0], vertices[1], vertices[2])))
+    if (!triangle_has_area(vertices[0], vertices[1], vertices[2]))
         report_warning(&reader->report, mapping->offset, "a triangle without area is never hit");
     return true;
 }
