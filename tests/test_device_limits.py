@@ -2,9 +2,10 @@
 """Limits of devices, which tests/shims/limits.c reports and enforces: glint works within each, with the same bits, or
 refuses the device with the reason."""
 import os
+import re
 from pathlib import Path
 
-from glint import ROOT, SPHERE, TestCase, find_icd, main, need_device, read, run, shim_build, skip_all, write
+from glint import ROOT, SPHERE, TestCase, find_icd, main, need_device, npy_read, read, run, shim_build, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 RENDER = "render sphere.yaml --quiet --size 320x200 -o image.npy"
@@ -83,6 +84,56 @@ class DeviceLimits(TestCase):
             with self.subTest(limits=limits, command=command):
                 self.refuses(command, message, status, env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits})
                 self.assertFalse(os.path.exists("image.npy"))
+
+    def test_reference_device(self):
+        """A device without 64-bit floating point takes its work in double from another one, chosen or found."""
+        mirrors = f"{ROOT}/tests/scenes/mirror-balls.yaml"
+        certified = "--size 96x64 --samples 2 --precision certified --quiet --aov doubt,path,t"
+        two = {"POCL_DEVICES": "basic pthread", "LD_PRELOAD": self.shim, "GLINT_LIMITS": "no-double", "GLINT_LIMITED": "basic"}
+        limited = POCL | two
+        self.assertEqual([device["fp64"] for device in self.json("devices --json", env=limited)["devices"]], [False, True])
+        self.glint(f"render {mirrors} {certified} --device pthread -o one.npy", env=limited)
+        chosen = '^glint: "pthread.*" works in double for "basic.*", which has no 64-bit floating point$'
+        for option, message in ("", chosen), ("--reference-device pthread", "^$"), ("--reference-device 1", "^$"):
+            process = self.glint(f"render {mirrors} {certified} --device basic {option} -o image.npy", env=limited)
+            self.assertRegex(process.stderr, re.compile(message, re.MULTILINE))
+            for end in "npy", "doubt.npy", "path.npy", "t.npy":
+                self.assertSameBytes(f"one.{end}", f"image.{end}")
+        self.assertIn(1, npy_read("one.doubt.npy")[2], "no pixel was rendered in double")
+        report = self.json(f"render {mirrors} {certified} --device basic -o image.npy --timing=json", env=limited)
+        self.assertRegex(report["by_device"][0]["double_by"], "^pthread")
+        self.assertIn("repeat", [launch["name"] for launch in report["by_device"][0]["launches"]])
+
+        accuracy = f"accuracy {mirrors} --size 48x32 --precision single --json --seconds 0.1 --device"
+        expected = self.json(f"{accuracy} pthread --save one", env=limited)["scenes"][0]
+        found = self.json(f"{accuracy} basic --save other", env=limited)["scenes"][0]
+        self.assertRegex(found["reference"]["device"], "^pthread")
+        self.assertEqual(found["reference"] | {"saved": None}, expected["reference"] | {"saved": None})
+        for path in Path("one").iterdir():
+            self.assertSameBytes(path, Path("other") / path.name)
+
+        rows = self.json(f"certify {mirrors} --size 48x32 --pixels 200 --json --device basic", env=limited)["precisions"]
+        unavailable = [row["precision"] for row in rows if "status" in row]
+        self.assertEqual(unavailable, ["double"])
+
+        self.refuses(f"{accuracy} basic --reference-device basic", "the reference device .* has no 64-bit", env=limited)
+        self.refuses(f"render {mirrors} {certified} --device basic --reference-device none", "no usable device matches", env=limited)
+        alone = limited | {"POCL_DEVICES": "basic"}
+        self.refuses(f"{accuracy} basic", "neither the device .* nor another one has 64-bit floating point", env=alone)
+        self.refuses(f"render {mirrors} {certified} -o none.npy", "certified needs 64-bit .* no other device works in double", env=alone)
+        self.refuses(f"certify {mirrors} --precision certified", "certified needs 64-bit", env=alone)
+
+    def test_reference_for_rusticl(self):
+        """rusticl hides 64-bit floating point unless told otherwise."""
+        env = {"OCL_ICD_VENDORS": "/etc/OpenCL/vendors", "RUSTICL_ENABLE": "llvmpipe"}
+        devices = {device["platform"]: device for device in self.json("devices --json", env=env)["devices"]}
+        if "rusticl" not in devices or len(devices) < 2 or devices["rusticl"]["fp64"]:
+            self.skipTest("rusticl and another OpenCL implementation are not both here")
+        command = "render sphere.yaml --size 16x12 --precision certified --quiet"
+        process = self.glint(f"{command} --device {devices['rusticl']['index']} -o image.npy", env=env)
+        self.assertRegex(process.stderr, '" works in double for "llvmpipe')
+        self.glint(f"{command} -o one.npy", env=POCL)
+        self.assertSameBytes("image.npy", "one.npy")
 
     def test_devices_report(self):
         report = self.json("devices --json", env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": "embedded,no-double,group=12"})

@@ -38,7 +38,7 @@ static const char help_text[] =
     "Measure speed and error of scenes in every requested configuration.\n\n"
     "      --reference FILE  linear colors to compare with, .exr or .npy, of the images' size or a multiple, "
     "then averaged\n"
-    "                        (default: the device's own image at double)\n"
+    "                        (default: the image at double)\n"
     "      --budget LIST     errors to allow: report the fastest configuration within each (default: "
     "1e-2,1e-4,1e-6)\n"
     "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
@@ -164,6 +164,7 @@ static bool reference_read(Accuracy *accuracy)
 // Renders the scene in double with the most samples of any variant, unperturbed. EXIT_DONE, or why not.
 static int reference_render(Accuracy *accuracy, AccuracyScene *scene, const Variant *variants)
 {
+    Compute *compute = &accuracy->open.compute;
     RenderSettings settings = variants[0].settings;
     settings.precision = PRECISION_DOUBLE;
     settings.lanes = 0;
@@ -173,21 +174,24 @@ static int reference_render(Accuracy *accuracy, AccuracyScene *scene, const Vari
         if (variants[i].settings.sample_count > settings.sample_count)
             settings.sample_count = variants[i].settings.sample_count;
     Renderer *renderer =
-        renderer_open(&accuracy->open.compute, variants[0].scene, &settings, &accuracy->messages);
-    if (!renderer) return EXIT_USER;
+        renderer_open(compute_in_double(compute), variants[0].scene, &settings, &accuracy->messages);
+    if (!renderer) return compute_check_reference(compute) ? EXIT_USER : EXIT_MACHINE;
     bool whole = renderer_render_film(renderer, ACCURACY_AOVS, &accuracy->reference);
+    if (compute->reference) scene->reference.device = compute->reference->device->name;
     scene->reference.precision = precision_names[settings.precision];
     scene->reference.bvh = bvh_choice_names[settings.bvh];
     scene->reference.lanes = renderer_report(renderer)->lanes;
     scene->reference.samples = settings.sample_count;
     scene->reference.kernel_hash = renderer_report(renderer)->kernel_hash;
     renderer_close(renderer);
+    compute_check_reference(compute);
     return whole ? EXIT_DONE : EXIT_INTERRUPTED;
 }
 
 static bool is_reference(const AccuracyScene *scene, const AccuracyVariant *variant)
 {
-    return !scene->reference.file && variant->samples == scene->reference.samples &&
+    return !scene->reference.file && !scene->reference.device &&
+           variant->samples == scene->reference.samples &&
            variant->row->kernel_hash == scene->reference.kernel_hash;
 }
 
@@ -288,12 +292,18 @@ static bool folder_make(Accuracy *accuracy)
 
 static bool has_reference(Accuracy *accuracy)
 {
-    const Device *device = accuracy->open.compute.device;
-    if (accuracy->options.reference_path || device->fp64) return true;
-    return message_error(&accuracy->messages,
-                         "the device \"%s\" has no 64-bit floating point for a reference: name one with "
-                         "--reference",
-                         device->name);
+    const AccuracyOptions *options = &accuracy->options;
+    const char *selector = options->variants.common.reference_device;
+    const bool is_certified = options->variants.precisions >> PRECISION_CERTIFIED & 1;
+    if (options->reference_path && !is_certified) return true;
+    if (reference_open(&accuracy->open.compute, &accuracy->open.devices, selector)) return true;
+    if (selector) return false;
+    if (options->reference_path) return true; // the rows at certified are unavailable
+    return message_error(
+        &accuracy->messages,
+        "neither the device \"%s\" nor another one has 64-bit floating point for a reference: "
+        "name a file with --reference",
+        accuracy->open.compute.device->name);
 }
 
 static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)

@@ -152,6 +152,7 @@ static void reference_print(const AccuracyScene *scene, FILE *stream)
         fprintf(stream, "  reference: %s, %u lanes, %u %s; %zu pixels at silhouettes",
                 scene->reference.precision, scene->reference.lanes, scene->reference.samples,
                 scene->reference.samples == 1 ? "sample" : "samples", scene->edges.silhouette_pixels);
+    if (scene->reference.device) fprintf(stream, "; on %s", scene->reference.device);
     if (scene->reference.nonfinite + scene->reference.negative > 0)
         fprintf(stream, "; %zu of its pixels are not finite, %zu negative", scene->reference.nonfinite,
                 scene->reference.negative);
@@ -229,6 +230,7 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
     if (scene->reference.file) {
         json_text(json, "file", scene->reference.file);
     } else {
+        json_text(json, "device", scene->reference.device ? scene->reference.device : report->device->name);
         json_text(json, "precision", scene->reference.precision);
         json_int64(json, "lanes", scene->reference.lanes);
         json_text(json, "bvh", scene->reference.bvh);

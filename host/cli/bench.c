@@ -202,7 +202,11 @@ static int scenes_bench(Bench *bench, int argument_count, char **arguments)
     messages_print(&messages, NULL);
     int status = EXIT_USER;
     if ((!options->baseline || baseline) && device_open(&bench->open, options->variants.common.device)) {
-        status = bench_run(bench, baseline);
+        const bool is_certified = options->variants.precisions >> PRECISION_CERTIFIED & 1;
+        const char *selector = options->variants.common.reference_device;
+        if (!is_certified || reference_open(&bench->open.compute, &bench->open.devices, selector) ||
+            !selector)
+            status = bench_run(bench, baseline);
         variant_set_close(&bench->set);
         status = device_close(&bench->open, status);
     }

@@ -23,6 +23,7 @@ static const struct option long_options[] = {
     {"json", no_argument, NULL, OPTION_JSON},
     COMMON_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
+    REFERENCE_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -35,7 +36,7 @@ static const char help_text[] =
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of fast, single, strict, double, certified (default: all that fit)\n" //
-    HELP_BOUNCES HELP_DEVICE HELP_LANES                                                            //
+    HELP_BOUNCES HELP_DEVICE HELP_REFERENCE HELP_LANES                                             //
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n"         //
     HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_JSON HELP_HELP;
 
@@ -247,8 +248,12 @@ static int decided_check(const CertifyErrors *certified)
     return EXIT_CHECK;
 }
 
-static int scene_certify(const CertifyOptions *options, const Scene *scene, Compute *compute)
+static int scene_certify(const CertifyOptions *options, const Scene *scene, OpenDevice *open)
 {
+    Compute *compute = &open->compute;
+    const bool is_certified = !options->precisions || options->precisions >> PRECISION_CERTIFIED & 1;
+    const char *selector = options->common.reference_device;
+    if (is_certified && !reference_open(compute, &open->devices, selector) && selector) return EXIT_USER;
     Certification certification = {.options = options, .scene = scene, .compute = compute};
     uint32_t width = options->width, height = options->height;
     image_size_choose(scene, &width, &height);
@@ -288,7 +293,7 @@ int command_certify(int argument_count, char **arguments)
     if (scene_open(&scene, options.scene, &options.common) && device_open(&open, options.common.device)) {
         Progress progress;
         progress_open(&progress, true); // for the interrupts
-        status = device_close(&open, scene_certify(&options, &scene, &open.compute));
+        status = device_close(&open, scene_certify(&options, &scene, &open));
         progress_close(&progress);
     }
     scene_free(&scene);

@@ -28,6 +28,10 @@ static void devices_append(Text *key, Renderer *const *renderers, size_t count, 
         Rank own = {0};
         rank_set_device(&own, renderer_report(renderers[i])->device);
         model_append(key, &own, renderer_report(renderers[i])->lanes);
+        const Device *reference = renderer_report(renderers[i])->reference_device;
+        if (!reference) continue;
+        rank_set_device(&own, reference);
+        model_append(key, &own, device_lanes(reference, true));
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
         if (ranks->items[i].lanes[PASS_ALL] > 0) // else it cannot render

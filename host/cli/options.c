@@ -197,6 +197,9 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     case OPTION_MAX_PIXELS:
         *valid = option_max_pixels(value);
         return true;
+    case OPTION_REFERENCE_DEVICE:
+        common->reference_device = value;
+        return true;
     case OPTION_PERTURB:
         *valid = perturb_read(value, common);
         return true;
@@ -291,6 +294,21 @@ bool device_open(OpenDevice *open, const char *selector)
         return false;
     }
     compute_open(&open->compute, device);
+    return true;
+}
+
+bool reference_open(Compute *compute, const DeviceList *devices, const char *selector)
+{
+    const Device *device = compute->device;
+    if (compute->reference || (!selector && device->fp64) || !compute_ok(compute)) return true;
+    MessageList messages = {0};
+    const Device *reference = device_choose_reference(devices, selector, &messages);
+    messages_print(&messages, NULL);
+    if (!reference) return false;
+    if (!selector)
+        fprintf(stderr, "glint: \"%s\" works in double for \"%s\", which has no 64-bit floating point\n",
+                reference->name, device->name);
+    if (reference != device) compute_open_reference(compute, reference);
     return true;
 }
 

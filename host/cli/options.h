@@ -11,7 +11,7 @@
 
 // Options of every command that uses a device.
 typedef struct {
-    const char *device;
+    const char *device, *reference_device;
     Precision precision;
     bool has_precision; // given
     uint32_t lanes;     // 0: the device's default
@@ -30,6 +30,7 @@ enum {
     OPTION_LENIENT,
     OPTION_MAX_PIXELS,
     OPTION_PERTURB,
+    OPTION_REFERENCE_DEVICE,
     OPTION_OWN
 };
 
@@ -49,6 +50,12 @@ enum {
         "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
     }
 
+// For commands that render at `certified`.
+#define REFERENCE_LONG_OPTION                                                                                \
+    {                                                                                                        \
+        "reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE                                 \
+    }
+
 // Help for options that several commands share; a command's help ends with HELP_HELP.
 #define HELP_DEVICE                                                                                          \
     "      --device D        index, part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "       \
@@ -66,6 +73,10 @@ enum {
 #define HELP_PERTURB                                                                                         \
     "      --perturb SEED[:SCALE]\n"                                                                         \
     "                        inject the rounding error that OpenCL permits, times SCALE (default: 1)\n"
+#define HELP_REFERENCE                                                                                       \
+    "      --reference-device D\n"                                                                           \
+    "                        renders in double: references, and the pixels that certified re-renders\n"      \
+    "                        (default: the device itself, else one with 64-bit floating point)\n"
 #define HELP_JSON "      --json            print JSON\n"
 #define HELP_HELP "  -h, --help            print this help\n"
 
@@ -137,6 +148,10 @@ const Device *device_find(DeviceList *devices, const char *selector);
 // The same, and opens it. False, with a message, if there is none; nothing to close then. A device that
 // fails, now or later, is reported by device_close.
 bool device_open(OpenDevice *open, const char *selector);
+// Opens the device that works in double for the Compute, if the user chose one or its own device has no
+// 64-bit floating point, and prints which it is. False if there is none, with a message if the user chose
+// one.
+bool reference_open(Compute *compute, const DeviceList *devices, const char *selector);
 // At the end of a command. Returns the exit status: EXIT_MACHINE, with a message, if the device failed, else
 // `status`. Unless failed or interrupted, the context is left to the process's end: PoCL takes 80 ms to free
 // its compiler.

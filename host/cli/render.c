@@ -195,6 +195,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
+        open->reference_selector = options.common.reference_device;
         if (render_devices_open(open, options.common.device))
             status = scene_render(&options, &scene, open, ranks, &times);
     }
@@ -304,6 +305,7 @@ const char *render_command_path(const RenderCommand *command, size_t index)
 
 bool render_command_open_devices(RenderCommand *command)
 {
+    command->open.reference_selector = command->options.common.reference_device;
     return render_devices_open(&command->open, command->options.common.device);
 }
 

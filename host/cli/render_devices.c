@@ -34,8 +34,17 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
     Compute **computes = memory_allocate(count, sizeof *computes);
     MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each), unfit = {0};
     open->is_unfit = false;
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         computes[i] = devices->items[i].compute;
+        if (settings->precision == PRECISION_CERTIFIED &&
+            !reference_open(computes[i], &devices->devices, open->reference_selector) &&
+            open->reference_selector) {
+            open->is_unfit = true;
+            free(computes);
+            free(of_each);
+            return false;
+        }
+    }
     bool is_done = renderers_open(renderers, computes, count, scene, settings,
                                   ranks ? &ranks->receivers : NULL, messages, of_each);
     for (size_t i = 0, kept = 0; i < count; i++) {

@@ -8,9 +8,10 @@ typedef struct {
     OpenDevices devices;
     Renderer **renderers; // as many; NULL, or with the last image's scene or only its kernels
     bool is_open;
-    bool is_single; // only one of those that are listed, see devices_open_one
-    size_t number;  // of that one
-    bool is_unfit;  // the last image's settings or scene do not fit a device
+    bool is_single;                 // only one of those that are listed, see devices_open_one
+    size_t number;                  // of that one
+    const char *reference_selector; // NULL: not given
+    bool is_unfit;                  // the last image's settings or scene do not fit a device
 } RenderDevices;
 
 // Those that the selector lists. True where they are open already. False, with a message, if there is none.

@@ -87,6 +87,7 @@ static void device_print(const RenderReport *report)
     line_print("upload", report->upload_seconds, "");
     launches_print("launches", report->launches.items, report->launches.count);
     launches_print("read-back", report->reads.items, report->reads.count);
+    if (report->reference_device) fprintf(stderr, "  in double by %s\n", report->reference_device->name);
 }
 
 static void pilot_print(const Pilot *pilot)
@@ -189,6 +190,7 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_text(json, "name", report->device->name);
     json_text(json, "platform", report->device->platform_name);
     json_text(json, "driver", report->device->driver);
+    json_text(json, "double_by", report->reference_device ? report->reference_device->name : NULL);
     json_int64(json, "lanes", report->lanes);
     hash_json(json, "kernel_hash", report->kernel_hash);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);

@@ -34,6 +34,7 @@ enum {
         {"size", required_argument, NULL, OPTION_SIZE},                                                      \
         {"seconds", required_argument, NULL, OPTION_SECONDS},                                                \
         {"device", required_argument, NULL, OPTION_DEVICE},                                                  \
+        {"reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE},                              \
         {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
     {                                                                                                        \
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
@@ -45,7 +46,7 @@ enum {
     "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
     "      --size WxH        image size (default: as glint render)\n"                                        \
     "      --seconds MAX     time limit of the measurement, converged or not (default: 5 per "               \
-    "row)\n" HELP_DEVICE HELP_LENIENT HELP_MAX_PIXELS
+    "row)\n" HELP_DEVICE HELP_REFERENCE HELP_LENIENT HELP_MAX_PIXELS
 
 // Handles one of these options; *valid receives whether its value is valid, with a message if not. False if
 // `option` is another one.

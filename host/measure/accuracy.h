@@ -128,6 +128,7 @@ typedef struct {
     struct {
         const char *file; // NULL: it was rendered as the next say
         const char *precision, *bvh;
+        const char *device; // NULL: that of the variants
         uint32_t lanes, samples;
         uint64_t kernel_hash;
         size_t nonfinite, negative; // pixels

@@ -27,6 +27,8 @@ void compute_close(Compute *compute)
 {
     if (compute->queue) clReleaseCommandQueue(compute->queue);
     if (compute->context) clReleaseContext(compute->context);
+    if (compute->reference) compute_close(compute->reference);
+    free(compute->reference);
     free(compute->failure.detail);
     *compute = (Compute){0};
 }
@@ -51,6 +53,24 @@ void compute_fail(Compute *compute, const char *call, cl_int status, const char 
     if (vasprintf(&text, detail, arguments) < 0) fault("out of memory: message");
     va_end(arguments);
     failure_keep(compute, call, status, text);
+}
+
+bool compute_open_reference(Compute *compute, const Device *device)
+{
+    compute->reference = memory_allocate_zeroed(1, sizeof *compute->reference);
+    compute_open(compute->reference, device);
+    return compute_check_reference(compute);
+}
+
+bool compute_check_reference(Compute *compute)
+{
+    const Compute *reference = compute->reference;
+    if (!reference || compute_ok(reference) || !compute_ok(compute)) return compute_ok(compute);
+    char *text = compute_failure_text(reference);
+    compute_fail(compute, reference->failure.call, reference->failure.status, "by its reference device: %s",
+                 text);
+    free(text);
+    return false;
 }
 
 bool compute_check(Compute *compute, cl_int status, const char *call)

@@ -15,17 +15,28 @@ typedef struct {
     char *detail;  // what else is known, such as a build log; NULL: nothing
 } ComputeFailure;
 
-typedef struct {
+typedef struct Compute {
     const Device *device; // outlives the Compute
     cl_context context;
     cl_command_queue queue;       // in order, profiling on
     ComputeFailure failure;       // the first
     ComputeFailure unmap_failure; // the first of an unmap; a failure of the Compute at the next launch
+    struct Compute *reference;    // another device, for work in double; NULL: this one does it
 } Compute;
 
 // False: it failed. Closed by compute_close either way.
 bool compute_open(Compute *compute, const Device *device);
 void compute_close(Compute *compute); // and zeroes; accepts a zeroed one
+
+// Opens the device as the Compute's reference, which compute_close closes.
+bool compute_open_reference(Compute *compute, const Device *device);
+// The Compute that does this one's work in double.
+static inline Compute *compute_in_double(Compute *compute)
+{
+    return compute->reference ? compute->reference : compute;
+}
+// A reference's failure becomes one of the Compute. Returns compute_ok.
+bool compute_check_reference(Compute *compute);
 
 static inline bool compute_ok(const Compute *compute)
 {

@@ -345,6 +345,19 @@ const Device *device_choose(const DeviceList *list, const char *selector, Messag
     return best;
 }
 
+const Device *device_choose_reference(const DeviceList *list, const char *selector, MessageList *messages)
+{
+    const Device *best = selector ? device_choose(list, selector, messages) : NULL;
+    for (size_t i = 0; i < list->count && !selector; i++) {
+        const Device *other = &list->items[i];
+        if (!device_usable(other, NULL) || !other->fp64) continue;
+        if (!best || device_rank(other) > device_rank(best)) best = other;
+    }
+    if (!best || best->fp64) return best;
+    message_error(messages, "the reference device \"%s\" has no 64-bit floating point", best->name);
+    return NULL;
+}
+
 static bool any_matches(const DeviceList *list, const char *selector)
 {
     for (size_t i = 0; i < list->count; i++)

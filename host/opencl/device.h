@@ -57,6 +57,10 @@ const Device *device_choose(const DeviceList *list, const char *selector, Messag
 size_t devices_choose(const DeviceList *list, const char *selector, const Device ***devices,
                       MessageList *messages);
 
+// The device that works in double for one that cannot: that of `selector`, or for NULL the default among
+// those with 64-bit floating point. Returns NULL, with an error message about the selector, if there is none.
+const Device *device_choose_reference(const DeviceList *list, const char *selector, MessageList *messages);
+
 // The selector the user gave: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
 // NULL.
 const char *device_selector(const char *option);

@@ -10,8 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool settings_fit(const RenderSettings *settings, const Device *device, MessageList *messages)
+static bool settings_fit(const RenderSettings *settings, const Compute *compute, MessageList *messages)
 {
+    const Device *device = compute->device;
     uint32_t lanes = settings->lanes;
     if (lanes != 0 && lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16)
         return message_error(messages, "lanes must be 1, 4, 8 or 16, not %u", lanes);
@@ -35,10 +36,12 @@ static bool settings_fit(const RenderSettings *settings, const Device *device, M
             messages,
             "precision certified: its bounds cover errors of the size that devices have, not %u times that",
             settings->perturb_scale);
-    if (settings->precision == PRECISION_CERTIFIED && !device->fp64)
-        return message_error(messages,
-                             "precision certified needs 64-bit floating point, which the device \"%s\" lacks",
-                             device->name);
+    if (settings->precision == PRECISION_CERTIFIED && !device->fp64 && !compute->reference)
+        return message_error(
+            messages,
+            "precision certified needs 64-bit floating point, which the device \"%s\" lacks, and "
+            "no other device works in double for it",
+            device->name);
     return true;
 }
 
@@ -166,13 +169,15 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     renderer->settings = pass_settings(settings, pass);
     RenderReport *report = &renderer->report;
     report->device = compute->device;
+    report->reference_device = compute->reference ? compute->reference->device : NULL;
     report->build_from_cache = true;
     report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
     report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->is_double);
     if (earlier) renderer_kernels_take(renderer, earlier);
     if (renderer_certifies(renderer))
-        renderer->repeat = prepare(compute, settings, pass + 1, earlier ? earlier->repeat : NULL);
+        renderer->repeat =
+            prepare(compute_in_double(compute), settings, pass + 1, earlier ? earlier->repeat : NULL);
     return renderer;
 }
 
@@ -180,7 +185,7 @@ Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, 
                               MessageList *messages)
 {
     Renderer *renderer = NULL;
-    if (compute_ok(compute) && settings_fit(settings, compute->device, messages))
+    if (compute_ok(compute) && settings_fit(settings, compute, messages))
         renderer = prepare(compute, settings, PASS_ALL, earlier);
     renderer_close(earlier);
     return renderer;
@@ -233,7 +238,7 @@ bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, 
     Renderer *taker = of_pass(renderer, pass);
     const bool has_room = device_has_room(compiled, taker, messages);
     scene_give(&taker, has_room, compiled);
-    return has_room && compute_ok(renderer->compute);
+    return has_room && compute_check_reference(renderer->compute);
 }
 
 // The renderers of a variant. Closes those of them whose devices have no room for the scene.
@@ -296,7 +301,7 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
         renderers[i] = renderer_open_empty(computes[i], &shared, renderers[i], &of_each[i]);
     const bool compiles = variants_compile(renderers, count, scene, &shared, others, messages, of_each);
     for (size_t i = 0; i < count; i++) {
-        if (compiles && compute_ok(computes[i])) continue;
+        if (compiles && compute_check_reference(computes[i])) continue;
         renderer_close(renderers[i]);
         renderers[i] = NULL;
     }
@@ -331,7 +336,7 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
                    MessageList *messages)
 {
     const RenderSettings of_pass = pass_settings(settings, renderer->pass);
-    if (!compute_ok(renderer->compute) || !settings_fit(&of_pass, renderer->compute->device, messages) ||
+    if (!compute_ok(renderer->compute) || !settings_fit(&of_pass, renderer->compute, messages) ||
         !scene_assign(renderer, scene, &of_pass, messages))
         return false;
     renderer->settings = of_pass;
@@ -339,7 +344,8 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
     arrays_upload(&renderer, 1, &renderer->compiled);
     scene_changed(renderer); // another eye may need another feature, or a deeper stack
     return compute_ok(renderer->compute) &&
-           (!renderer->repeat || renderer_move(renderer->repeat, scene, settings, messages));
+           (!renderer->repeat || renderer_move(renderer->repeat, scene, settings, messages)) &&
+           compute_check_reference(renderer->compute);
 }
 
 uint64_t renderer_scene_hash(const Renderer *renderer)

@@ -79,10 +79,10 @@ typedef struct {
 // Opens a renderer on each device. The scene is compiled once for each variant that they or the receivers
 // (NULL: none) need, and uploaded; kernels are built when first used. False with a message, and all renderers
 // NULL: a number of the scene does not fit the precision. A single renderer is NULL with a message in its own
-// list if the settings do not fit its device (double or certified without fp64, lanes not 1, 4, 8 or 16), or
-// the scene its memory; without one if the device failed, see Compute. Computes outlive their renderers.
-// `moves` is ignored where there are several devices. renderers[i] is NULL before, or an earlier renderer of
-// the device, which is closed: its kernels are used again where they suit.
+// list if the settings do not fit its device (double without fp64, certified where its reference lacks that,
+// lanes not 1, 4, 8 or 16), or the scene its memory; without one if the device failed, see Compute. Computes
+// outlive their renderers. `moves` is ignored where there are several devices. renderers[i] is NULL before,
+// or an earlier renderer of the device, which is closed: its kernels are used again where they suit.
 bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count, const Scene *scene,
                     const RenderSettings *settings, const SceneReceivers *others, MessageList *messages,
                     MessageList *of_each);
@@ -177,6 +177,7 @@ typedef struct {
 
 typedef struct {
     const Device *device;
+    const Device *reference_device; // that re-renders pixels at `certified`; NULL: `device` does
     FeatureSet features;
     uint32_t lanes;
     bool is_double; // structs in double

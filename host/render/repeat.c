@@ -58,7 +58,7 @@ static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem 
     void *values = renderer_map(renderer, of_band, film_layer_size(band, layer), CL_MAP_READ | CL_MAP_WRITE);
     if (!values) return;
     void *repeated = memory_allocate(film_layer_size(&film, layer), 1);
-    const bool is_read = buffer_read(renderer->compute, of_list, film_layer_size(&film, layer), repeated);
+    const bool is_read = buffer_read(repeat->compute, of_list, film_layer_size(&film, layer), repeated);
     for (size_t i = 0; i < list->index.count && is_read; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->index.items[i] * components + k;
@@ -150,11 +150,11 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
             layer_merge(renderer, layer, repeated.layers[layer], band->buffers->layers[layer], list,
                         &band->film);
     if (undecided && whole)
-        buffer_read(renderer->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
+        buffer_read(repeat->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
                     list->index.count * sizeof *undecided, undecided);
     repeat_launches_take(&renderer->report, &repeat->report);
     band_buffers_close(&repeated);
-    return whole && compute_ok(renderer->compute);
+    return compute_check_reference(renderer->compute) && whole;
 }
 
 // Leaves those of the list's pixels that are undecided; returns the number of their undecided samples.

@@ -1,5 +1,6 @@
 // Preloaded into glint by tests/test_device_limits.py: OpenCL devices report the limits that GLINT_LIMITS
-// lists, NAME or NAME=VALUE with commas between, and enforce them.
+// lists, NAME or NAME=VALUE with commas between, and enforce them. Where GLINT_LIMITED is set, only devices
+// with that in their names report limits, and only of arithmetic are they then enforced.
 //
 //   embedded       the embedded profile
 //   toward-zero    float arithmetic does not round to nearest
@@ -57,9 +58,18 @@ static void word_remove(char *text, const char *word)
     if (at) memmove(at, at + strlen(word), strlen(at + strlen(word)) + 1);
 }
 
+static bool is_limited(cl_device_id device)
+{
+    const char *limited = getenv("GLINT_LIMITED");
+    char name[256] = "";
+    if (limited) NEXT(clGetDeviceInfo)(device, CL_DEVICE_NAME, sizeof name - 1, name, NULL);
+    return !limited || strstr(name, limited);
+}
+
 cl_int clGetDeviceInfo(cl_device_id device, cl_device_info what, size_t size, void *to, size_t *needed)
 {
     size_t value;
+    if (!is_limited(device)) return NEXT(clGetDeviceInfo)(device, what, size, to, needed);
     if (what == CL_DEVICE_PROFILE && limit_get("embedded", NULL))
         return answer("EMBEDDED_PROFILE", sizeof "EMBEDDED_PROFILE", size, to, needed);
     if (what == CL_DEVICE_MAX_WORK_GROUP_SIZE && limit_get("group", &value)) return ANSWER(size_t, value);
@@ -94,8 +104,10 @@ cl_int clGetKernelWorkGroupInfo(cl_kernel kernel, cl_device_id device, cl_kernel
 cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const char **texts,
                                      const size_t *lengths, cl_int *status)
 {
+    cl_device_id device;
+    clGetContextInfo(context, CL_CONTEXT_DEVICES, sizeof device, &device, NULL);
     for (cl_uint i = 0; i < count; i++)
-        if (limit_get("no-double", NULL) && strstr(texts[i], "#define IS_DOUBLE 1")) {
+        if (is_limited(device) && limit_get("no-double", NULL) && strstr(texts[i], "#define IS_DOUBLE 1")) {
             *status = CL_INVALID_VALUE; // glint was told that there is no such type
             return NULL;
         }

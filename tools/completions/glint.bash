@@ -22,6 +22,7 @@ _glint() {
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
     --device) words="cpu gpu all" ;;
+    --reference-device) words="cpu gpu" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
     --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
     esac

@@ -17,6 +17,7 @@ _glint() {
     --bits) compadd 8 16 ;;
     --transfer) compadd srgb none ;;
     --device) compadd cpu gpu all ;;
+    --reference-device) compadd cpu gpu ;;
     --timing) [[ -n $IPREFIX ]] && compadd json || _files ;;
     --aov) _sequence compadd - ${(f)"$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p')"} ;;
     *)
