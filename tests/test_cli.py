@@ -137,9 +137,11 @@ class WrongInput(CliTestCase):
         write("bad.rt", "bogus 1\n")
         self.refuses("check bad.rt", "^Error$")
         write("far.yaml", SPHERE.replace("[3, 4, -5]", "[3e20, 4, -5]"))
-        self.refuses(f"render far.yaml {SMALL}", r"light .*3e.20")
+        for command in (f"render far.yaml {SMALL}", "check far.yaml"):
+            self.refuses(command, r"light .*3e.20")
         write("bright.yaml", SPHERE.replace("[3, 4, -5]", "[3, 4, -5], color: [1e20, 1, 1], intensity: 1e20"))
-        self.refuses(f"render bright.yaml {SMALL}", "precision single")
+        for command in (f"render bright.yaml {SMALL}", "check bright.yaml"):
+            self.refuses(command, "precision single")
         self.nothing_left("*.png")
 
 

@@ -528,6 +528,29 @@ static void distance_from_origin_changes_nothing(void **state)
     film_free(&films[1]);
 }
 
+// Plates so far away that both ends round to one point keep their form.
+static void plates_far_away(Precision precision)
+{
+    const char *const shapes[] = {"cylinder: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: 1e6}",
+                                  "cone: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: [1e6, 9e5]}",
+                                  "cylinder: {from: [0, -2e7, -2e7], to: [0, -20000000.5, -20000000.5], "
+                                  "radius: 1e6}"};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        Text text = {0};
+        text_appendf(&text,
+                     "camera: {position: [0, 0, 0], look_at: [0, %d, -1], fov: 10}\nbackground: [0.25, 0.25, "
+                     "0.25]\nambient: [1, 1, 1]\nobjects:\n  - %s\n",
+                     i == 2 ? -1 : 0, shapes[i]);
+        Scene scene = scene_of(text_c(&text));
+        text_free(&text);
+        Film film = render(&scene, 15, 15, precision, AOV_OBJECT);
+        check(film.object[7 * 15 + 7] == 0);
+        check(film.object[0] == UINT32_MAX && film.object[14 * 15 + 7] == UINT32_MAX);
+        film_free(&film);
+        scene_free(&scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -539,6 +562,7 @@ int main(void)
         AT_EACH_PRECISION(tilted_plane),
         AT_EACH_PRECISION(inside),
         AT_EACH_PRECISION(ground_horizon),
+        AT_EACH_PRECISION(plates_far_away),
         cmocka_unit_test(facing_panes),
         cmocka_unit_test(degenerate_cameras),
         cmocka_unit_test(single_pixel_and_extreme_fields),

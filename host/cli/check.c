@@ -4,6 +4,7 @@
 #include "host/base/json.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/compile/compile.h"
 #include "host/compile/features.h"
 #include "host/compile/scene_bounds.h"
 #include "host/import/load.h"
@@ -148,7 +149,6 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
     json_print(json, stdout);
 }
 
-// Only rendering reads the textures; here they must exist.
 static bool images_are_there(const Scene *scene, MessageList *messages)
 {
     const Source source = scene_source(scene);
@@ -159,6 +159,22 @@ static bool images_are_there(const Scene *scene, MessageList *messages)
         if (obstacle) report_error(&report, texture->offset, "cannot read '%s': %s", texture->path, obstacle);
     }
     return report_close(&report);
+}
+
+// Whether the scene fits the precision that glint render takes by default.
+static bool scene_renders(const Scene *scene, MessageList *messages)
+{
+    const CompileSettings settings = {.width = 1,
+                                      .height = 1,
+                                      .sample_count = 1,
+                                      .precision = PRECISION_SINGLE,
+                                      .lanes = 1,
+                                      .bvh = BVH_OFF,
+                                      .shift_to_eye = true};
+    CompiledScene compiled;
+    if (!scene_compile(&compiled, scene, &settings, messages)) return false;
+    compiled_scene_free(&compiled);
+    return true;
 }
 
 static bool object_print(const Scene *scene, const char *path, uint32_t id)
@@ -204,7 +220,8 @@ int command_check(int argument_count, char **arguments)
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};
-    bool loaded = scene_load(&scene, path, &scene_options, &messages) && images_are_there(&scene, &messages);
+    bool loaded = scene_load(&scene, path, &scene_options, &messages) &&
+                  images_are_there(&scene, &messages) && scene_renders(&scene, &messages);
     if (as_json) {
         json_report(path, &scene, loaded, &messages);
         message_list_free(&messages);

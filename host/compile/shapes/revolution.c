@@ -8,13 +8,24 @@ typedef struct {
     bool finite, caps, only_inside;
 } RevolutionGiven;
 
+// Both ends are rounded as points, so that they stay where the points of other objects are rounded to; unless
+// that turns the axis of a short shape far away, or leaves none: then its base alone is, and it keeps its
+// form.
+static Vector3 axis_between_rounded_ends(const Rounding *rounding, const RevolutionGiven *given, Vector3 base)
+{
+    if (!given->finite) return given->axis;
+    const Vector3 axis =
+        vector_subtract(point_from_eye(rounding, vector_add(given->from, given->axis)), base);
+    const double length = vector_length(given->axis),
+                 turned = vector_length(vector_subtract(axis, given->axis)) / length;
+    const bool keeps_form = turned * fmax(1, fmax(given->base_radius, given->end_radius) / length) < 0x1p-6;
+    return keeps_form ? axis : given->axis;
+}
+
 static Revolution revolution_rounded(const Rounding *rounding, const RevolutionGiven *given)
 {
     Vector3 base = point_from_eye(rounding, given->from);
-    Vector3 axis = given->axis;
-    // both ends are rounded as points, so that they stay where the points of other objects are rounded to
-    if (given->finite)
-        axis = vector_subtract(point_from_eye(rounding, vector_add(given->from, given->axis)), base);
+    const Vector3 axis = axis_between_rounded_ends(rounding, given, base);
     Vector3 scaled = vector_rounded(rounding, axis_scaled(axis));
     double length = vector_length(scaled);
     double radius = rounded(rounding, given->base_radius);
