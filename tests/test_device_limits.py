@@ -1,8 +1,10 @@
 #!/usr/bin/env -S python3 -B
 """Limits of devices, which tests/shims/limits.c reports and enforces: glint works within each, with the same bits, or
 refuses the device with the reason."""
+import json
 import os
 import re
+import shutil
 from pathlib import Path
 
 from glint import ROOT, SPHERE, TestCase, find_icd, main, need_device, npy_read, read, run, shim_build, skip_all, write
@@ -29,6 +31,8 @@ WORKS = (
     ("first=4096", "trace sphere.yaml --rays rays.txt --lanes 1"),
     ("first=4096", "verify S1 M1 --precision strict --lanes 1"),
 )
+# Limits: warned of, with the same bits. The statuses are CL_OUT_OF_HOST_MEMORY and CL_OUT_OF_RESOURCES.
+INLINED = "build=6", "kernel=5"
 # Limits, command, exit status, message.
 REFUSED = (
     ("embedded", f"{RENDER} --precision strict", 1, "precision strict: the device .* has the embedded profile"),
@@ -38,6 +42,13 @@ REFUSED = (
     ("no-double", f"{RENDER} --precision double", 1, "precision double: the device .* has no 64-bit floating point"),
     (f"buffer={16 * MEBI}", "render large.yaml -o image.npy --quiet", 1, "the scene needs .* at most 16.0 MiB in one buffer"),
     (f"memory={64 * MEBI}", "render large.yaml -o image.npy --quiet", 1, "the scene needs .* the device .* has 64.0 MiB"),
+    # 4 lanes have their functions out of line in any case
+    ("build=6", f"{RENDER} --lanes 4", 2, "clBuildProgram: CL_OUT_OF_HOST_MEMORY .*: the driver's compiler ran out of memory"),
+    ("build=5", f"{RENDER} --lanes 4", 2, "clBuildProgram: CL_OUT_OF_RESOURCES .* ran out of memory or time"),
+    ("build=11", f"{RENDER} --lanes 4", 2, "clBuildProgram: CL_BUILD_PROGRAM_FAILURE .* does not accept the kernel"),
+    ("kernel=5", f"{RENDER} --lanes 4", 2, "clCreateKernel: CL_OUT_OF_RESOURCES .*: the kernel needs more registers"),
+    ("kernel=6", f"{RENDER} --lanes 4", 2, "clCreateKernel: CL_OUT_OF_HOST_MEMORY .*: the driver ran out of memory"),
+    ("kernel=46", f"{RENDER} --lanes 4", 2, "clCreateKernel: CL_INVALID_KERNEL_NAME .*: the driver's build left the kernel out"),
     # a limit that the device does not report
     ("first=1000", f"{RENDER} --lanes 1", 2, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES .* on "),
 )
@@ -77,6 +88,25 @@ class DeviceLimits(TestCase):
         for limits, command in WORKS:
             with self.subTest(limits=limits, command=command):
                 self.assertEqual(self.outputs(command, limits), self.outputs(command, None))
+
+    def test_is_built_out_of_line(self):
+        command = f"render {ROOT}/tests/scenes/mirror-balls.yaml --size 64x48 --lanes 1 --precision strict --quiet --aov path,t"
+        cache = {"XDG_CACHE_HOME": os.path.abspath("cache")}
+        self.glint(f"{command} -o one.npy", env=POCL | cache)
+        for limits in INLINED:
+            with self.subTest(limits=limits):
+                shutil.rmtree("cache")  # or its kernel would be found
+                limited = POCL | cache | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits}
+                for is_cached in False, True:
+                    process = self.glint(f"{command} -o image.npy --timing=json", env=limited)
+                    self.assertRegex(process.stderr, "warning: the compiler of the device .* functions out of line")
+                    device = json.loads(process.stdout)["by_device"][0]
+                    self.assertTrue(device["build_out_of_line"])
+                    self.assertEqual(device["build_from_cache"], is_cached)
+                    for end in "npy", "path.npy", "t.npy":
+                        self.assertSameBytes(f"one.{end}", f"image.{end}")
+        report = self.json(f"{command} -o image.npy --timing=json", env=POCL | cache | {"XDG_CACHE_HOME": "other"})
+        self.assertFalse(report["by_device"][0]["build_out_of_line"])
 
     def test_is_refused(self):
         large_mesh("large.obj")

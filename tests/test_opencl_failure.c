@@ -48,11 +48,12 @@ static void calls_fail(const char *call, bool returns_null, bool is_needed)
 static void test_needed_calls(void **state)
 {
     (void)state;
-    static const char *const needed[] = {
-        "clCreateContext",     "clCreateCommandQueue", "clCreateBuffer", "clSetMemObjectDestructorCallback",
-        "clCreateKernel",      "clSetKernelArg",       "clFinish",       "clEnqueueWriteBuffer",
-        "clEnqueueReadBuffer", "clEnqueueMapBuffer",   "clGetEventInfo", "clEnqueueNDRangeKernel",
-        "clWaitForEvents"};
+    static const char *const needed[] = {"clCreateContext",        "clCreateCommandQueue",
+                                         "clCreateBuffer",         "clSetMemObjectDestructorCallback",
+                                         "clSetKernelArg",         "clFinish",
+                                         "clEnqueueWriteBuffer",   "clEnqueueReadBuffer",
+                                         "clEnqueueMapBuffer",     "clGetEventInfo",
+                                         "clEnqueueNDRangeKernel", "clWaitForEvents"};
     for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
         calls_fail(needed[i], false, true);
     assert_work_is_right();
@@ -75,7 +76,7 @@ static void test_needed_objects(void **state)
 {
     (void)state;
     static const char *const creating[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer",
-                                           "clCreateKernel", "clEnqueueMapBuffer"};
+                                           "clEnqueueMapBuffer"};
     for (size_t i = 0; i < sizeof creating / sizeof *creating; i++)
         calls_fail(creating[i], true, true);
     assert_work_is_right();
@@ -115,16 +116,23 @@ static void test_empty_build_log(void **state)
     assert_work_is_right();
 }
 
-// A cached program that the driver refuses is built from source, without a cache every program is.
+// A cached program that the driver refuses, or from which it creates no kernel, is built from source, without
+// a cache every program is. A failed build is repeated with functions out of line.
 static void test_builds(void **state)
 {
     (void)state;
     calls_fail("clCreateProgramWithBinary", false, false);
     calls_fail("clCreateProgramWithBinary", true, false);
     calls_fail("clBuildProgram", false, false);
+    calls_fail("clCreateKernel", false, false);
+    calls_fail("clCreateKernel", true, false);
     char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
     setenv("XDG_CACHE_HOME", "/dev/null", 1);
-    calls_fail("clCreateProgramWithSource", false, true);
+    calls_fail("clCreateProgramWithSource", false, false);
+    call_fail("clCreateProgramWithSource", EVERY_CALL, false, true);
+    calls_fail("clCreateKernel", false, false);
+    call_fail("clCreateKernel", EVERY_CALL, false, true);
+    call_fail("clCreateKernel", EVERY_CALL, true, true);
     call_fail("clBuildProgram", 0, false, false); // built once more, despite PoCL's cache
     call_fail("clBuildProgram", EVERY_CALL, false, true);
     assert_work_is_right();

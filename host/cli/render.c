@@ -120,6 +120,13 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     if (whole && times->repeats.undecided > 0)
         message_warning(messages, "%llu samples are undecided, and are as at precision double",
                         (unsigned long long)times->repeats.undecided);
+    for (size_t i = 0; i < devices->count && whole; i++)
+        if (renderer_report(renderers[i])->is_out_of_line)
+            message_warning(
+                messages,
+                "the compiler of the device \"%s\" failed at a kernel with its functions inlined; it is "
+                "built with functions out of line, which is slower",
+                renderer_report(renderers[i])->device->name);
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
     messages_print(messages, NULL);
     int status = whole                    ? EXIT_DONE

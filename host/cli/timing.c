@@ -84,6 +84,7 @@ static void device_print(const RenderReport *report)
     line_print("flatten", report->flatten_seconds, "");
     if (report->features & FEATURE_BVH) line_print("bvh", report->bvh_seconds, "");
     line_print("build", report->build_seconds, report->build_from_cache ? "from the cache" : "compiled");
+    if (report->is_out_of_line) fputs("    functions out of line\n", stderr);
     line_print("upload", report->upload_seconds, "");
     launches_print("launches", report->launches.items, report->launches.count);
     launches_print("read-back", report->reads.items, report->reads.count);
@@ -200,6 +201,7 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
         json_none(json, "bvh_ms");
     json_number(json, "build_ms", 1e3 * report->build_seconds);
     json_bool(json, "build_from_cache", report->build_from_cache);
+    json_bool(json, "build_out_of_line", report->is_out_of_line);
     json_number(json, "upload_ms", 1e3 * report->upload_seconds);
     share_json(json, &report->share, settings);
     launches_json(json, "launches", report->launches.items, report->launches.count);

@@ -105,6 +105,8 @@ static char *failure_text(const Compute *compute, const ComputeFailure *failure)
     else
         text_appendf(&text, "%s (%d)", cl_status_name(failure->status), failure->status);
     text_appendf(&text, " on %s%s", compute->device->name, fault_limits());
+    const char *meaning = cl_status_meaning(failure->call, failure->status);
+    if (meaning) text_appendf(&text, ": %s", meaning);
     if (failure->detail) text_appendf(&text, ": %s", failure->detail);
     return text.items;
 }

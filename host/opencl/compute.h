@@ -64,6 +64,9 @@ char *compute_unmap_failure_text(const Compute *compute);
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"
     const char *prelude; // definitions placed before the text (features, LANES, precision)
+    // For a second build where the first fails: definitions that make the text easier to compile. NULL: none.
+    const char *easy_prelude;
+    const char *kernel;  // a program from which it cannot be created is not built; NULL: none is created
     const char *options; // compiler flags only
     const char *launch;  // kernel and work-group size, such as "render 8x1"; may be NULL; see program_store
     bool no_cache;
@@ -71,7 +74,9 @@ typedef struct {
 
 typedef struct {
     cl_program program;
+    cl_kernel kernel;   // the request's; NULL: none, or the caller has it
     uint64_t text_hash; // of the composed text, prelude included
+    bool is_easy;       // built with the easy prelude
     double build_seconds;
     bool from_cache;
 } Program;
@@ -80,6 +85,7 @@ typedef struct {
 // (host/opencl/cache.h) or builds it. The key: text, options, launch, device name, driver, platform version
 // and the cache's own format version. `no_cache` bypasses PoCL's own cache, too. False: failed; where the
 // text does not compile, the detail has the build log and the file in which the composed text was saved.
+// Where both builds fail, the first one's failure is kept.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
 // Writes the program to the cache, unless it came from there. Call after its first launch has ended: PoCL
 // compiles a kernel at its first launch, a binary holds what was launched by then, and a program loaded from

@@ -76,3 +76,5 @@ unsigned device_lanes(const Device *device, bool is_double);
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
 
 const char *cl_status_name(cl_int status); // "CL_SUCCESS", …
+// What a status of an OpenCL function means, in words; NULL: no more than its name.
+const char *cl_status_meaning(const char *function, cl_int status);

@@ -69,18 +69,47 @@ static void describe_cache_disk(Text *text)
                      free_kibi);
 }
 
-static void build_fail(Compute *compute, cl_program program, cl_int status, const char *text,
-                       const char *options)
+// A build and, where one is requested, its kernel.
+typedef struct {
+    cl_program program;
+    cl_kernel kernel;
+    const char *failed_call; // NULL: none
+    cl_int status;
+} Build;
+
+static void build_release(Build *build)
 {
-    char *log = build_log(compute, program), *path = save_text(text);
-    Text reason = {0};
-    text_appendf(&reason, "%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
-    describe_cache_disk(&reason);
-    compute_fail(compute, "clBuildProgram", status, "options \"%s\"\n%s\nthe composed text: %s", options,
-                 text_c(&reason), path);
-    text_free(&reason);
-    free(path);
-    free(log);
+    if (build->kernel) clReleaseKernel(build->kernel);
+    if (build->program) clReleaseProgram(build->program);
+    *build = (Build){0};
+}
+
+static bool build_check(Build *build, const char *call, cl_int status, bool is_there)
+{
+    fault_note_call(NULL);
+    if (status == CL_SUCCESS && is_there) return true;
+    build->failed_call = call;
+    build->status = status;
+    return false;
+}
+
+// Releases the build.
+static void build_report(Compute *compute, Build *build, const char *text, const char *options)
+{
+    if (build->program && strcmp(build->failed_call, "clBuildProgram") == 0) {
+        char *log = build_log(compute, build->program), *path = save_text(text);
+        Text reason = {0};
+        text_appendf(&reason, "%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
+        describe_cache_disk(&reason);
+        compute_fail(compute, build->failed_call, build->status, "options \"%s\"\n%s\nthe composed text: %s",
+                     options, text_c(&reason), path);
+        text_free(&reason);
+        free(path);
+        free(log);
+    } else {
+        compute_check_object(compute, NULL, build->status, build->failed_call);
+    }
+    build_release(build);
 }
 
 // PoCL has a cache of its own, with the options in its key: an option never used before makes it build.
@@ -91,70 +120,104 @@ static void append_unused_option(Text *options)
     text_appendf(options, " -D GLINT_BUILD=%jd%09ld%d", (intmax_t)now.tv_sec, now.tv_nsec, (int)getpid());
 }
 
-// NULL: failed; unless `afresh`, a failed build is no failure of the Compute yet.
-static cl_program build_from_source(Compute *compute, const char *text, const char *options, bool afresh)
+static void kernel_create(Build *build, const char *name)
 {
+    if (!name) return;
+    cl_int status;
+    fault_note_call("clCreateKernel");
+    build->kernel = clCreateKernel(build->program, name, &status);
+    build_check(build, "clCreateKernel", status, build->kernel);
+}
+
+// Builds `text`, which a driver that has a cache builds again if `afresh`.
+static Build build_from_source(Compute *compute, const char *text, const ProgramRequest *request, bool afresh)
+{
+    Build build = {0};
     cl_int status;
     fault_note_call("clCreateProgramWithSource");
-    cl_program program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
-    if (!compute_check_object(compute, program, status, "clCreateProgramWithSource")) return NULL;
-    Text all_options = {0};
-    text_appendf(&all_options, "%s", options);
-    if (afresh) append_unused_option(&all_options);
+    build.program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
+    if (!build_check(&build, "clCreateProgramWithSource", status, build.program)) return build;
+    Text options = {0};
+    text_appendf(&options, "%s", or_empty(request->options));
+    if (afresh) append_unused_option(&options);
     fault_note_call("clBuildProgram");
-    status = clBuildProgram(program, 1, &compute->device->id, text_c(&all_options), NULL, NULL);
-    fault_note_call(NULL);
-    text_free(&all_options);
-    if (status == CL_SUCCESS) return program;
-    if (afresh) build_fail(compute, program, status, text, options);
-    clReleaseProgram(program);
-    return NULL;
+    status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
+    text_free(&options);
+    if (build_check(&build, "clBuildProgram", status, true)) kernel_create(&build, request->kernel);
+    return build;
 }
 
 // Processes that build the same program at once can fail in PoCL's cache (3.1: one removes the file that
 // another reads), so a build counts as failed only if it fails outside that cache, too.
-static cl_program build_with_retry(Compute *compute, const char *text, const char *options)
+static Build build_with_retry(Compute *compute, const char *text, const ProgramRequest *request)
 {
-    cl_program program = build_from_source(compute, text, options, false);
-    return program || !compute_ok(compute) ? program : build_from_source(compute, text, options, true);
+    Build build = {0};
+    if (!request->no_cache) {
+        build = build_from_source(compute, text, request, false);
+        if (!build.failed_call || strcmp(build.failed_call, "clBuildProgram") != 0) return build;
+        build_release(&build);
+    }
+    return build_from_source(compute, text, request, true);
 }
 
-// NULL if the driver refuses the binary.
-static cl_program build_from_binary(const Compute *compute, const Text *binary, const char *options)
+// Without a program if the driver refuses the binary.
+static Build build_from_binary(const Compute *compute, const Text *binary, const ProgramRequest *request)
 {
+    Build build = {0};
     const unsigned char *bytes = (const unsigned char *)text_c(binary);
     cl_int binary_status, status;
     fault_note_call("clCreateProgramWithBinary");
-    cl_program program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
-                                                   &bytes, &binary_status, &status);
-    if (status != CL_SUCCESS || !program) return NULL;
-    fault_note_call("clBuildProgram");
-    status = clBuildProgram(program, 1, &compute->device->id, options, NULL, NULL);
-    fault_note_call(NULL);
-    if (status == CL_SUCCESS) return program;
-    clReleaseProgram(program);
-    return NULL;
+    build.program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
+                                              &bytes, &binary_status, &status);
+    if (build_check(&build, "clCreateProgramWithBinary", status, build.program)) {
+        fault_note_call("clBuildProgram");
+        status =
+            clBuildProgram(build.program, 1, &compute->device->id, or_empty(request->options), NULL, NULL);
+        if (build_check(&build, "clBuildProgram", status, true)) kernel_create(&build, request->kernel);
+    }
+    if (build.failed_call) build_release(&build);
+    return build;
+}
+
+static Build build_from_cache(const Compute *compute, const ProgramRequest *request, const char *text)
+{
+    Build build = {0};
+    if (request->no_cache || !text) return build;
+    char *key = request_key(compute, request, text);
+    Text binary = {0};
+    if (cache_load(key, &binary)) build = build_from_binary(compute, &binary, request);
+    text_free(&binary);
+    free(key);
+    return build;
 }
 
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program)
 {
     *program = (Program){0};
     if (!compute_ok(compute)) return false;
-    double start = clock_seconds();
-    const char *options = or_empty(request->options);
-    char *text = program_text(request->root, or_empty(request->prelude));
-    program->text_hash = hash_bytes(HASH_START, text, strlen(text));
-    if (request->no_cache) {
-        program->program = build_from_source(compute, text, options, true);
-    } else {
-        char *key = request_key(compute, request, text);
-        Text binary = {0};
-        if (cache_load(key, &binary)) program->program = build_from_binary(compute, &binary, options);
-        program->from_cache = program->program != NULL;
-        if (!program->from_cache) program->program = build_with_retry(compute, text, options);
-        text_free(&binary);
-        free(key);
+    const double start = clock_seconds();
+    char *text = program_text(request->root, or_empty(request->prelude)),
+         *easy_text = request->easy_prelude ? program_text(request->root, request->easy_prelude) : NULL;
+    Build build = build_from_cache(compute, request, text);
+    if (!build.program) {
+        // it is there where the text itself could not be built
+        build = build_from_cache(compute, request, easy_text);
+        program->is_easy = build.program != NULL;
     }
+    program->from_cache = build.program != NULL;
+    if (!build.program) build = build_with_retry(compute, text, request);
+    if (build.failed_call && easy_text) {
+        Build easy = build_with_retry(compute, easy_text, request);
+        program->is_easy = !easy.failed_call;
+        build_release(program->is_easy ? &build : &easy);
+        if (program->is_easy) build = easy;
+    }
+    const char *built_text = program->is_easy ? easy_text : text;
+    program->text_hash = hash_bytes(HASH_START, built_text, strlen(built_text));
+    if (build.failed_call) build_report(compute, &build, text, or_empty(request->options));
+    program->program = build.program;
+    program->kernel = build.kernel;
+    free(easy_text);
     free(text);
     program->build_seconds = clock_seconds() - start;
     return compute_ok(compute);
@@ -189,8 +252,8 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
         free(bytes);
         return;
     }
-    char *text = program_text(request->root, or_empty(request->prelude)),
-         *key = request_key(compute, request, text);
+    const char *prelude = program->is_easy ? request->easy_prelude : request->prelude;
+    char *text = program_text(request->root, or_empty(prelude)), *key = request_key(compute, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};
     cache_store(key, &binary);
     text_free(&binary);
@@ -200,6 +263,7 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
 
 void program_close(Program *program)
 {
+    if (program->kernel) clReleaseKernel(program->kernel);
     if (program->program) clReleaseProgram(program->program);
     *program = (Program){0};
 }

@@ -1,6 +1,7 @@
 // OpenCL's status codes by name.
 #include "host/opencl/device.h"
 #include <CL/cl_ext.h>
+#include <string.h>
 
 #define STATUS(name)                                                                                         \
     case name:                                                                                               \
@@ -72,4 +73,37 @@ const char *cl_status_name(cl_int status)
     default:
         return "a status unknown to OpenCL 1.2";
     }
+}
+
+static const struct {
+    const char *function;
+    cl_int status;
+    const char *meaning;
+} meanings[] = {
+    {"clBuildProgram", CL_OUT_OF_HOST_MEMORY, "the driver's compiler ran out of memory"},
+    {"clBuildProgram", CL_OUT_OF_RESOURCES,
+     "the driver's compiler ran out of memory or time, or the kernel needs more than the device has"},
+    {"clBuildProgram", CL_BUILD_PROGRAM_FAILURE, "the driver's compiler does not accept the kernel"},
+    {"clBuildProgram", CL_COMPILER_NOT_AVAILABLE, "the driver has no compiler"},
+    {"clBuildProgram", CL_INVALID_BUILD_OPTIONS, "the driver's compiler does not know an option"},
+    {"clCreateKernel", CL_OUT_OF_HOST_MEMORY, "the driver ran out of memory when it finished the kernel"},
+    {"clCreateKernel", CL_OUT_OF_RESOURCES,
+     "the kernel needs more registers, private memory or arguments than the device has"},
+    {"clCreateKernel", CL_INVALID_KERNEL_NAME, "the driver's build left the kernel out"},
+    {"clCreateKernel", CL_INVALID_KERNEL_DEFINITION, "the driver built the kernel with other arguments"},
+    {"clCreateKernel", CL_INVALID_PROGRAM_EXECUTABLE, "the driver reported a build that it did not finish"},
+    {"clEnqueueNDRangeKernel", CL_OUT_OF_RESOURCES,
+     "the kernel needs more than the device has, or its watchdog stopped it"},
+    {"clEnqueueNDRangeKernel", CL_MEM_OBJECT_ALLOCATION_FAILURE,
+     "the buffers do not fit the device's memory"},
+    {"clWaitForEvents", CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST,
+     "the device failed, or its watchdog stopped it"},
+};
+
+const char *cl_status_meaning(const char *function, cl_int status)
+{
+    for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
+        if (meanings[i].status == status && strcmp(meanings[i].function, function) == 0)
+            return meanings[i].meaning;
+    return NULL;
 }

@@ -50,6 +50,7 @@ static void variant_close(Renderer *renderer, KernelVariant *variant)
         program_close(&slot->program);
     }
     text_free(&variant->prelude);
+    text_free(&variant->easy_prelude);
     *variant = (KernelVariant){0};
 }
 
@@ -80,12 +81,13 @@ static bool has_fma(const Renderer *renderer)
     return renderer->report.is_double || device->fma_in_hardware || device->native_float_width > 1;
 }
 
-static void prelude_write(Text *text, const Renderer *renderer)
+static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_line)
 {
     const RenderSettings *settings = &renderer->settings;
     const Precision precision = settings->precision;
     const uint32_t scale = settings->perturb_scale;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
+    text_appendf(text, "#define IS_OUT_OF_LINE %d\n", is_out_of_line);
     text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
@@ -122,7 +124,7 @@ static bool variant_has(const KernelVariant *variant, const Text *prelude)
 void renderer_kernels_choose(Renderer *renderer)
 {
     Text prelude = {0};
-    prelude_write(&prelude, renderer);
+    prelude_write(&prelude, renderer, false);
     if (!variant_has(&renderer->variant, &prelude)) {
         const KernelVariant variant = renderer->variant;
         renderer->variant = renderer->other_variant;
@@ -133,6 +135,7 @@ void renderer_kernels_choose(Renderer *renderer)
     } else {
         variant_close(renderer, &renderer->variant);
         renderer->variant = (KernelVariant){.prelude = prelude, .options = build_options(renderer)};
+        if (renderer->report.lanes == 1) prelude_write(&renderer->variant.easy_prelude, renderer, true);
         memset(renderer->paces, 0, sizeof renderer->paces);
     }
     for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
@@ -165,6 +168,8 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     slot->request = (ProgramRequest){
         .root = kernel_sources[kind].file,
         .prelude = text_c(&renderer->variant.prelude),
+        .easy_prelude = renderer->variant.easy_prelude.items,
+        .kernel = kernel_sources[kind].name,
         .options = renderer->variant.options,
         .no_cache = renderer->settings.no_cache,
     };
@@ -173,7 +178,9 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
-    slot->kernel = program_kernel(renderer->compute, &slot->program, kernel_sources[kind].name);
+    renderer->report.is_out_of_line |= slot->program.is_easy;
+    slot->kernel = slot->program.kernel;
+    slot->program.kernel = NULL;
     scene_arguments_set(renderer, slot->kernel);
     return slot->kernel;
 }

@@ -16,6 +16,7 @@ typedef struct {
 // Kernels with the same definitions before their text.
 typedef struct {
     Text prelude;
+    Text easy_prelude; // with functions out of line; empty where they are in any case
     const char *options;
     KernelSlot kernels[KERNEL_COUNT];
 } KernelVariant;

@@ -78,6 +78,7 @@ static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
         array_push(report->launches, ((NamedLaunch){"repeat", of_repeat->launches.items[i].time}));
     report->build_seconds += of_repeat->build_seconds;
     report->build_from_cache &= of_repeat->build_from_cache;
+    report->is_out_of_line |= of_repeat->is_out_of_line;
     of_repeat->build_seconds = 0;
     of_repeat->launches.count = 0;
 }

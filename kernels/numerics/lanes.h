@@ -54,8 +54,8 @@ typedef int scalar_integer;
 
 // For large functions with several callers and little live state: inlined, each copy would be compiled. And
 // for the bodies of kernels, of which PoCL compiles three, one per form of launch. But GPUs would pass their
-// structs through memory.
-#if LANES == 1
+// structs through memory, unless their compiler can build no body that large (IS_OUT_OF_LINE).
+#if LANES == 1 && !IS_OUT_OF_LINE
 #define OUT_OF_LINE inline
 #else
 #define OUT_OF_LINE __attribute__((noinline))

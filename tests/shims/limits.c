@@ -11,6 +11,8 @@
 //   memory=N       global memory has N bytes, over all buffers
 //   buffer=N       a buffer has at most N bytes
 //   buffers=N      a kernel takes at most N buffers
+//   build=N        the compiler fails with status -N at kernels that have large functions inlined
+//   kernel=N       and so does clCreateKernel
 //   first=N        the watchdog: a kernel's launch fails if it has more than N work-items, and more than four
 //                  times those of its last launch
 #define CL_TARGET_OPENCL_VERSION 120
@@ -115,6 +117,35 @@ cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const ch
 }
 
 enum { BUFFERS_MAX = 4096, KERNELS_MAX = 64, ARGUMENTS_MAX = 256 };
+
+// Whether the program's compiler or linker is to fail.
+static bool is_too_large(cl_program program, const char *limit, size_t *status)
+{
+    size_t size = 0;
+    if (!limit_get(limit, status)) return false;
+    NEXT(clGetProgramInfo)(program, CL_PROGRAM_SOURCE, 0, NULL, &size);
+    char *text = calloc(size + 1, 1);
+    NEXT(clGetProgramInfo)(program, CL_PROGRAM_SOURCE, size, text, NULL);
+    const bool is_too_large = size > 1 && !strstr(text, "#define IS_OUT_OF_LINE 1");
+    free(text);
+    return is_too_large;
+}
+
+cl_int clBuildProgram(cl_program program, cl_uint count, const cl_device_id *devices, const char *options,
+                      void(CL_CALLBACK *notify)(cl_program, void *), void *data)
+{
+    size_t status;
+    if (is_too_large(program, "build", &status)) return -(cl_int)status;
+    return NEXT(clBuildProgram)(program, count, devices, options, notify, data);
+}
+
+cl_kernel clCreateKernel(cl_program program, const char *name, cl_int *status)
+{
+    size_t failure;
+    if (!is_too_large(program, "kernel", &failure)) return NEXT(clCreateKernel)(program, name, status);
+    *status = -(cl_int)failure;
+    return NULL;
+}
 
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static struct {
