@@ -99,6 +99,7 @@ MEANINGS = {
     "flatten_ms": "number; flattening it to arrays",
     "by_device[]": "object; what each device did",
     "by_device[].{name,platform,driver}": "text; from OpenCL",
+    "{launches[],read_backs[]}.clock": "text; of the time that counts: `event` (the device's) or `host`",
     "by_device[].build_out_of_line": "boolean; the driver failed to build a kernel with its functions inlined",
     "by_device[].double_by": "text or null; at `certified` another device that re-renders pixels in double",
     "by_device[].share": "number; of the rows, 0 to 1",

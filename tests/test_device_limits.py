@@ -161,9 +161,24 @@ class DeviceLimits(TestCase):
             self.skipTest("rusticl and another OpenCL implementation are not both here")
         command = "render sphere.yaml --size 16x12 --precision certified --quiet"
         process = self.glint(f"{command} --device {devices['rusticl']['index']} -o image.npy", env=env)
-        self.assertRegex(process.stderr, '" works in double for "llvmpipe')
+        self.assertRegex(process.stderr, '" works in double for "llvmpipe.* RUSTICL_FEATURES is fp64')
+        double = command.replace("certified", "double")
+        self.refuses(f"{double} --device {devices['rusticl']['index']}", "no 64-bit floating point .* RUSTICL_FEATURES is fp64", env=env)
         self.glint(f"{command} -o one.npy", env=POCL)
         self.assertSameBytes("image.npy", "one.npy")
+
+    def test_timers_without_times(self):
+        """Every figure names the host's clock; with timers that work, the device's."""
+        for limits, clock, text in ("no-timer", "host", "host's"), ("group=8192", "event", "device's"):
+            env = POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits}
+            report = self.json(f"{RENDER} --timing=json", env=env)["by_device"][0]
+            self.assertEqual({item["clock"] for item in report["launches"]}, {clock})
+            printed = self.glint(f"{RENDER} --timing", env=env).stderr
+            self.assertRegex(printed, rf"launches +[0-9.]+ ms  \d+ commands?, by the {text} clock")
+            self.assertEqual("by the host's clock: the runtime reports no times for events" in printed, clock == "host")
+            bench = "bench sphere.yaml --size 64x64 --seconds 0.1"
+            self.assertEqual({row["clock"] for row in self.json(f"{bench} --json", env=env)["runs"]}, {clock})
+            self.assertRegex(self.glint(bench, env=env).stdout, rf" {clock} +\d+ ")
 
     def test_devices_report(self):
         report = self.json("devices --json", env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": "embedded,no-double,group=12"})

@@ -302,8 +302,8 @@ static bool has_reference(Accuracy *accuracy)
     return message_error(
         &accuracy->messages,
         "neither the device \"%s\" nor another one has 64-bit floating point for a reference: "
-        "name a file with --reference",
-        accuracy->open.compute.device->name);
+        "name a file with --reference%s",
+        accuracy->open.compute.device->name, device_fp64_hint(accuracy->open.compute.device));
 }
 
 static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)

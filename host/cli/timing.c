@@ -50,14 +50,22 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     enum { SHOWN_MAX = 12 };
     LaunchSum sum = launches_sum(launches, count);
     char remark[160];
-    snprintf(remark, sizeof remark, "%zu %s; %.3f ms by the host's clock", count,
-             count == 1 ? "command" : "commands", 1e3 * sum.host_seconds);
+    const char *commands = count == 1 ? "command" : "commands";
+    if (sum.untrusted_count)
+        snprintf(remark, sizeof remark, "%zu %s, by the host's clock", count, commands);
+    else
+        snprintf(remark, sizeof remark, "%zu %s, by the device's clock; %.3f ms by the host's", count,
+                 commands, 1e3 * sum.host_seconds);
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
     for (size_t i = 0; i < count && i < SHOWN_MAX; i++) {
         const LaunchTime *time = &launches[i].time;
         const char *doubt = launch_time_doubt(time);
-        fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms%s%s\n", launches[i].name, 1e3 * time->event_seconds,
-                1e3 * time->host_seconds, doubt ? "; not trusted: " : "", doubt ? doubt : "");
+        if (doubt)
+            fprintf(stderr, "    %-9s %9.3f ms  by the host's clock: %s\n", launches[i].name,
+                    1e3 * time->host_seconds, doubt);
+        else
+            fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms\n", launches[i].name, 1e3 * time->event_seconds,
+                    1e3 * time->host_seconds);
         if (launch_delay(time) > 0)
             fprintf(stderr, "              %.3f ms passed before it ran: the driver %s\n",
                     1e3 * launch_delay(time),
@@ -151,6 +159,7 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
         const LaunchTime *time = &launches[i].time;
         json_begin_object(json, NULL);
         json_text(json, "name", launches[i].name);
+        json_text(json, "clock", time->trusted ? "event" : "host");
         if (time->trusted)
             json_number(json, "event_ms", 1e3 * time->event_seconds);
         else

@@ -233,6 +233,12 @@ unsigned device_lanes(const Device *device, bool is_double)
     return width >= 16 ? 16 : width >= 8 ? 8 : width >= 4 ? 4 : 1;
 }
 
+const char *device_fp64_hint(const Device *device)
+{
+    if (strcasecmp(device->platform_name, "rusticl") != 0) return "";
+    return " (newer versions of rusticl have it if the environment variable RUSTICL_FEATURES is fp64)";
+}
+
 const char *device_type_name(cl_device_type type)
 {
     if (type & CL_DEVICE_TYPE_GPU) return "gpu";

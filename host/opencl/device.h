@@ -73,6 +73,9 @@ bool device_usable(const Device *device, const char **why);
 // `is_double`, rounded down to 1, 4, 8 or 16; elsewhere 1.
 unsigned device_lanes(const Device *device, bool is_double);
 
+// What may give the device 64-bit floating point, to be appended to a message that it has none; else "".
+const char *device_fp64_hint(const Device *device);
+
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
 
 const char *cl_status_name(cl_int status); // "CL_SUCCESS", …

@@ -29,8 +29,8 @@ static bool settings_fit(const RenderSettings *settings, const Compute *compute,
                              "square roots may be less exact than the precision assumes",
                              precision_names[settings->precision], device->name);
     if (settings->precision == PRECISION_DOUBLE && !device->fp64)
-        return message_error(messages, "precision double: the device \"%s\" has no 64-bit floating point",
-                             device->name);
+        return message_error(messages, "precision double: the device \"%s\" has no 64-bit floating point%s",
+                             device->name, device_fp64_hint(device));
     if (settings->precision == PRECISION_CERTIFIED && settings->perturb_scale > 1)
         return message_error(
             messages,
@@ -40,8 +40,8 @@ static bool settings_fit(const RenderSettings *settings, const Compute *compute,
         return message_error(
             messages,
             "precision certified needs 64-bit floating point, which the device \"%s\" lacks, and "
-            "no other device works in double for it",
-            device->name);
+            "no other device works in double for it%s",
+            device->name, device_fp64_hint(device));
     return true;
 }
 

@@ -10,6 +10,7 @@
 //   constant=N     constant memory has N bytes
 //   memory=N       global memory has N bytes, over all buffers
 //   buffer=N       a buffer has at most N bytes
+//   no-timer       the times of events are 0
 //   buffers=N      a kernel takes at most N buffers
 //   build=N        the compiler fails with status -N at kernels that have large functions inlined
 //   kernel=N       and so does clCreateKernel
@@ -93,6 +94,12 @@ cl_int clGetDeviceInfo(cl_device_id device, cl_device_info what, size_t size, vo
         *(cl_device_fp_config *)to &= ~(cl_device_fp_config)CL_FP_INF_NAN;
     if (what == CL_DEVICE_EXTENSIONS && limit_get("no-double", NULL)) word_remove(to, "cl_khr_fp64");
     return status;
+}
+
+cl_int clGetEventProfilingInfo(cl_event event, cl_profiling_info what, size_t size, void *to, size_t *needed)
+{
+    if (limit_get("no-timer", NULL)) return ANSWER(cl_ulong, 0);
+    return NEXT(clGetEventProfilingInfo)(event, what, size, to, needed);
 }
 
 cl_int clGetKernelWorkGroupInfo(cl_kernel kernel, cl_device_id device, cl_kernel_work_group_info what,
