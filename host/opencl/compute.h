@@ -95,6 +95,9 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
 cl_kernel program_kernel(Compute *compute, const Program *program, const char *name);
 void program_close(Program *program);
 
+// The key of the cache for a request's program. Caller frees.
+char *program_key(const Device *device, const ProgramRequest *request);
+
 // Composes only; for tests and hashes. NULL if `root` or an include is not embedded. Caller frees.
 char *program_text(const char *root, const char *prelude);
 
@@ -120,7 +123,8 @@ typedef struct {
     double event_seconds;              // end - start; 0 where the runtime reports zeros
     double host_seconds;               // from enqueue until the host sees it complete
     double host_start_seconds;         // clock_seconds() before the enqueue
-    bool trusted; // false: zeros, a mere counter, end before start, or event longer than host_seconds
+    bool trusted;      // false: zeros, a mere counter, end before start, or event longer than host_seconds
+    const char *fault; // of the device's timer, as its passport has it; NULL: none. Not trusted with one
 } LaunchTime;
 
 // Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. An event may

@@ -6,6 +6,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/opencl/passport.h"
 #include <CL/cl_ext.h>
 #include <stdlib.h>
 #include <string.h>
@@ -145,6 +146,7 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
 {
     Device device = {.platform = platform, .id = id, .index = (unsigned)list->count};
     device_describe(list, &device);
+    device.passports = device_passports_open();
     for (size_t i = 0; i < list->count; i++) {
         const Device *other = &list->items[i];
         if (other->platform == platform && strcmp(other->name, device.name) == 0) device.same_name_index++;
@@ -209,6 +211,7 @@ void device_list_close(DeviceList *list)
         free(device->platform_name);
         free(device->platform_version);
         free(device->extensions);
+        device_passports_close(device->passports);
     }
     free(list->items);
     *list = (DeviceList){0};

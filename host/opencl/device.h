@@ -27,6 +27,7 @@ typedef struct {
     // only devices of the embedded profile may be so
     bool rounds_toward_zero, lacks_infinity;
     bool compiler, available, little_endian;
+    struct DevicePassports *passports; // host/opencl/passport.h
 } Device;
 
 typedef struct {

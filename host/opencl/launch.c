@@ -1,6 +1,6 @@
 // Launches and the times of their events.
 #include "host/base/clock.h"
-#include "host/opencl/compute.h"
+#include "host/opencl/passport.h"
 
 LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds)
 {
@@ -20,6 +20,7 @@ LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, 
 const char *launch_time_doubt(const LaunchTime *time)
 {
     if (time->trusted) return NULL;
+    if (time->fault) return time->fault;
     if (time->start_seconds == 0 && time->end_seconds == 0) return "the runtime reports no times for events";
     if (time->end_seconds <= time->start_seconds) return "the event ends no later than it starts";
     if (time->event_seconds < 1.5e-9) return "event timestamps are a counter, not a clock";
@@ -49,6 +50,8 @@ LaunchTime event_time(Compute *compute, cl_event event, const char *command, dou
                                  event_timestamp(event, CL_PROFILING_COMMAND_END), host_seconds,
                                  compute->device->timer_resolution_seconds);
         time.host_start_seconds = host_start;
+        time.fault = passport_timer_fault(compute->device);
+        time.trusted = time.trusted && !time.fault;
     }
     clReleaseEvent(event);
     return time;

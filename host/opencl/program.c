@@ -19,9 +19,8 @@ static const char *or_empty(const char *text)
 }
 
 // All that the compiled program depends on. The native width distinguishes processors of the same name.
-static char *request_key(const Compute *compute, const ProgramRequest *request, const char *text)
+static char *request_key(const Device *device, const ProgramRequest *request, const char *text)
 {
-    const Device *device = compute->device;
     Text key = {0};
     text_appendf(&key, "options %s\nlaunch %s\n", or_empty(request->options), or_empty(request->launch));
     text_appendf(&key, "device %s, %s, native width %u\n", device->name, device->version,
@@ -30,6 +29,14 @@ static char *request_key(const Compute *compute, const ProgramRequest *request, 
     text_appendf(&key, "platform %s, %s\n", device->platform_name, device->platform_version);
     text_append(&key, text, strlen(text));
     return key.items;
+}
+
+char *program_key(const Device *device, const ProgramRequest *request)
+{
+    char *text = program_text(request->root, or_empty(request->prelude));
+    char *key = request_key(device, request, text);
+    free(text);
+    return key;
 }
 
 static char *build_log(const Compute *compute, cl_program program)
@@ -183,7 +190,7 @@ static Build build_from_cache(const Compute *compute, const ProgramRequest *requ
 {
     Build build = {0};
     if (request->no_cache || !text) return build;
-    char *key = request_key(compute, request, text);
+    char *key = request_key(compute->device, request, text);
     Text binary = {0};
     if (cache_load(key, &binary)) build = build_from_binary(compute, &binary, request);
     text_free(&binary);
@@ -253,12 +260,12 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
         return;
     }
     const char *prelude = program->is_easy ? request->easy_prelude : request->prelude;
-    char *text = program_text(request->root, or_empty(prelude)), *key = request_key(compute, request, text);
+    char *text = program_text(request->root, or_empty(prelude)),
+         *key = request_key(compute->device, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};
     cache_store(key, &binary);
     text_free(&binary);
     free(key);
-    free(text);
 }
 
 void program_close(Program *program)

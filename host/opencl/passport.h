@@ -1,0 +1,116 @@
+// What a device's arithmetic and its event timers really do: measured by kernels/passport.cl, which is built
+// as the renderer's kernels are, judged against exact results on the host, and cached for the device, its
+// driver and the text of that kernel.
+#pragma once
+
+#include "host/base/text.h"
+#include "host/opencl/compute.h"
+#include "host/opencl/exact.h"
+
+// The build options and functions that a precision's kernels share. `fast` is decided by PASSPORT_SINGLE.
+typedef enum { PASSPORT_SINGLE, PASSPORT_STRICT, PASSPORT_DOUBLE, PASSPORT_MODE_COUNT } PassportMode;
+extern const char *const passport_mode_names[PASSPORT_MODE_COUNT];
+
+typedef enum { SUBNORMALS_KEPT, SUBNORMALS_FLUSHED, SUBNORMALS_MIXED } Subnormals;
+
+// Results of division or of the square root.
+typedef struct {
+    double largest_ulp;          // the largest error; infinite where a result is not finite
+    uint64_t count, wrong_count; // wrong: not correctly rounded
+    bool is_exhaustive;          // all mantissas of a binade are among them
+    bool is_repaired;            // the function that kernels call returned only correctly rounded results
+} RoundedResults;
+
+typedef enum {
+    TIMER_SOUND,
+    TIMER_ABSENT,   // only zeros
+    TIMER_COUNTER,  // numbers commands
+    TIMER_BACKWARD, // a command ends before it starts, or starts before the one before it ended
+    TIMER_UNIT      // does not count nanoseconds
+} TimerFault;
+
+typedef struct {
+    TimerFault fault;
+    double tick_nanoseconds;   // how long one unit lasts by the host's clock; 0: unknown
+    uint64_t step_nanoseconds; // the greatest common divisor of all times; 0: unknown
+} TimerFindings;
+
+// Of one mode at one vector width.
+typedef struct {
+    PassportMode mode;
+    uint32_t lanes;
+    bool is_thorough;  // divided and took roots of all mantissas, as far as PASSPORT_SECONDS_MAX allowed
+    bool uses_fma;     // HAS_FMA of kernels: fma is fused and costs less than PASSPORT_FMA_COST_MAX
+    bool fma_is_fused; // the device's own
+    bool fma_is_exact; // as kernels have it, perhaps emulated
+    double fma_cost;   // its time over that of a product and a sum; 0: not fused, not measured
+    bool contracts, two_sum_is_exact, two_product_is_exact;
+    RoundingMode rounding;
+    RoundedResults quotients, roots;
+    bool has_promised_rounding; // of quotients and roots: built with an option that asks for it
+    Subnormals subnormals;
+    bool has_promised_subnormals;
+    bool has_infinities_and_nans, converts_exactly;
+    TimerFindings timer;
+    double build_seconds, seconds; // of the kernel; of the measurement
+} Passport;
+
+// A measurement's seconds at most, except on devices that are too slow even for the fewest operands: three,
+// one of each mode, take less than a second.
+#define PASSPORT_SECONDS_MAX 0.3
+// Fused hardware takes about half of the time of a product and a sum, an emulation dozens of times that.
+#define PASSPORT_FMA_COST_MAX 8.0
+
+// The compiler's options of a mode on a device.
+const char *passport_build_options(const Device *device, PassportMode mode);
+
+// The passport of a mode and width: measured before in this process, or from the cache, or measured now.
+// Thorough ones take up to PASSPORT_SECONDS_MAX, the others some hundredths, and both a build. NULL: the
+// device failed. Lives as long as the device's list. Not for two threads with one device.
+const Passport *passport_acquire(Compute *compute, PassportMode mode, uint32_t lanes, bool is_thorough,
+                                 bool no_cache);
+// Measures all modes that the device has at their default widths thoroughly, and replaces those of the cache.
+bool passports_measure(Compute *compute);
+// Loads what the cache has of all modes at the default widths; measures nothing.
+void passports_recall(const Device *device);
+
+// The passports of a device that are known, in the order in which they became so.
+typedef struct DevicePassports DevicePassports;
+DevicePassports *device_passports_open(void);
+void device_passports_close(DevicePassports *passports); // accepts NULL
+size_t passport_count(const Device *device);
+const Passport *passport_at(const Device *device, size_t index);
+
+// Whether quotients and roots are correctly rounded by the driver's promise, which nothing refuted.
+bool passport_rounds_correctly(const Passport *passport);
+
+// Why the events' times of the device are not trusted; NULL: they are, or nothing is known.
+const char *passport_timer_fault(const Device *device);
+
+// Each property has a finding: as it should be; unusual, which glint allows for; or broken, which the
+// precisions of the mode other than `single` and `fast` rely on.
+typedef enum { FINDING_SOUND, FINDING_UNUSUAL, FINDING_BROKEN } Finding;
+extern const char *const finding_names[];
+
+typedef enum {
+    PROPERTY_CONTRACTION,
+    PROPERTY_TWO_SUM,
+    PROPERTY_TWO_PRODUCT,
+    PROPERTY_FMA,
+    PROPERTY_ROUNDING,
+    PROPERTY_DIVISION,
+    PROPERTY_SQUARE_ROOT,
+    PROPERTY_SUBNORMALS,
+    PROPERTY_SPECIALS,
+    PROPERTY_CONVERSIONS,
+    PROPERTY_TIMERS,
+    PROPERTY_COUNT
+} Property;
+extern const char *const property_names[PROPERTY_COUNT];
+
+// Appends what was found.
+Finding passport_finding(const Passport *passport, Property property, Text *text);
+// Appends the first broken property and what was found; false: none is broken.
+bool passport_broken(const Passport *passport, Text *text);
+// Appends everything that is not sound, for a line of a report; false: there is nothing.
+bool passports_abnormal(const Device *device, Text *text);
