@@ -5,6 +5,7 @@
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/compile/compile.h"
+#include "host/render/arithmetic.h"
 #include "host/render/renderer_state.h"
 #include "host/render/sample_pattern.h"
 #include <stdlib.h>
@@ -174,6 +175,8 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
     report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->is_double);
+    renderer->passport =
+        arithmetic_passport(compute, renderer->settings.precision, report->lanes, settings->no_cache);
     if (earlier) renderer_kernels_take(renderer, earlier);
     if (renderer_certifies(renderer))
         renderer->repeat =
@@ -185,7 +188,9 @@ Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, 
                               MessageList *messages)
 {
     Renderer *renderer = NULL;
-    if (compute_ok(compute) && settings_fit(settings, compute, messages))
+    stage_begin(settings->stage, "measuring the device's arithmetic", NULL, 0);
+    if (compute_ok(compute) && settings_fit(settings, compute, messages) &&
+        arithmetic_suits(compute, settings, messages))
         renderer = prepare(compute, settings, PASS_ALL, earlier);
     renderer_close(earlier);
     return renderer;

@@ -67,18 +67,13 @@ void renderer_kernels_close(Renderer *renderer)
     variant_close(renderer, &renderer->other_variant);
 }
 
-// Injected errors make the device count as not correctly rounded, so that `strict` repairs them.
-static bool rounds_correctly(const Renderer *renderer)
+// Whether kernels repair quotients and roots. Injected errors make the device count as not correctly rounded,
+// and so does a promise that the passport refutes. Where there is none, no measurement replaces it: pairs of
+// mantissas are too many to try.
+static bool repairs_divide(const Renderer *renderer)
 {
-    return renderer->compute->device->correctly_rounded && renderer->settings.perturb_seed == 0;
-}
-
-// OpenCL requires fma of doubles; Intel's CPU runtime does not report it for floats, but reports native
-// vectors, unlike llvmpipe and Oclgrind.
-static bool has_fma(const Renderer *renderer)
-{
-    const Device *device = renderer->compute->device;
-    return renderer->report.is_double || device->fma_in_hardware || device->native_float_width > 1;
+    return renderer->settings.precision == PRECISION_STRICT &&
+           (renderer->settings.perturb_seed != 0 || !passport_rounds_correctly(renderer->passport));
 }
 
 static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_line)
@@ -93,9 +88,8 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
     text_appendf(text, "#define IS_CERTIFIED %d\n", renderer_certifies(renderer));
     text_appendf(text, "#define IS_PIXEL_LIST %d\n", renderer->pass != PASS_ALL);
-    text_appendf(text, "#define REPAIRS_DIVIDE %d\n",
-                 precision == PRECISION_STRICT && !rounds_correctly(renderer));
-    text_appendf(text, "#define HAS_FMA %d\n", has_fma(renderer));
+    text_appendf(text, "#define REPAIRS_DIVIDE %d\n", repairs_divide(renderer));
+    text_appendf(text, "#define HAS_FMA %d\n", renderer->passport->uses_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
     // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
     text_appendf(text, "#define STACK_CAPACITY %u\n",
@@ -109,11 +103,8 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
 
 static const char *build_options(const Renderer *renderer)
 {
-    const Precision precision = renderer->settings.precision;
-    if (precision == PRECISION_FAST) return "-cl-std=CL1.2 -cl-fast-relaxed-math";
-    if (precision == PRECISION_STRICT && rounds_correctly(renderer))
-        return "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt";
-    return "-cl-std=CL1.2";
+    if (renderer->settings.precision == PRECISION_FAST) return "-cl-std=CL1.2 -cl-fast-relaxed-math";
+    return passport_build_options(renderer->compute->device, renderer->passport->mode);
 }
 
 static bool variant_has(const KernelVariant *variant, const Text *prelude)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/compile/compiled_scene.h"
+#include "host/opencl/passport.h"
 #include "host/render/pace.h"
 #include "host/render/renderer.h"
 
@@ -25,6 +26,7 @@ struct Renderer {
     Compute *compute;
     RenderSettings settings;
     PixelPass pass;
+    const Passport *passport; // of its kernels
     RenderReport report;
     CompiledScene compiled; // without the arrays that are only on the device
     cl_mem arrays[FLAT_COUNT];

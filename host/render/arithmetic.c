@@ -1,0 +1,66 @@
+#include "host/render/arithmetic.h"
+
+// The last one's pixels that stay open are re-rendered at the modes after the first.
+static const struct {
+    PassportMode modes[2];
+    unsigned mode_count;
+    bool relies; // refused where a property of a mode is broken
+} needs[PRECISION_COUNT] = {
+    [PRECISION_FAST] = {{PASSPORT_SINGLE}, 1, false},
+    [PRECISION_SINGLE] = {{PASSPORT_SINGLE}, 1, false},
+    [PRECISION_STRICT] = {{PASSPORT_STRICT}, 1, true},
+    [PRECISION_DOUBLE] = {{PASSPORT_DOUBLE}, 1, true},
+    [PRECISION_CERTIFIED] = {{PASSPORT_SINGLE, PASSPORT_DOUBLE}, 2, true},
+};
+
+const Passport *arithmetic_passport(Compute *compute, Precision precision, uint32_t lanes, bool no_cache)
+{
+    return passport_acquire(compute, needs[precision].modes[0], lanes, needs[precision].relies, no_cache);
+}
+
+static bool passport_refuses(const Passport *passport, Text *why)
+{
+    if (!passport_broken(passport, why)) return false;
+    text_appendf(why, " (%s, %u %s)", passport_mode_names[passport->mode], passport->lanes,
+                 passport->lanes == 1 ? "lane" : "lanes");
+    return true;
+}
+
+bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageList *messages)
+{
+    const Precision precision = settings->precision;
+    for (unsigned i = 0; i < needs[precision].mode_count; i++) {
+        const PassportMode mode = needs[precision].modes[i];
+        Compute *runs = mode == PASSPORT_DOUBLE ? compute_in_double(compute) : compute;
+        const Device *device = runs->device;
+        const uint32_t lanes =
+            settings->lanes ? settings->lanes : device_lanes(device, mode == PASSPORT_DOUBLE);
+        const Passport *passport =
+            passport_acquire(runs, mode, lanes, needs[precision].relies, settings->no_cache);
+        if (!passport) return false;
+        Text why = {0};
+        const bool is_refused = needs[precision].relies && passport_refuses(passport, &why);
+        if (is_refused)
+            message_error(messages,
+                          "precision %s relies on arithmetic that the device \"%s\" does not have: %s; "
+                          "precision single works without it",
+                          precision_names[precision], device->name, text_c(&why));
+        text_free(&why);
+        if (is_refused) return false;
+    }
+    return true;
+}
+
+bool arithmetic_refuses(const Device *device, Precision precision, Text *why)
+{
+    if (!needs[precision].relies) return false;
+    for (size_t k = 0; k < passport_count(device); k++) {
+        const Passport *passport = passport_at(device, k);
+        for (unsigned i = 0; i < needs[precision].mode_count; i++)
+            if (passport->mode == needs[precision].modes[i] &&
+                passport->lanes == device_lanes(device, passport->mode == PASSPORT_DOUBLE) &&
+                passport_refuses(passport, why))
+                return true;
+    }
+    return false;
+}
