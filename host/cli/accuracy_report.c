@@ -1,5 +1,6 @@
 #include "host/cli/accuracy_report.h"
 
+#include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <inttypes.h>
@@ -178,6 +179,7 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
 {
     const Device *device = report->device;
     fprintf(stream, "%s, %s %s\n", device->name, device->platform_name, device->driver);
+    passports_remark(device, stream);
     if (report->perturb_seed > 0)
         fprintf(stream, "every variant with injected rounding errors: --perturb %u:%u\n",
                 report->perturb_seed, report->perturb_scale);

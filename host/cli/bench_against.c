@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/bench_report.h"
+#include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -285,6 +286,7 @@ static void against_print_text(const Against *against, const Device *device)
 {
     printf("%s, %s %s\nagainst %s; intervals of %g %% confidence\n\n", device->name, device->platform_name,
            device->driver, against->options->other, 100 * comparison_confidence);
+    passports_remark(device, stdout);
     for (size_t i = 0; i < against->set->count; i++) {
         const BenchKey *key = &against->set->rows[i].key;
         printf("%s, %ux%u, %s, %u lanes, BVH %s, %u samples, %u bounces: %zu %s\n", key->scene, key->width,
@@ -319,6 +321,7 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
     int status = pairs_run(&against, &progress);
     progress_close(&progress);
     if (status == EXIT_DONE) {
+        passports_recall(device); // the workers' have them
         if (options->as_json)
             against_print_json(&against, device);
         else

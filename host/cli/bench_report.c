@@ -1,6 +1,7 @@
 #include "host/cli/bench_report.h"
 
 #include "host/base/fault.h"
+#include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include "host/measure/baseline.h"
@@ -67,6 +68,7 @@ static void peak_print(const BenchReport *report, FILE *stream)
     const Peak *peak = report->peak;
     fprintf(stream, "%s, %s %s\n", report->device->name, report->device->platform_name,
             report->device->driver);
+    passports_remark(report->device, stream);
     fprintf(stream, "measured peak: %.1f GFLOP/s in float", peak->flops_per_second[0] / 1e9);
     if (peak->flops_per_second[1] > 0) fprintf(stream, ", %.1f in double", peak->flops_per_second[1] / 1e9);
     fprintf(stream, ", %.1f GB/s; by the %s clock%s\n", peak->bytes_per_second / 1e9,

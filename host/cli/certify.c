@@ -6,6 +6,7 @@
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
@@ -114,9 +115,10 @@ static void text_print(const Certification *certification)
         undecided += reference_is_undecided(&sample->pixels[i]);
         textured += sample->pixels[i].has_texture;
     }
-    printf("%s, %s %s\n%s, %ux%u: %zu pixels, reference of %d bits in %.1f s", device->name,
-           device->platform_name, device->driver, certification->options->scene, sample->width,
-           sample->height, sample->count, (int)QUAD_BITS, certification->reference_seconds);
+    printf("%s, %s %s\n", device->name, device->platform_name, device->driver);
+    passports_remark(device, stdout);
+    printf("%s, %ux%u: %zu pixels, reference of %d bits in %.1f s", certification->options->scene,
+           sample->width, sample->height, sample->count, (int)QUAD_BITS, certification->reference_seconds);
     if (undecided > 0) printf("; %zu undecided in it are left out", undecided);
     if (textured > 0) printf("; of %zu with a texture no color is compared", textured);
     puts("\n                     wrong             largest error of color        largest margin\n"

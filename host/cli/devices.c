@@ -1,26 +1,29 @@
-// glint devices: every device of every platform, with the properties that matter for tracing.
+// glint devices: every device of every platform, with the properties that matter for tracing and the
+// passports of its arithmetic.
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
-#include "host/opencl/device.h"
+#include "host/cli/passport_report.h"
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_JSON = OPTION_OWN };
+enum { OPTION_JSON = OPTION_OWN, OPTION_PROBE };
 
 static const struct option long_options[] = {
+    {"probe", no_argument, NULL, OPTION_PROBE},
     {"json", no_argument, NULL, OPTION_JSON},
     {"help", no_argument, NULL, 'h'},
     {0},
 };
 
 static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
-                                "Lists every OpenCL device of every platform; * marks the default."
-                                "\n\n" //
+                                "Lists every OpenCL device of every platform; * marks the default. Then\n"
+                                "what the arithmetic of each really does, where that was measured.\n\n"
+                                "      --probe           measure it now\n" //
     HELP_JSON HELP_HELP;
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
@@ -62,6 +65,8 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_int64(json, "local_memory_bytes", (int64_t)device->local_memory_bytes);
         json_int64(json, "largest_work_group", (int64_t)device->largest_work_group);
         json_number(json, "timer_resolution_seconds", device->timer_resolution_seconds);
+        passports_json(json, device);
+        passports_refusals_json(json, device);
         json_end(json);
     }
     json_print(json, stdout);
@@ -147,14 +152,39 @@ static void devices_print_table(const DeviceList *list, const Device *chosen)
         printf("%u of %u platforms: no device\n", list->empty_platform_count, list->platform_count);
 }
 
+// Measures the passports of the usable devices, or loads those in the cache. False: a device failed.
+static bool passports_find(const DeviceList *list, bool probes)
+{
+    bool is_done = true;
+    for (size_t i = 0; i < list->count; i++) {
+        const Device *device = &list->items[i];
+        if (!device_usable(device, NULL)) continue;
+        if (!probes) {
+            passports_recall(device);
+            continue;
+        }
+        Compute compute;
+        compute_open(&compute, device);
+        if (!passports_measure(&compute)) {
+            char *failure = compute_failure_text(&compute);
+            fprintf(stderr, "glint: %s\n", failure);
+            free(failure);
+            is_done = false;
+        }
+        compute_close(&compute);
+    }
+    return is_done;
+}
+
 int command_devices(int argument_count, char **arguments)
 {
-    bool as_json = false;
+    bool as_json = false, probes = false;
     optind = 1;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
         if (option == 'h') return option_help(help_text);
-        if (option != OPTION_JSON) return EXIT_USER;
-        as_json = true;
+        if (option == '?') return EXIT_USER;
+        as_json = as_json || option == OPTION_JSON;
+        probes = probes || option == OPTION_PROBE;
     }
     if (optind < argument_count) return option_usage_fault("devices", "takes no arguments");
 
@@ -162,15 +192,18 @@ int command_devices(int argument_count, char **arguments)
     device_list_open(&list);
     MessageList messages = {0};
     const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
+    const bool is_probed = passports_find(&list, probes);
     if (as_json)
         devices_print_json(&list, chosen);
     else if (list.count > 0)
         devices_print_table(&list, chosen);
+    for (size_t i = 0; i < list.count && !as_json; i++)
+        passports_print(&list.items[i]);
     char *failure = device_list_failure_text(&list);
     if (chosen && failure) message_warning(&messages, "%s", failure);
     message_list_print(&messages, stderr);
     message_list_free(&messages);
-    int status = chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
+    int status = !is_probed ? EXIT_MACHINE : chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
     free(failure);
     device_list_close(&list);
     return status;

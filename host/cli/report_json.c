@@ -1,5 +1,6 @@
 #include "host/cli/report_json.h"
 
+#include "host/cli/passport_report.h"
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -40,6 +41,7 @@ void device_json(Json *json, const Device *device)
     json_text(json, "type", device_type_name(device->type));
     json_int64(json, "units", device->compute_units);
     json_int64(json, "clock_mhz", device->clock_mhz);
+    passports_json(json, device);
 }
 
 void size_json(Json *json, uint32_t width, uint32_t height)

@@ -1,6 +1,7 @@
 #include "host/cli/timing.h"
 
 #include "host/cli/options.h"
+#include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <stdio.h>
@@ -139,6 +140,7 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
         const RenderReport *report = renderer_report(renderers[i]);
         fprintf(stderr, "%s, %u %s (kernel %016llx)\n", report->device->name, report->lanes,
                 report->lanes == 1 ? "lane" : "lanes", (unsigned long long)report->kernel_hash);
+        passports_remark(report->device, stderr);
         if (count > 1 || ranks) share_print(&report->share, settings);
         device_print(report);
     }
@@ -200,6 +202,7 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_text(json, "name", report->device->name);
     json_text(json, "platform", report->device->platform_name);
     json_text(json, "driver", report->device->driver);
+    passports_json(json, report->device);
     json_text(json, "double_by", report->reference_device ? report->reference_device->name : NULL);
     json_int64(json, "lanes", report->lanes);
     hash_json(json, "kernel_hash", report->kernel_hash);

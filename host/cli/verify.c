@@ -5,8 +5,10 @@
 #include "host/base/json.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
+#include "host/render/arithmetic.h"
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
@@ -170,6 +172,17 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
     perturb_json(json, common->perturb_seed, common->perturb_scale);
 }
 
+// Prints why the arithmetic of the device does not suit a precision.
+static bool arithmetic_is_suitable(Compute *compute, const VerifyOptions *options, Precision precision)
+{
+    RenderSettings settings = settings_whole(&options->common, 1, 1);
+    settings.precision = precision;
+    MessageList messages = {0};
+    const bool is_suitable = arithmetic_suits(compute, &settings, &messages);
+    messages_print(&messages, NULL);
+    return is_suitable;
+}
+
 static int device_verify(Compute *compute, const VerifyOptions *options)
 {
     Precision first = options->every_precision ? PRECISION_FAST : options->common.precision;
@@ -182,6 +195,7 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
         }
         last = PRECISION_STRICT;
     }
+    if (!options->every_precision && !arithmetic_is_suitable(compute, options, first)) return EXIT_USER;
     Json *json = options->json ? json_open() : NULL;
     if (json) {
         origin_add_json(json, compute->device, &options->common);
@@ -191,7 +205,9 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
     }
     size_t failed = 0;
     for (Precision precision = first; precision <= last && compute_ok(compute); precision++)
-        failed += precision_verify(compute, options, precision, json);
+        if (arithmetic_is_suitable(compute, options, precision))
+            failed += precision_verify(compute, options, precision, json);
+    if (!json) passports_remark(compute->device, stdout);
     if (json) {
         json_end(json);
         json_print(json, stdout);

@@ -1,0 +1,127 @@
+#include "host/cli/passport_report.h"
+
+#include "host/render/arithmetic.h"
+#include <math.h>
+#include <string.h>
+
+static void rounded_results_json(Json *json, const char *key, const RoundedResults *results)
+{
+    json_begin_object(json, key);
+    json_number(json, "largest_ulp", results->largest_ulp);
+    json_int64(json, "count", (int64_t)results->count);
+    json_int64(json, "wrong", (int64_t)results->wrong_count);
+    json_bool(json, "exhaustive", results->is_exhaustive);
+    json_end(json);
+}
+
+static void properties_json(Json *json, const Passport *passport)
+{
+    json_begin_array(json, "properties");
+    for (Property property = 0; property < PROPERTY_COUNT; property++) {
+        Text what = {0};
+        const Finding finding = passport_finding(passport, property, &what);
+        json_begin_object(json, NULL);
+        json_text(json, "name", property_names[property]);
+        json_text(json, "finding", finding_names[finding]);
+        json_text(json, "value", text_c(&what));
+        json_end(json);
+        text_free(&what);
+    }
+    json_end(json);
+}
+
+void passports_json(Json *json, const Device *device)
+{
+    json_begin_array(json, "passports");
+    for (size_t i = 0; i < passport_count(device); i++) {
+        const Passport *passport = passport_at(device, i);
+        json_begin_object(json, NULL);
+        json_text(json, "precision", passport_mode_names[passport->mode]);
+        json_int64(json, "lanes", passport->lanes);
+        json_bool(json, "thorough", passport->is_thorough);
+        json_bool(json, "uses_fma", passport->uses_fma);
+        json_number(json, "fma_cost", passport->fma_is_fused ? passport->fma_cost : NAN);
+        rounded_results_json(json, "division", &passport->quotients);
+        rounded_results_json(json, "square_root", &passport->roots);
+        json_number(json, "build_ms", 1e3 * passport->build_seconds);
+        json_number(json, "probe_ms", 1e3 * passport->seconds);
+        properties_json(json, passport);
+        json_end(json);
+    }
+    json_end(json);
+}
+
+void passports_refusals_json(Json *json, const Device *device)
+{
+    json_begin_array(json, "refused");
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        Text why = {0};
+        if (arithmetic_refuses(device, precision, &why)) {
+            json_begin_object(json, NULL);
+            json_text(json, "precision", precision_names[precision]);
+            json_text(json, "reason", text_c(&why));
+            json_end(json);
+        }
+        text_free(&why);
+    }
+    json_end(json);
+}
+
+// What was found at all precisions is printed once; what differs, once for each.
+static void property_print(const Device *device, Property property)
+{
+    const size_t count = passport_count(device);
+    for (size_t i = 0; i < count; i++) {
+        Text what = {0}, other = {0};
+        const Passport *passport = passport_at(device, i);
+        const Finding finding = passport_finding(passport, property, &what);
+        bool is_printed = false, is_everywhere = i == 0;
+        for (size_t j = 0; j < count; j++) {
+            other.count = 0;
+            passport_finding(passport_at(device, j), property, &other);
+            const bool is_same = strcmp(text_c(&what), text_c(&other)) == 0;
+            is_printed = is_printed || (is_same && j < i);
+            is_everywhere = is_everywhere && is_same;
+        }
+        if (!is_printed) {
+            printf("  %-12s  ", i == 0 ? property_names[property] : "");
+            if (!is_everywhere) printf("%s: ", passport_mode_names[passport->mode]);
+            printf("%s%s\n",
+                   finding == FINDING_SOUND    ? ""
+                   : finding == FINDING_BROKEN ? "BROKEN: "
+                                               : "unusual: ",
+                   text_c(&what));
+        }
+        text_free(&what);
+        text_free(&other);
+    }
+}
+
+void passports_print(const Device *device)
+{
+    if (passport_count(device) == 0) return;
+    printf("\narithmetic of %u, %s, at", device->index, device->name);
+    double seconds = 0;
+    for (size_t i = 0; i < passport_count(device); i++) {
+        const Passport *passport = passport_at(device, i);
+        printf("%s %s (%u %s)", i ? "," : "", passport_mode_names[passport->mode], passport->lanes,
+               passport->lanes == 1 ? "lane" : "lanes");
+        seconds += passport->seconds;
+    }
+    printf(", measured in %.2f s\n", seconds);
+    for (Property property = 0; property < PROPERTY_COUNT; property++)
+        property_print(device, property);
+    for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
+        Text why = {0};
+        if (arithmetic_refuses(device, precision, &why))
+            printf("  precision %s is refused: %s\n", precision_names[precision], text_c(&why));
+        text_free(&why);
+    }
+}
+
+void passports_remark(const Device *device, FILE *stream)
+{
+    Text text = {0};
+    if (passports_abnormal(device, &text)) fprintf(stream, "%s\n", text_c(&text));
+    text_free(&text);
+}
