@@ -1,0 +1,314 @@
+#!/usr/bin/env -S python3 -B
+"""The passport of a device's arithmetic: each property is violated once, by a shim that edits the text of kernels or the times
+of events; `glint devices --probe` names it, and the precisions that rely on it are refused. It is measured once per driver."""
+import hashlib
+import os
+import re
+
+import glint
+from glint import SPHERE, TestCase, main, need_device, shim_build, skip_all, write
+
+# Replaces each FIND by REPLACE in the text of every kernel, where EDITS has FIND and REPLACE in turn, with \1 between them.
+# TIMER changes the times of events, DRIVER the driver's version; LAUNCHES is a file that gets a line for each launch.
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void *next(const char *name) { return dlsym(RTLD_NEXT, name); }
+
+static char *replace(const char *text, const char *find, const char *by)
+{
+    size_t count = 0, length = strlen(find);
+    for (const char *at = text; (at = strstr(at, find)); at += length)
+        count++;
+    char *result = malloc(strlen(text) + count * strlen(by) + 1), *end = result;
+    for (const char *at; (at = strstr(text, find)); text = at + length) {
+        end = mempcpy(end, text, at - text);
+        end = stpcpy(end, by);
+    }
+    strcpy(end, text);
+    return result;
+}
+
+void *clCreateProgramWithSource(void *context, unsigned count, const char **texts, const size_t *lengths, int *status)
+{
+    char *edits = strdup(getenv("EDITS") ? getenv("EDITS") : ""), *rest = edits;
+    char *text = strdup(texts[0]);
+    while (*rest) {
+        char *find = strsep(&rest, "\1"), *by = strsep(&rest, "\1");
+        if (strstr(text, "kernel void passport") && !strstr(text, find)) abort(); // the kernel has changed
+        text = replace(text, find, by);
+        if (!rest) break;
+    }
+    return ((void *(*)())next("clCreateProgramWithSource"))(context, 1, &text, NULL, status);
+}
+
+int clGetEventProfilingInfo(void *event, unsigned what, size_t size, unsigned long *value, size_t *needed)
+{
+    static unsigned long count;
+    int status = ((int (*)())next("clGetEventProfilingInfo"))(event, what, size, value, needed);
+    const char *timer = getenv("TIMER");
+    if (!timer || !value) return status;
+    count++;
+    if (!strcmp(timer, "zero")) *value = 0;
+    if (!strcmp(timer, "microseconds")) *value /= 1000;
+    if (!strcmp(timer, "counter")) *value = (count + 1) / 2 * 2 + (what == 0x1283); // CL_PROFILING_COMMAND_END
+    if (!strcmp(timer, "backward")) *value = 4000000000000000 - *value;
+    return status;
+}
+
+int clGetDeviceInfo(void *device, unsigned what, size_t size, char *value, size_t *needed)
+{
+    const char *driver = getenv("DRIVER");
+    if (!driver || what != 0x102D) // CL_DRIVER_VERSION
+        return ((int (*)())next("clGetDeviceInfo"))(device, what, size, value, needed);
+    if (needed) *needed = strlen(driver) + 1;
+    if (value) strcpy(value, driver);
+    return 0;
+}
+
+int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void *f, unsigned g, void *h, void *i)
+{
+    FILE *file = getenv("LAUNCHES") ? fopen(getenv("LAUNCHES"), "a") : NULL;
+    char name[64] = "";
+    ((int (*)())next("clGetKernelInfo"))(b, 0x1190, sizeof name, name, NULL); // CL_KERNEL_FUNCTION_NAME
+    if (file) fprintf(file, "%s\n", name);
+    if (file) fclose(file);
+    return ((int (*)())next("clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
+}
+"""
+# Functions that the edits below call, after the types that they use.
+TYPES = "} Pair;"
+HELPERS = """
+static inline real shim_flush(real a)
+{
+    return fabs(a) < (real)(IS_DOUBLE ? DBL_MIN : FLT_MIN) ? (real)(0) : a;
+}
+static inline mask shim_is_ordinary(real a)
+{
+    return (fabs(a) > (real)(0x1p-60f)) & (fabs(a) < (real)(0x1p60f));
+}
+static inline real shim_ulps_above(real a, int ulps)
+{
+    return lanes_select(shim_is_ordinary(a), real_from_bits(bits_from_real(a) + (integer)(ulps)), a);
+}
+static inline real shim_scaled(real a)
+{
+    return lanes_select(shim_is_ordinary(a), a * (real)(1.02f), a);
+}
+static inline real shim_truncate(real high, real low)
+{
+    return low != (real)(0) && (low < (real)(0)) == (high > (real)(0)) && fabs(high) < (real)(LARGEST)
+               ? real_from_bits(bits_from_real(high) - (integer)(1)) : high;
+}
+"""
+MODES = ["single", "strict", "double"]
+ALL = ["strict", "double", "certified"]
+
+# What is violated: (name of the property, finding, pattern of its value, edits, refused precisions).
+VIOLATIONS = {
+    "contraction": ("contraction", "broken", "contracted", {
+        "outcome_of(a * b + c, -c - a * b)": "outcome_of(fma(a, b, c), -c - a * b)"}, ALL),
+    "contraction of a difference": ("contraction", "broken", "contracted", {
+        "outcome_of(a * b + c, -c - a * b)": "outcome_of(a * b + c, -fma(a, b, c))"}, ALL),
+    "two-sum": ("two-sum", "broken", "loses", {"(a - (sum - of_b)) + (b - of_b)": "(real)(0)"}, ALL),
+    "two-product": ("two-product", "broken", "loses", {
+        "(Pair){product, real_fma(a, b, -product)}": "(Pair){product, (real)(0)}"}, ALL),
+    "fma that rounds twice": ("fma", "unusual|broken", "rounds twice", {
+        "#define real_fma fma": "#define real_fma(a, b, c) ((a) * (b) + (c))"}, ["double", "certified"]),
+    "rounding": ("rounding", "broken", "toward zero", {
+        "outcome_of(a + b, a * b)":
+            "outcome_of(shim_truncate(a + b, two_sum(a, b).low), shim_truncate(a * b, fma(a, b, -(a * b))))"}, ALL),
+    "division, by an ulp": ("division", "sound|unusual", "off by up to 1.* ulp", {
+        "real quotient = a / b;": "real quotient = shim_ulps_above(a / b, 1);"}, []),
+    "division, by three ulp": ("division", "unusual|broken", "off by up to 3.* ulp", {
+        "real quotient = a / b;": "real quotient = shim_ulps_above(a / b, 3);"}, ["double", "certified"]),
+    "division, of some mantissas": ("division", "sound|unusual", "off by up to 1.* ulp", {
+        "real quotient = a / b;":
+            "real quotient = a / b; if (!PERTURB) return lanes_select("
+            "(bits_from_real(b) & (integer)(4095)) == (integer)(5), shim_ulps_above(quotient, 1), quotient);"}, []),
+    "division, beyond repair": ("division", "broken", "off by", {
+        "real quotient = a / b;": "real quotient = shim_scaled(a / b);"}, ALL),
+    "square root, by an ulp": ("square root", "sound|unusual", "off by up to 1.* ulp", {
+        "real root = sqrt(a);": "real root = shim_ulps_above(sqrt(a), 1);"}, []),
+    "square root, by four ulp": ("square root", "unusual|broken", "off by up to 4.* ulp", {
+        "real root = sqrt(a);": "real root = shim_ulps_above(sqrt(a), 4);"},
+        ["double", "certified"]),
+    "subnormals flushed": ("subnormals", "unusual", "flushed to zero", {
+        "real a = real_from_bits(a_bits), b = real_from_bits(b_bits), c = real_from_bits(c_bits);":
+            "real a = shim_flush(real_from_bits(a_bits)), b = shim_flush(real_from_bits(b_bits)), "
+            "c = shim_flush(real_from_bits(c_bits));",
+        "return (Outcome){bits_from_real(first), bits_from_real(second)};":
+            "return (Outcome){bits_from_real(shim_flush(first)), bits_from_real(shim_flush(second))};"}, []),
+    "subnormals mixed": ("subnormals", "unusual", "by some operations", {
+        "return outcome_of(a + b, a * b);": "return outcome_of(a + b, shim_flush(a * b));"}, []),
+    "infinity": ("inf and NaN", "broken", "not as", {
+        "return outcome_of(a + b, a * b);": "return outcome_of(clamp(a + b, (real)(-LARGEST), (real)(LARGEST)), a * b);"},
+        ALL),
+    "NaN": ("inf and NaN", "broken", "not as", {
+        "compared(a != b, COMPARED_UNEQUAL)": "compared((a < b) | (a > b), COMPARED_UNEQUAL)"}, ALL),
+    "integer to real": ("conversions", "broken", "wrong", {
+        "bits_from_real(real_from_integer(a_bits))": "bits_from_real(real_from_integer(a_bits & ~(integer)(1)))"}, ALL),
+    "real to integer": ("conversions", "broken", "wrong", {
+        "integer_from_real(b)}": "integer_from_real(floor(b))}"}, ALL),
+    "double to float": ("conversions", "broken", "wrong", {
+        "LANES_CONVERT(float)(real_from_bits(a))": "JOIN(LANES_CONVERT(float), _rtz)(real_from_bits(a))"},
+        ["double", "certified"]),
+}
+TIMERS = {"zero": "reports no times", "microseconds": "do not count nanoseconds but some 1.*e\\+03|do not count nanoseconds",
+          "counter": "counter", "backward": "backward"}
+
+
+class PassportTest(TestCase):
+    def setUp(self):
+        super().setUp()
+        self.shim = shim_build("shim.so", SHIM, "-ldl")
+        write("sphere.yaml", SPHERE)
+
+    def violated(self, edits=None, **variables):
+        """Options of run: the shim, and a cache for each violation, since keys have the text before it is edited."""
+        edits = {TYPES: TYPES + HELPERS} | edits if edits else {}
+        text = "\1".join(word for edit in edits.items() for word in edit)
+        folder = "cache-" + hashlib.md5((text + variables.get("TIMER", "")).encode()).hexdigest()
+        return {"env": {"LD_PRELOAD": self.shim, "XDG_CACHE_HOME": os.path.abspath(folder), "EDITS": text} | variables}
+
+    def probe(self, **options):
+        """The default device, probed."""
+        return next(device for device in self.json("devices --probe --json", **options)["devices"] if device["default"])
+
+    def findings(self, device, name):
+        """What each precision's passport has for a property."""
+        return {passport["precision"]: next(found for found in passport["properties"] if found["name"] == name)
+                for passport in device["passports"]}
+
+    def abnormal(self, device):
+        return {(passport["precision"], found["name"]): found["value"] for passport in device["passports"]
+                for found in passport["properties"] if found["finding"] != "sound"}
+
+    def test_nothing_is_wrong_without_a_violation(self):
+        """What the violations below are compared with. PoCL on x86-64 is as IEEE 754 demands."""
+        device = self.probe(**self.violated())
+        self.assertEqual([passport["precision"] for passport in device["passports"]], MODES if HAS_DOUBLE else MODES[:2])
+        if "PoCL" not in device["platform_version"]:
+            self.skipTest("another implementation may have violations of its own")
+        self.assertEqual(self.abnormal(device), {})
+        self.assertEqual(device["refused"], [])
+        for passport in device["passports"]:
+            self.assertEqual(passport["division"]["wrong"], 0)
+            self.assertGreater(passport["division"]["count"], 1000)
+
+    def test_each_violation_is_named(self):
+        usual = self.abnormal(self.probe(**self.violated()))
+        for what, (name, finding, value, edits, refused) in VIOLATIONS.items():
+            with self.subTest(what):
+                device = self.probe(**self.violated(edits))
+                found = self.findings(device, name)
+                named = [mode for mode in found if re.search(value, found[mode]["value"])]
+                expected = ["double"] if what == "double to float" else list(found)
+                if not HAS_DOUBLE and expected == ["double"]:
+                    continue
+                self.assertEqual(named, expected, found)
+                for mode in named:
+                    self.assertRegex(found[mode]["finding"], f"^({finding})$", found[mode])
+                others = {other: value for other, value in self.abnormal(device).items() if other not in usual and other[1] != name}
+                # what is computed from it may break, too
+                allowed = {"fma that rounds twice": {"two-product"}, "rounding": {"inf and NaN"},
+                           "subnormals flushed": {"conversions"}}.get(what, set())
+                self.assertLessEqual({other[1] for other in others}, allowed, others)
+                if HAS_DOUBLE:
+                    self.assertEqual([refusal["precision"] for refusal in device["refused"]], refused)
+
+    def test_text_names_it(self):
+        broken = self.violated(VIOLATIONS["two-sum"][3])
+        process = self.glint("devices --probe", **broken)
+        self.assertRegex(process.stdout, "(?m)^  two-sum +BROKEN: loses the rounding error of a sum$")
+        self.assertIn("precision strict is refused: two-sum: loses", process.stdout)
+        self.assertIn("BROKEN: loses", self.glint("devices", **broken).stdout, "it was not kept")
+
+    def test_refusals(self):
+        """By the commands that render, with the device, the property and what works; `single` goes without it."""
+        broken = self.violated(VIOLATIONS["two-sum"][3])
+        for precision in ALL if HAS_DOUBLE else ["strict"]:
+            self.refuses(f"render sphere.yaml --size 16x16 -o a.png --precision {precision}",
+                         f"precision {precision} relies on arithmetic that the device \".+\" does not have: two-sum: "
+                         "loses the rounding error of a sum .*; precision single works without it", **broken)
+        self.refuses("verify S5 --precision strict", "precision strict relies on .* two-sum", **broken)
+        process = self.glint("render sphere.yaml --size 16x16 -o a.png --precision single --timing", **broken)
+        self.assertRegex(process.stderr, r"single, \d+ lanes?: two-sum: loses")
+        report = self.json("render sphere.yaml --size 16x16 -o a.png --quiet --timing=json", **broken)
+        passport, = report["by_device"][0]["passports"]
+        self.assertIn({"name": "two-sum", "finding": "broken", "value": "loses the rounding error of a sum"},
+                      passport["properties"])
+
+    def test_bits_at_strict(self):
+        """Whatever glint allows for leaves the bits as they are: an inexact division is repaired, and fma emulated."""
+        command = "render sphere.yaml --size 32x24 --quiet --precision strict -o"
+        self.glint(f"{command} right.npy", **self.violated())
+        for what in "division, by three ulp", "square root, by four ulp", "division, of some mantissas", "fma that rounds twice":
+            with self.subTest(what):
+                self.glint(f"{command} other.npy", **self.violated(VIOLATIONS[what][3]))
+                self.assertSameBytes("right.npy", "other.npy")
+
+    def test_slow_fma(self):
+        """An fma that is emulated at many times its cost is not used; its time counts, not what the driver claims."""
+        slow = """
+static inline real shim_fma(real a, real b, real c)
+{
+    real d = a;
+    for (uint i = 0; i < 20; i++)
+        d = sqrt(d * d + (real)(1));
+    return fma(a, b, lanes_select(d == (real)(12345), d, c));
+}
+"""
+        edits = {"#define real_fma fma": f"{slow}\n#define real_fma shim_fma"}
+        device = self.probe(**self.violated(edits))
+        for passport in device["passports"]:
+            self.assertGreater(passport["fma_cost"], 8)
+            self.assertEqual(passport["uses_fma"], passport["precision"] == "double")
+        self.assertEqual(self.findings(device, "fma")["strict"]["finding"], "unusual")
+        self.assertEqual(device["refused"], [])
+        self.assertTrue(all(passport["uses_fma"] for passport in self.probe(**self.violated())["passports"]))
+
+    def test_timers(self):
+        """Each fault is named, refuses nothing, and makes reports use the host's clock."""
+        for timer, pattern in TIMERS.items():
+            with self.subTest(timer):
+                options = self.violated(TIMER=timer)
+                device = self.probe(**options)
+                for found in self.findings(device, "event timers").values():
+                    self.assertEqual(found["finding"], "unusual")
+                    self.assertRegex(found["value"], pattern)
+                self.assertEqual(device["refused"], [])
+                report = self.json("render sphere.yaml --size 64x64 --quiet --timing=json -o a.png", **options)
+                for launch in report["by_device"][0]["launches"]:
+                    self.assertIsNone(launch["event_ms"])
+                    self.assertRegex(launch["doubt"], pattern.split(" but")[0])
+
+    def test_the_cache(self):
+        """One measurement per device and driver, unless asked for."""
+        def probes(command, **variables):
+            write("launches", "")
+            self.glint(command, **self.violated(LAUNCHES=os.path.abspath("launches"), **variables))
+            return glint.read("launches").count("passport\n")
+
+        render = "render sphere.yaml --size 16x16 --quiet -o a.png"
+        self.assertGreater(probes(render), 5)
+        self.assertEqual(probes(render), 0)
+        self.assertEqual(probes("devices"), 0)
+        self.assertGreater(probes(f"{render} --precision strict"), 5, "another precision has other options")
+        self.assertEqual(probes(f"{render} --precision strict"), 0)
+        self.assertGreater(probes(render, DRIVER="7.7"), 5, "another driver")
+        self.assertEqual(probes(render, DRIVER="7.7"), 0)
+        self.assertEqual(probes(render), 0)
+        self.assertGreater(probes("devices --probe"), 5)
+        self.assertGreater(probes(f"{render} --no-cache"), 5)
+
+
+if __name__ == "__main__":
+    if glint.IS_SANITIZED:
+        skip_all("sanitizers must be loaded before a shim")
+    HAS_DOUBLE = need_device()["fp64"]
+    main()
