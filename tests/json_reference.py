@@ -17,14 +17,15 @@ page from the commands' output.
   Numbers that are not finite are `null`, such as the PSNR of equal images.
 - A *figure* may be unavailable: an object with `status` `"unavailable"` and `reason` stands in its place.
 - A member is always there unless its row says when. In every report `glint` is the program's version, and `device` has the name,
-  platform, driver and other members of `glint devices`. `doubt` and `clock_doubt` appear where the device's clock is not trusted,
-  and say why.
+  platform, driver, passports and other members of `glint devices`. `doubt` and `clock_doubt` appear where the device's clock is not
+  trusted, and say why.
 """
 NOTES = {
     "glint render --timing=json": "`glint-mpi render` adds `by_rank[]`, with each further rank's `host`, `name`, `driver`, `lanes`, "
                                   "`share`, `bands`, `busy_ms` and `idle_ms`.",
     "glint check": "",
-    "glint devices": "",
+    "glint devices": "`passports[]` has those that are known, in other reports those that were needed; `refused[]` has each `precision` "
+                     "that a passport refuses, and the `reason`. Both may be empty.",
     "glint diff": "Not printed if the images cannot be compared (exit status 1).",
     "glint bench": "A row that cannot be measured has only the members up to `size`, `status` and `reason`.",
     "glint bench --against": "What is not listed is as in `glint bench`; `frame_ms` and `frame_samples_ms` are this program's.",

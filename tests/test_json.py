@@ -110,7 +110,7 @@ class Json(TestCase):
                            self.json("check broken.yaml --json", status=1))
 
     def test_devices(self):
-        self.check_members("glint devices", self.json("devices --json"))
+        self.check_members("glint devices", self.json("devices --probe --json"))
 
     def test_diff(self):
         self.glint(f"render plain.yaml {SMALL} --aov t -o a.png")
