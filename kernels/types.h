@@ -272,7 +272,9 @@ typedef struct {
     // corners of a box around all points where a transparent object may touch an opaque one; low above high
     // where none does
     scalar4 contact_low, contact_high;
-    scalar4 sample;                  // x: width of a sample's share of a pixel, at distance 1
+    // x: width of a sample's share of a pixel, at distance 1; y: the first rival of every hit at `certified`,
+    // the largest scalar, or its negative where no bound holds and so every hit is in doubt
+    scalar4 sample;
     uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: largest depth
     uint4 cull_spheres;              // x: number per common origin, 0: none

@@ -596,6 +596,59 @@ static void needles_have_an_area(void **state)
     }
 }
 
+// A shape of a size, in front of the eye.
+static Object shape_of_size(unsigned form, double size)
+{
+    const Vector3 center = {0.3 * size, 0.2 * size, -4 * size}, axis = {0.3 * size, size, 0.7 * size};
+    switch (form) {
+    case 0:
+        return (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, size}};
+    case 1:
+        return (Object){.kind = SHAPE_DISC, .as.disc = {center, axis, size}};
+    case 2:
+        return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {center, axis, size, true, true}};
+    case 3:
+        return (Object){.kind = SHAPE_CONE, .as.cone = {center, axis, {size, 0.3 * size}, 0, true, true}};
+    case 4:
+        return (Object){.kind = SHAPE_PARABOLOID,
+                        .as.paraboloid = {center, axis, 0.25 * size, 1.5 * size, .finite = true}};
+    case 5:
+        return (Object){.kind = SHAPE_TORUS, .as.torus = {center, axis, size, 0.4 * size}};
+    case 6:
+        return (Object){.kind = SHAPE_TRIANGLE,
+                        .as.triangle.vertices = {center, vector_add(center, axis), {0, 0, center.z}}};
+    default:
+        return (Object){.kind = SHAPE_BOX, .as.box = {vector_subtract(center, vector_all(size)), center}};
+    }
+}
+enum { FORMS = 8 };
+
+// Shapes from 1e-29 to 1e29 as seen from close by, alone and with one of another size in the same scene.
+static void mixed_sizes_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    const int steps = tests_are_long() ? 10 : 3; // on either side of 1
+    size_t undecided = 0, count = 0;
+    for (unsigned form = 0; form < FORMS; form++)
+        for (int i = -steps; i <= steps; i++)
+            for (int k = -steps; k <= steps; k++) {
+                if (!tests_are_long() && (unsigned)(k + i + 2 * steps) % 4 != form % 4) continue;
+                const int exponent = i * 29 / steps, other = k * 29 / steps;
+                const double size = pow(10, exponent);
+                Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
+                array_push(scene.objects, shape_of_size(form, size));
+                if (other != exponent) array_push(scene.objects, shape_of_size(FORMS - 1, pow(10, other)));
+                array_push(scene.lights, ((Light){.kind = LIGHT_DIRECTIONAL,
+                                                  .color = {0.5, 0.5, 0.5},
+                                                  .direction = {-3, -5, -1}}));
+                undecided += check_small(&scene, 0, shape_names[scene.objects.items[0].kind], exponent);
+                count++;
+            }
+    print_message("%zu pixels undecided of %zu\n", undecided, count * SMALL_SIDE * SMALL_SIDE);
+    assert_true(undecided * 16 < count * SMALL_SIDE * SMALL_SIDE);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
@@ -603,7 +656,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(planets_are_decided),          cmocka_unit_test(mirrors_glass_and_spots_are_decided),
         cmocka_unit_test(hard_cases_are_decided),       cmocka_unit_test(lights_on_surfaces_are_decided),
         cmocka_unit_test(checkers_far_out_are_decided), cmocka_unit_test(faint_paths_are_decided),
-        cmocka_unit_test(needles_have_an_area)};
+        cmocka_unit_test(needles_have_an_area),         cmocka_unit_test(mixed_sizes_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

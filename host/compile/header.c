@@ -17,6 +17,13 @@ static scalar4 center_and_half_extent(const Bounds *bounds)
     return scalar4_of(vector_add(half_low, half_high), half_extents.x + half_extents.y + half_extents.z);
 }
 
+// The largest scalar, or its negative if an error bound may underflow or overflow.
+static double first_rival(const CompiledScene *compiled, const CompileSettings *settings)
+{
+    const double largest = settings->precision == PRECISION_DOUBLE ? DBL_MAX : FLT_MAX;
+    return settings->certifies && !bounds_hold(compiled, settings) ? -largest : largest;
+}
+
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
@@ -32,7 +39,8 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),
         .contact_low = scalar4_within_floats(compiled->contact.min),
         .contact_high = scalar4_within_floats(compiled->contact.max),
-        .sample.x = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count),
+        .sample = {2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count),
+                   first_rival(compiled, settings), 0, 0},
         .image = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,

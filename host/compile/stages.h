@@ -54,5 +54,9 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings);
 // (kernels/shading/surface.h).
 Bounds contact_find(const CompiledScene *compiled);
 
+// certified_range.c: whether no error bound of `certified` underflows or overflows, by the sizes of the
+// primitives and their distances from the eye. Else every pixel is in doubt.
+bool bounds_hold(const CompiledScene *compiled, const CompileSettings *settings);
+
 // header.c: FLAT_HEADER.
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);

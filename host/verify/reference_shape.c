@@ -68,7 +68,7 @@ int quadratic_roots(Quad a, Quad b, Quad c, Quad roots[2])
     Quad root = quad_root(discriminant);
     Quad sum = b < 0 ? root - b : -b - root;
     roots[0] = sum == 0 ? 0 : c / sum;
-    if (quad_absolute(sum) > (Quad)1e25L * quad_absolute(a)) return 1;
+    if (quad_absolute(sum) > (Quad)1e32L * quad_absolute(a)) return 1;
     roots[1] = sum / a;
     return 2;
 }

@@ -18,7 +18,7 @@ static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene
     if (IS_CERTIFIED) {
         traversal->hit.low = (real)(LARGEST);                           // of no hit: no rival
         traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
-        traversal->rival = (real)(LARGEST);
+        traversal->rival = (real)(scene->header->sample.y);
         traversal->hit.doubt = mask_none();
     }
     if (!lanes_any(ray->active)) return false;

@@ -1,0 +1,65 @@
+#include "host/base/parallel.h"
+#include "host/compile/shapes.h"
+#include "host/compile/stages.h"
+#include <stdatomic.h>
+
+// A primitive's reach is its largest coordinate seen from the eye: its distance, or its size if that is more.
+// The error of any point near it is at least u times that, whichever ray comes there, and the bounds are
+// products of two such lengths. Those are normal numbers, and roundings below them do not count, if the reach
+// lies within this range: in float the least one is (2^-24 2^-36)^2 = 2^-120.
+//
+// A torus' turning points are the zeros of a cubic of its size, which must be in range to the last bit. A
+// smaller one may be open everywhere: where the error of a point exceeds its size.
+typedef struct {
+    double reach_min, reach_max, torus_min, torus_max, roundoff;
+} CertifiedRange;
+
+static const CertifiedRange of_float = {0x1p-36, 0x1p48, 0x1p-30, 0x1p36, 0x1p-24},
+                            of_double = {0x1p-220, 0x1p220, 0x1p-220, 0x1p220, 0x1p-53};
+
+typedef struct {
+    const CompiledScene *compiled;
+    size_t kind;
+    CertifiedRange range;
+    atomic_bool exceeds;
+} RangeTest;
+
+// That of a plane, of which no square is taken, may be anything.
+static double primitive_reach(size_t kind, const void *primitive)
+{
+    Bounds bounds;
+    if (primitive_bounds(kind, primitive, &bounds))
+        return fmax(vector_largest(bounds.min), vector_largest(bounds.max));
+    return shape_ops[kind]->largest_coordinate(primitive);
+}
+
+static bool is_in_range(const CertifiedRange *range, size_t kind, const void *primitive)
+{
+    const double reach = primitive_reach(kind, primitive);
+    if (kind == KIND_PLANES) return reach == 0 || (reach >= 0x1p-60 && reach <= 0x1p60);
+    if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
+    if (kind != KIND_TORI) return true;
+    const Torus *torus = primitive;
+    const double size = torus->center_major.w + torus->axis_minor.w;
+    return size <= range->torus_max && (size >= range->torus_min || size <= range->roundoff * reach);
+}
+
+static void range_test(void *context, size_t begin, size_t end)
+{
+    RangeTest *test = context;
+    const FlatArray *array = &test->compiled->arrays[FLAT_FIRST_SHAPE + test->kind];
+    for (size_t i = begin; i < end; i++)
+        if (!is_in_range(&test->range, test->kind, flat_array_at(array, i))) {
+            atomic_store(&test->exceeds, true);
+            return;
+        }
+}
+
+bool bounds_hold(const CompiledScene *compiled, const CompileSettings *settings)
+{
+    RangeTest test = {.compiled = compiled,
+                      .range = settings->precision == PRECISION_DOUBLE ? of_double : of_float};
+    for (; test.kind < KIND_COUNT && !test.exceeds; test.kind++)
+        parallel_run(compiled->arrays[FLAT_FIRST_SHAPE + test.kind].count, FLAT_RANGE_MIN, range_test, &test);
+    return !test.exceeds;
+}
