@@ -258,6 +258,23 @@ static void test_orientation_is_exact(void **state)
     }
 }
 
+// Corners whose differences round to one line, or whose products vanish, and corners that are on one.
+static void test_area_is_exact(void **state)
+{
+    (void)state;
+    const Vector3 needles[][3] = {{{0x1p60, 0x1p60, -1}, {0, 0, -1}, {0.25, 0, -1}},
+                                  {{0x1p-60, 0, 0}, {1, 1, 0}, {2, 2, 0}},
+                                  {{0, 0, 0}, {1e-200, 0, 0}, {0, 1e-200, 0}}};
+    for (size_t i = 0; i < sizeof needles / sizeof *needles; i++) {
+        assert_true(triangle_has_area(needles[i][0], needles[i][1], needles[i][2]));
+        assert_int_equal(polygon_triangulate(needles[i], 3, &triangles), POLYGON_CUT);
+        assert_int_equal(triangles.count, 1);
+    }
+    assert_false(triangle_has_area((Vector3){1, 2, 3}, (Vector3){2, 4, 6}, (Vector3){3, 6, 9}));
+    assert_false(triangle_has_area((Vector3){0.1, 0.3, 7}, (Vector3){0.1, 0.3, 7}, (Vector3){1, 2, 3}));
+    assert_false(triangle_has_area((Vector3){0, 0, 0}, (Vector3){1e-200, 0, 0}, (Vector3){0x1p60, 0, 0}));
+}
+
 static int triangles_free(void **state)
 {
     (void)state;
@@ -277,6 +294,7 @@ int main(void)
         cmocka_unit_test(test_repeated_corners),
         cmocka_unit_test(test_not_simple),
         cmocka_unit_test(test_orientation_is_exact),
+        cmocka_unit_test(test_area_is_exact),
     };
     return cmocka_run_group_tests(tests, NULL, triangles_free);
 }

@@ -24,7 +24,6 @@ typedef struct {
     atomic_bool exceeds;
 } RangeTest;
 
-// That of a plane, of which no square is taken, may be anything.
 static double primitive_reach(size_t kind, const void *primitive)
 {
     Bounds bounds;
@@ -36,6 +35,7 @@ static double primitive_reach(size_t kind, const void *primitive)
 static bool is_in_range(const CertifiedRange *range, size_t kind, const void *primitive)
 {
     const double reach = primitive_reach(kind, primitive);
+    // no square is taken of a plane's distance
     if (kind == KIND_PLANES) return reach == 0 || (reach >= 0x1p-60 && reach <= 0x1p60);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
     if (kind != KIND_TORI) return true;

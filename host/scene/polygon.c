@@ -4,6 +4,7 @@
 #include "host/base/memory.h"
 #include <float.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
     double sum, error; // exactly what was added
@@ -296,8 +297,11 @@ PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonT
 {
     triangles->count = 0;
     Vector3 normal = polygon_normal(corners, count);
-    if (count == 3 && vector_is_zero(normal))
-        normal = triangle_normal_signs(corners[0], corners[1], corners[2]);
+    if (count == 3 && vector_is_zero(normal) && triangle_has_area(corners[0], corners[1], corners[2])) {
+        array_reserve(*triangles, 1);
+        memcpy(triangles->items[triangles->count++], (uint32_t[]){0, 1, 2}, sizeof *triangles->items);
+        return POLYGON_CUT;
+    }
     if (vector_is_zero(normal)) return POLYGON_WITHOUT_AREA;
     Ring ring;
     ring_open(&ring, corners, count, normal);
