@@ -4,6 +4,7 @@
 #include "host/base/base64.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
+#include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/base/stage.h"
 #include "host/base/text.h"
@@ -441,6 +442,26 @@ static void test_fault_removes_the_temporary(void **state)
     unlink("kept");
 }
 
+// A product that wraps would be an allocation that is too small.
+static void test_products_do_not_wrap(void **state)
+{
+    (void)state;
+    assert_int_equal(memory_product(3, 5), 15);
+    assert_int_equal(memory_product(0, SIZE_MAX), 0);
+    assert_true(memory_product(SIZE_MAX / 2, 2) == SIZE_MAX - 1);
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        if (!freopen("/dev/null", "w", stderr)) _exit(9);
+        memory_product(SIZE_MAX / 2 + 1, 2);
+        _exit(0);
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), EXIT_MACHINE);
+}
+
 // Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".
 static void test_hash(void **state)
 {
@@ -537,6 +558,7 @@ int main(void)
         cmocka_unit_test(test_output_of_killed_processes),
         cmocka_unit_test(test_base64),
         cmocka_unit_test(test_fault_removes_the_temporary),
+        cmocka_unit_test(test_products_do_not_wrap),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);
 }

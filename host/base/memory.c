@@ -11,11 +11,17 @@ static void *memory_must(void *memory, size_t count, size_t size)
     return memory;
 }
 
-// An empty allocation is one byte, so that NULL always means failure.
-static size_t memory_size(size_t count, size_t size)
+size_t memory_product(size_t count, size_t size)
 {
     size_t total;
     if (__builtin_mul_overflow(count, size, &total)) fault("out of memory: %zu x %zu bytes", count, size);
+    return total;
+}
+
+// An empty allocation is one byte, so that NULL always means failure.
+static size_t memory_size(size_t count, size_t size)
+{
+    const size_t total = memory_product(count, size);
     return total ? total : 1;
 }
 

@@ -10,6 +10,9 @@ void *memory_resize(void *memory, size_t count, size_t size);
 char *memory_copy_text(const char *text);
 char *memory_copy_part(const char *text, size_t length); // with a NUL behind it
 
+// count * size, or a fault if that exceeds the address space.
+size_t memory_product(size_t count, size_t size);
+
 // From this size on memory_allocate_large uses large pages.
 enum { MEMORY_LARGE_MIN = 1 << 22 };
 

@@ -46,7 +46,7 @@ static void array_renew(CompiledScene *compiled, size_t kind, FlatLayout layout,
 {
     FlatArray *array = &compiled->arrays[kind];
     free(array->items);
-    *array = (FlatArray){memory_allocate_large(count * layout.size), count, layout};
+    *array = (FlatArray){memory_allocate_large(memory_product(count, layout.size)), count, layout};
     parallel_run(count, FLAT_RANGE_MIN, range_zero, array);
     compiled->changed[kind] = true;
 }

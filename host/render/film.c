@@ -22,7 +22,7 @@ uint32_t film_components(const Film *film, Layer layer)
 size_t film_layer_size(const Film *film, Layer layer)
 {
     const size_t value_size = layer_types[layer] == LAYER_TYPE_INTEGER ? sizeof(uint32_t) : film->real_size;
-    return film_pixel_count(film) * film_components(film, layer) * value_size;
+    return memory_product(memory_product(film_pixel_count(film), film_components(film, layer)), value_size);
 }
 
 size_t film_size(const Film *film)

@@ -2,6 +2,7 @@
 // in kernels/aovs.h.
 #pragma once
 
+#include "host/base/memory.h"
 #include "kernels/aovs.h"
 #include <stdbool.h>
 #include <stddef.h>
@@ -78,7 +79,7 @@ typedef struct {
 
 static inline size_t film_pixel_count(const Film *film)
 {
-    return (size_t)film->width * film->height;
+    return memory_product(film->width, film->height);
 }
 
 // Values per pixel.

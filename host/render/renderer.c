@@ -52,9 +52,9 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
 {
     const Device *device = renderer->compute->device;
     const bool is_double = renderer->report.is_double;
-    size_t sum = 0, largest = 0;
+    uint64_t sum = 0, largest = 0; // of all arrays, which may exceed a 32-bit host's size_t
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        size_t size = flat_array_size(&compiled->arrays[kind], is_double);
+        const uint64_t size = flat_array_size(&compiled->arrays[kind], is_double);
         sum += size;
         if (size > largest) largest = size;
     }
