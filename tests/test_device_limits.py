@@ -23,6 +23,7 @@ WORKS = (
     ("group=12", f"{RENDER} --precision strict --lanes 1 --aov {ALL_AOVS}"),
     ("group=12", "trace sphere.yaml --rays rays.txt --lanes 1"),
     ("constant=16384", f"{RENDER} --precision strict"),
+    (f"address=32,memory={8192 * MEBI}", f"{RENDER} --precision strict"),
     (f"memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision strict --size 3840x2160 --aov {ALL_AOVS}"),
     # the watchdog: no launch grows more than fourfold
     ("first=4096", f"{RENDER} --precision strict --lanes 1 --size 3840x400 --aov {ALL_AOVS}"),
@@ -180,10 +181,38 @@ class DeviceLimits(TestCase):
             self.assertEqual({row["clock"] for row in self.json(f"{bench} --json", env=env)["runs"]}, {clock})
             self.assertRegex(self.glint(bench, env=env).stdout, rf" {clock} +\d+ ")
 
+    def test_devices_of_one_name(self):
+        """Two boards of a kind differ by their places on the PCI bus, by which they can be chosen."""
+        places = {"khr": ("0001:{}:02.3", None), "nv": ("0000:{}:05.1", None), "amd": ("0000:{}:04.0", "Lodestar 7")}
+        for extensions, (place, board) in places.items():
+            env = POCL | {"POCL_DEVICES": "basic basic", "LD_PRELOAD": self.shim, "GLINT_LIMITS": extensions}
+            devices = self.json("devices --json", env=env)["devices"]
+            self.assertEqual([device["pci"] for device in devices], [place.format(65), place.format(66)])
+            self.assertEqual([device["board"] for device in devices], [board, board])
+            uuids = [bytes([0xAB, bus, *[0] * 14]).hex() for bus in (0x65, 0x66)] if extensions == "khr" else [None, None]
+            self.assertEqual([device["uuid"] for device in devices], uuids)
+            text = self.glint("devices", env=env).stdout
+            for bus in 65, 66:
+                self.assertIn(f"; PCI {place.format(bus)}", text)
+            for selector in filter(None, (devices[1]["pci"], devices[1]["pci"].partition(":")[2], devices[1]["uuid"])):
+                report = self.json(f"{RENDER} --device {selector} --timing=json", env=env)
+                self.assertEqual(report["by_device"][0]["pci"], devices[1]["pci"])
+            if board:
+                report = self.json(f"{RENDER} --device lodestar --timing=json", env=env)
+                self.assertEqual((report["by_device"][0]["board"], report["by_device"][0]["pci"]), (board, devices[0]["pci"]))
+        self.refuses(f"{RENDER} --device 65:00.1", 'no usable device matches "65:00.1"', env=POCL)
+        device = self.json("devices --json", env=POCL)["devices"][0]
+        self.assertEqual((device["board"], device["pci"], device["uuid"]), (None, None, None))
+
     def test_devices_report(self):
         report = self.json("devices --json", env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": "embedded,no-double,group=12"})
         device = report["devices"][0]
         self.assertEqual((device["profile"], device["fp64"], device["largest_work_group"]), ("embedded", False, 12))
+        self.assertIn(device["address_bits"], (32, 64))
+        limits = f"address=32,memory={8192 * MEBI},buffer={5000 * MEBI}"
+        report = self.json("devices --json", env=POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits})
+        sizes = [report["devices"][0][name] for name in ("address_bits", "memory_bytes", "largest_buffer_bytes")]
+        self.assertEqual(sizes, [32, 2**32 - 1, 2**32 - 1])
 
 
 if __name__ == "__main__":

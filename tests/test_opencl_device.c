@@ -15,6 +15,9 @@ static Device fabricated(unsigned index, cl_device_type type, const char *name, 
         .type = type,
         .name = (char *)(uintptr_t)name,
         .platform_name = (char *)(uintptr_t)platform,
+        .board = (char *)(uintptr_t) "",
+        .pci = (char *)(uintptr_t) "",
+        .uuid = (char *)(uintptr_t) "",
         .available = true,
         .compiler = true,
         .little_endian = true,
@@ -40,6 +43,9 @@ static void machine_fill(Machine *machine)
     items[3] = fabricated(3, CL_DEVICE_TYPE_GPU, "Force RTX 3090", "Vendor CUDA");
     items[4] = fabricated(4, CL_DEVICE_TYPE_GPU, "Force RTX 3090", "Vendor CUDA");
     items[4].same_name_index = 1;
+    items[4].pci = (char *)(uintptr_t) "0000:65:00.0";
+    items[4].uuid = (char *)(uintptr_t) "00112233445566778899aabbccddeeff";
+    items[4].board = (char *)(uintptr_t) "Lodestar 7";
     items[5] = fabricated(5, CL_DEVICE_TYPE_CPU, "Xeon", "Acme");
     machine->list = (DeviceList){.items = items, .count = 6, .platform_count = 3};
 }
@@ -51,15 +57,41 @@ static void test_choice(void **state)
         const char *selector;
         int index;
     } cases[] = {
-        {NULL, 3},    {"gpu", 3},     {"GPU", 3},
-        {"cpu", 0},   {"Cpu", 0},     {"0", 0},
-        {"4", 4},     {"5", 5},       {"3090", 3},
-        {"force", 3}, {"haswell", 0}, {"portable", 0},
-        {"XEON", 5},  {"tile", 1},    {"acme", 5},
-        {"2", -1},    {"mute", -1},   {"nonsense", -1},
-        {"6", -1},    {"512", 0},     {"12", -1},
-        {"51", -1},   {"309", -1},    {"-1", -1},
-        {"00", 0},    {"0x0", -1},    {"99999999999999999999999", -1},
+        {NULL, 3},
+        {"gpu", 3},
+        {"GPU", 3},
+        {"cpu", 0},
+        {"Cpu", 0},
+        {"0", 0},
+        {"4", 4},
+        {"5", 5},
+        {"3090", 3},
+        {"force", 3},
+        {"haswell", 0},
+        {"portable", 0},
+        {"XEON", 5},
+        {"tile", 1},
+        {"acme", 5},
+        {"2", -1},
+        {"mute", -1},
+        {"nonsense", -1},
+        {"6", -1},
+        {"512", 0},
+        {"12", -1},
+        {"51", -1},
+        {"309", -1},
+        {"-1", -1},
+        {"00", 0},
+        {"0x0", -1},
+        {"99999999999999999999999", -1},
+        {"0000:65:00.0", 4},
+        {"65:00.0", 4},
+        {"65:00", -1},
+        {":65:00.0", -1},
+        {"", 3},
+        {"lodestar", 4},
+        {"00112233445566778899AABBCCDDEEFF", 4},
+        {"00112233445566778899aabbccddeef", -1},
     };
     Machine machine = {0};
     machine_fill(&machine);

@@ -141,9 +141,12 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         fputs("glint bench: no row could be measured\n", stderr);
         status = EXIT_USER;
     } else if (baseline) {
+        const char *board = baseline_board(baseline);
         if (strcmp(baseline_device(baseline), device->name) != 0)
             fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
                     baseline_device(baseline));
+        else if (board[0] != '\0' && strcmp(board, device->board) != 0)
+            fprintf(stderr, "glint bench: the baseline was measured on another board, \"%s\"\n", board);
         struct utsname host = {0};
         uname(&host);
         if (strcmp(baseline_host(baseline), host.nodename) != 0)

@@ -7,6 +7,8 @@
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
+#include "host/cli/report_json.h"
+#include "host/opencl/device.h"
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -43,6 +45,7 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_bool(json, "usable", device_usable(device, &why));
         json_text(json, "unusable_because", why);
         json_text(json, "name", device->name);
+        device_identity_json(json, device);
         json_text(json, "type", device_type_name(device->type));
         json_text(json, "profile", device->embedded_profile ? "embedded" : "full");
         json_text(json, "vendor", device->vendor);
@@ -60,6 +63,7 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_bool(json, "fma", device->fma_in_hardware);
         json_bool(json, "correctly_rounded_divide_sqrt", device->correctly_rounded);
         json_bool(json, "compiler", device->compiler);
+        json_int64(json, "address_bits", device->address_bits);
         json_int64(json, "memory_bytes", (int64_t)device->memory_bytes);
         json_int64(json, "largest_buffer_bytes", (int64_t)device->largest_buffer_bytes);
         json_int64(json, "local_memory_bytes", (int64_t)device->local_memory_bytes);
@@ -114,6 +118,8 @@ static void row_fill(Row *row, const Device *device, bool is_chosen)
     size_append(cell++, device->memory_bytes);
     size_append(cell++, device->largest_buffer_bytes);
     text_appendf(cell, "%s, %s", device->platform_name, device->driver);
+    if (device->board[0]) text_appendf(cell, "; %s", device->board);
+    if (device->pci[0]) text_appendf(cell, "; PCI %s", device->pci);
     if (device->same_name_index) text_appendf(cell, "; twin %u", device->same_name_index);
     if (!device_usable(device, &why)) text_appendf(cell, "; unusable: %s", why);
 }

@@ -58,11 +58,11 @@ enum {
 
 // Help for options that several commands share; a command's help ends with HELP_HELP.
 #define HELP_DEVICE                                                                                          \
-    "      --device D        index, part of the name, cpu or gpu (default: GLINT_DEVICE, else a GPU, "       \
-    "else a CPU)\n"
+    "      --device D        index, part of the name, place on the PCI bus, cpu or gpu\n"                    \
+    "                        (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
 #define HELP_DEVICES                                                                                         \
-    "      --device LIST     all, or several: each an index, part of the name, cpu or gpu, with commas\n"    \
-    "                        between (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
+    "      --device LIST     all, or several: each an index, part of the name, place on the PCI bus, cpu\n"  \
+    "                        or gpu, with commas between (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
 #define HELP_LANES                                                                                           \
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
 #define HELP_BOUNCES                                                                                         \

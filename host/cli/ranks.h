@@ -14,7 +14,8 @@ typedef struct {
 // Names its device. Texts too long for it are cut.
 static inline void rank_set_device(Rank *rank, const Device *device)
 {
-    snprintf(rank->device, sizeof rank->device, "%s", device->name);
+    const char *board = device->board;
+    snprintf(rank->device, sizeof rank->device, "%s%s%s", device->name, board[0] ? ", " : "", board);
     snprintf(rank->driver, sizeof rank->driver, "%s, %s", device->platform_name, device->driver);
 }
 

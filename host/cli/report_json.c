@@ -32,9 +32,22 @@ void figure_json(Json *json, const char *key, double scale, Figure figure)
     json_end(json);
 }
 
+static const char *null_if_empty(const char *text)
+{
+    return text[0] != '\0' ? text : NULL;
+}
+
+void device_identity_json(Json *json, const Device *device)
+{
+    json_text(json, "board", null_if_empty(device->board));
+    json_text(json, "pci", null_if_empty(device->pci));
+    json_text(json, "uuid", null_if_empty(device->uuid));
+}
+
 void device_json(Json *json, const Device *device)
 {
     json_text(json, "name", device->name);
+    device_identity_json(json, device);
     json_text(json, "platform", device->platform_name);
     json_text(json, "platform_version", device->platform_version);
     json_text(json, "driver", device->driver);

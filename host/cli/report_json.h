@@ -9,6 +9,8 @@ void summary_json(Json *json, const char *key, Summary seconds); // in milliseco
 // The reason in place of a missing figure, in the open object.
 void unavailable_json(Json *json, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
+// Board, place on the PCI bus and UUID, each null where unknown.
+void device_identity_json(Json *json, const Device *device);
 void device_json(Json *json, const Device *device); // the device's members, in the open object
 void size_json(Json *json, uint32_t width, uint32_t height);
 void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits

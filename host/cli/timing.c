@@ -200,6 +200,7 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
 {
     json_begin_object(json, NULL);
     json_text(json, "name", report->device->name);
+    device_identity_json(json, report->device);
     json_text(json, "platform", report->device->platform_name);
     json_text(json, "driver", report->device->driver);
     passports_json(json, report->device);

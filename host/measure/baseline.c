@@ -124,6 +124,11 @@ const char *baseline_device(const Baseline *baseline)
     return text_of(json_object_get(json_object_get(baseline->report, "device"), "name"));
 }
 
+const char *baseline_board(const Baseline *baseline)
+{
+    return text_of(json_object_get(json_object_get(baseline->report, "device"), "board"));
+}
+
 const char *baseline_host(const Baseline *baseline)
 {
     return text_of(json_object_get(json_object_get(baseline->report, "host"), "name"));

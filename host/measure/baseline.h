@@ -12,8 +12,9 @@ enum { BENCH_SCHEMA = 5 }; // of the reports
 // Reads a file that glint bench --json wrote; NULL with a message where it is none.
 Baseline *baseline_open(const char *path, MessageList *messages);
 void baseline_close(Baseline *baseline);
-// Names of the device and the host, or "" where the report has none.
+// Names of the device, its board and the host, or "" where the report has none.
 const char *baseline_device(const Baseline *baseline);
+const char *baseline_board(const Baseline *baseline);
 const char *baseline_host(const Baseline *baseline);
 
 // The times of the row with this key, but for the scene's path; false: the baseline has none.

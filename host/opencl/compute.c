@@ -104,7 +104,9 @@ static char *failure_text(const Compute *compute, const ComputeFailure *failure)
         text_appendf(&text, "NULL with CL_SUCCESS");
     else
         text_appendf(&text, "%s (%d)", cl_status_name(failure->status), failure->status);
-    text_appendf(&text, " on %s%s", compute->device->name, fault_limits());
+    const Device *device = compute->device;
+    text_appendf(&text, " on %s%s%s%s", device->name, device->pci[0] ? " at " : "", device->pci,
+                 fault_limits());
     const char *meaning = cl_status_meaning(failure->call, failure->status);
     if (meaning) text_appendf(&text, ": %s", meaning);
     if (failure->detail) text_appendf(&text, ": %s", failure->detail);

@@ -90,6 +90,85 @@ static bool extensions_have(const char *extensions, const char *name)
     return false;
 }
 
+// Of extensions, by their specifications.
+enum {
+    QUERY_NV_PCI_BUS = 0x4008,
+    QUERY_NV_PCI_SLOT = 0x4009, // device and function
+    QUERY_NV_PCI_DOMAIN = 0x400A,
+    QUERY_AMD_TOPOLOGY = 0x4037,
+    QUERY_AMD_BOARD_NAME = 0x4038,
+    QUERY_UUID = 0x106A,
+    QUERY_PCI_BUS_INFO = 0x410F,
+    AMD_TOPOLOGY_PCIE = 1,
+};
+
+typedef struct {
+    cl_uint domain, bus, device, function;
+} PciPlace;
+
+static bool pci_of_khr(DeviceList *list, cl_device_id id, PciPlace *place)
+{
+    return device_query(list, id, QUERY_PCI_BUS_INFO, sizeof *place, place, NULL);
+}
+
+static bool pci_of_nv(DeviceList *list, cl_device_id id, PciPlace *place)
+{
+    cl_uint slot = 0;
+    if (!device_query(list, id, QUERY_NV_PCI_BUS, sizeof place->bus, &place->bus, NULL) ||
+        !device_query(list, id, QUERY_NV_PCI_SLOT, sizeof slot, &slot, NULL))
+        return false;
+    device_number(list, id, QUERY_NV_PCI_DOMAIN, &place->domain);
+    place->device = slot >> 3;
+    place->function = slot & 7;
+    return true;
+}
+
+static bool pci_of_amd(DeviceList *list, cl_device_id id, PciPlace *place)
+{
+    struct {
+        cl_uint type;
+        cl_uchar unused[17], bus, device, function;
+    } topology = {0};
+    if (!device_query(list, id, QUERY_AMD_TOPOLOGY, sizeof topology, &topology, NULL)) return false;
+    *place = (PciPlace){0, topology.bus, topology.device, topology.function};
+    return topology.type == AMD_TOPOLOGY_PCIE;
+}
+
+static const struct {
+    const char *extension;
+    bool (*query)(DeviceList *list, cl_device_id id, PciPlace *place);
+} pci_queries[] = {
+    {"cl_khr_pci_bus_info", pci_of_khr},
+    {"cl_nv_device_attribute_query", pci_of_nv},
+    {"cl_amd_device_attribute_query", pci_of_amd},
+};
+
+static void device_identify(DeviceList *list, Device *device)
+{
+    Text pci = {0}, uuid = {0};
+    PciPlace place = {0};
+    for (size_t i = 0; i < sizeof pci_queries / sizeof *pci_queries && pci.count == 0; i++)
+        if (extensions_have(device->extensions, pci_queries[i].extension) &&
+            pci_queries[i].query(list, device->id, &place))
+            text_appendf(&pci, "%04x:%02x:%02x.%x", place.domain, place.bus, place.device, place.function);
+    cl_uchar bytes[16];
+    if (extensions_have(device->extensions, "cl_khr_device_uuid") &&
+        device_query(list, device->id, QUERY_UUID, sizeof bytes, bytes, NULL))
+        for (size_t i = 0; i < sizeof bytes; i++)
+            text_appendf(&uuid, "%02x", bytes[i]);
+    device->pci = pci.items ? pci.items : memory_copy_text("");
+    device->uuid = uuid.items ? uuid.items : memory_copy_text("");
+    device->board = extensions_have(device->extensions, "cl_amd_device_attribute_query")
+                        ? device_text(list, device->id, QUERY_AMD_BOARD_NAME)
+                        : memory_copy_text("");
+}
+
+// What 32 bits can address of a size in bytes; 0: unknown.
+static uint64_t addressable(uint64_t bytes)
+{
+    return bytes == 0 || bytes > UINT32_MAX ? UINT32_MAX : bytes;
+}
+
 static void device_describe(DeviceList *list, Device *device)
 {
     cl_device_id id = device->id;
@@ -100,6 +179,7 @@ static void device_describe(DeviceList *list, Device *device)
     device->version = device_text(list, id, CL_DEVICE_VERSION);
     device->driver = device_text(list, id, CL_DRIVER_VERSION);
     device->extensions = device_text(list, id, CL_DEVICE_EXTENSIONS);
+    device_identify(list, device);
 
     device_number(list, id, CL_DEVICE_TYPE, &device->type);
     device_number(list, id, CL_DEVICE_MAX_COMPUTE_UNITS, &device->compute_units);
@@ -109,6 +189,12 @@ static void device_describe(DeviceList *list, Device *device)
     device_number(list, id, CL_DEVICE_GLOBAL_MEM_SIZE, &device->memory_bytes);
     device_number(list, id, CL_DEVICE_MAX_MEM_ALLOC_SIZE, &device->largest_buffer_bytes);
     device_number(list, id, CL_DEVICE_LOCAL_MEM_SIZE, &device->local_memory_bytes);
+
+    device_number(list, id, CL_DEVICE_ADDRESS_BITS, &device->address_bits);
+    if (device->address_bits == 32) {
+        device->memory_bytes = addressable(device->memory_bytes);
+        device->largest_buffer_bytes = addressable(device->largest_buffer_bytes);
+    }
 
     size_t timer_nanoseconds = 0;
     device_number(list, id, CL_DEVICE_PROFILING_TIMER_RESOLUTION, &timer_nanoseconds);
@@ -212,6 +298,9 @@ void device_list_close(DeviceList *list)
         free(device->platform_version);
         free(device->extensions);
         device_passports_close(device->passports);
+        free(device->board);
+        free(device->pci);
+        free(device->uuid);
     }
     free(list->items);
     *list = (DeviceList){0};
@@ -280,12 +369,21 @@ static bool name_matches(const char *name, const char *selector)
     return false;
 }
 
+// The domain may be left out.
+static bool pci_matches(const char *pci, const char *selector)
+{
+    const char *bus = strchr(pci, ':');
+    return bus && (strcasecmp(pci, selector) == 0 || strcasecmp(bus + 1, selector) == 0);
+}
+
 static bool device_matches(const Device *device, const char *selector)
 {
     if (!selector) return true;
     if (strcasecmp(selector, "gpu") == 0) return (device->type & CL_DEVICE_TYPE_GPU) != 0;
     if (strcasecmp(selector, "cpu") == 0) return (device->type & CL_DEVICE_TYPE_CPU) != 0;
-    return name_matches(device->name, selector) || name_matches(device->platform_name, selector);
+    return name_matches(device->name, selector) || name_matches(device->platform_name, selector) ||
+           name_matches(device->board, selector) || pci_matches(device->pci, selector) ||
+           (selector[0] != '\0' && strcasecmp(device->uuid, selector) == 0);
 }
 
 // Whether the selector is the index of a device: "3090" may still be a part of a name.

@@ -16,9 +16,14 @@ typedef struct {
     cl_device_type type;
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
-    unsigned compute_units, clock_mhz;
-    unsigned native_float_width, native_double_width;                // at least 1; double 0 without fp64
-    uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes; // 0: unknown
+    // What tells devices of one name apart, where the driver has the extensions; else empty texts.
+    char *board; // "AMD Radeon RX 6800"
+    char *pci;   // "0000:65:00.0": domain, bus, device, function
+    char *uuid;  // 32 hexadecimal digits
+    unsigned compute_units, clock_mhz, address_bits;
+    unsigned native_float_width, native_double_width; // at least 1; double 0 without fp64
+    // 0: unknown; of a device with 32-bit addresses less than 4 GiB
+    uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes;
     size_t largest_work_group, longest_group_sides[3];
     double timer_resolution_seconds;
     bool fp64, denormals, fma_in_hardware;
@@ -45,11 +50,11 @@ void device_list_close(DeviceList *list);
 // "CALL: STATUS (CODE)", or NULL if no call failed. Caller frees.
 char *device_list_failure_text(const DeviceList *list);
 
-// `selector`: an index, a part of the device's or platform's name (any case; a number only as a whole),
-// "cpu", "gpu", or NULL for the default: a GPU if there is one, else a CPU, else any device. Considers only
-// devices that are usable; of identical ones, chooses the first. NULL,
-// with an error message, if none matches: the message lists the devices, or says how to install PoCL if there
-// are none.
+// `selector`: an index, a part of the device's, board's or platform's name (any case; a number only as a
+// whole), the device's place on the PCI bus (with or without the domain), its UUID, "cpu", "gpu", or NULL for
+// the default: a GPU if there is one, else a CPU, else any device. Considers only devices that are usable; of
+// identical ones, chooses the first. NULL, with an error message, if none matches: the message lists the
+// devices, or says how to install PoCL if there are none.
 const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages);
 
 // The devices of `selector`: "all" of them, or those of a list with commas between selectors as above.

@@ -23,7 +23,7 @@ static char *request_key(const Device *device, const ProgramRequest *request, co
 {
     Text key = {0};
     text_appendf(&key, "options %s\nlaunch %s\n", or_empty(request->options), or_empty(request->launch));
-    text_appendf(&key, "device %s, %s, native width %u\n", device->name, device->version,
+    text_appendf(&key, "device %s %s, %s, native width %u\n", device->name, device->board, device->version,
                  device->native_float_width);
     text_appendf(&key, "driver %s, %s\n", device->vendor, device->driver);
     text_appendf(&key, "platform %s, %s\n", device->platform_name, device->platform_version);
