@@ -41,7 +41,7 @@ static int64_t exr_read_bytes(exr_const_context_t context, void *reader, void *b
     const ImageFile *file = ((ExrReader *)reader)->file;
     if (offset >= file->length) return 0;
     if (size > file->length - offset) size = file->length - offset;
-    memcpy(bytes, file->bytes + offset, size);
+    memcpy(bytes, file->bytes + offset, (size_t)size);
     return (int64_t)size;
 }
 

@@ -33,7 +33,7 @@ static int64_t exr_write_bytes(exr_const_context_t context, void *user_data, con
     (void)context, (void)fail;
     ImageWriter *writer = user_data;
     FILE *file = writer->output.file;
-    if (fseeko(file, (off_t)offset, SEEK_SET) == 0 && fwrite(bytes, 1, size, file) == size)
+    if (fseeko(file, (off_t)offset, SEEK_SET) == 0 && fwrite(bytes, 1, (size_t)size, file) == size)
         return (int64_t)size;
     ((ExrWriter *)writer->state)->write_error = errno;
     return -1;
@@ -115,7 +115,7 @@ static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
     const ExrWriter *state = pipeline->encoding_user_data;
     exr_result_t code = state->compress(pipeline);
     if (code == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes)
-        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, (size_t)pipeline->packed_bytes);
     return code;
 }
 

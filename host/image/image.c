@@ -157,8 +157,9 @@ bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_
     if (width * height > pixels_max)
         return image_refuse(file, "%ju x %ju pixels are more than %u; --max-pixels raises this limit",
                             (uintmax_t)width, (uintmax_t)height, pixels_max);
-    image->values = calloc(values, sizeof *image->values);
-    if (!image->values) return image_refuse(file, "the image does not fit into memory");
+    size_t count;
+    if (__builtin_add_overflow(values, 0, &count) || !(image->values = calloc(count, sizeof *image->values)))
+        return image_refuse(file, "the image does not fit into memory");
     image->width = (uint32_t)width;
     image->height = (uint32_t)height;
     image->channels = (uint32_t)channels;

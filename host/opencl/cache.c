@@ -216,9 +216,9 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
         return damaged;
     if (header.format != cache_format) return absent;
     entry->key = content->items + sizeof header;
-    entry->key_length = header.key_length;
-    entry->binary = entry->key + header.key_length;
-    entry->binary_length = rest - header.key_length;
+    entry->key_length = (size_t)header.key_length;
+    entry->binary = entry->key + entry->key_length;
+    entry->binary_length = rest - entry->key_length;
     expected = header_of(entry->key_length, entry->binary_length);
     Secret secret;
     if (secret_read(&secret, folder) != NULL) return "the key of its hash cannot be read";
@@ -379,7 +379,7 @@ static bool entry_write(OutputFile *output, const CacheHeader *header, const cha
                         MessageList *messages)
 {
     return output_write(output, header, sizeof *header, messages) &&
-           output_write(output, key, header->key_length, messages) &&
+           output_write(output, key, strlen(key), messages) &&
            output_write(output, binary->items, binary->count, messages) && output_commit(output, messages);
 }
 

@@ -228,7 +228,7 @@ static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const
 {
     bool is_written = ftruncate(checkpoint->descriptor, 0) == 0 &&
                       bytes_write(checkpoint->descriptor, header, sizeof *header, 0) &&
-                      bytes_write(checkpoint->descriptor, key, header->key_length, sizeof *header) &&
+                      bytes_write(checkpoint->descriptor, key, strlen(key), sizeof *header) &&
                       fsync(checkpoint->descriptor) == 0;
     return is_written || open_failed(checkpoint->path, "write", messages);
 }
@@ -237,9 +237,10 @@ static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const
 static bool key_check(const Checkpoint *checkpoint, const FileHeader *header, const char *key,
                       MessageList *messages)
 {
-    char *found = memory_allocate_zeroed(header->key_length + 1, 1);
+    const size_t length = (size_t)header->key_length; // at most KEY_BYTES_MAX
+    char *found = memory_allocate_zeroed(length + 1, 1);
     bool is_same = false;
-    if (!bytes_read(checkpoint->descriptor, found, header->key_length, sizeof *header)) {
+    if (!bytes_read(checkpoint->descriptor, found, length, sizeof *header)) {
         open_failed(checkpoint->path, "read", messages);
     } else {
         const FileHeader of_found = file_header(found);

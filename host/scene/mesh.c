@@ -68,7 +68,7 @@ static size_t vertices_join(Mesh *mesh, uint32_t *joined)
     size_t kept = 0;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         if (joined[i] == none) continue;
-        size_t slot = vertex_hash(mesh, i) & (slot_count - 1);
+        size_t slot = (size_t)vertex_hash(mesh, i) & (slot_count - 1);
         while (slots[slot] != none && !vertices_equal(mesh, slots[slot], i))
             slot = (slot + 1) & (slot_count - 1);
         if (slots[slot] == none) {

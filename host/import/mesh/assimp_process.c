@@ -116,7 +116,7 @@ static void reply_write(FILE *reply, MeshDraft *draft, bool is_read)
     materials_write(reply, draft->scene);
     for (size_t i = 0; i < 6; i++)
         if (header.counts[i] > 0)
-            fwrite(*arrays.items[i].items, arrays.items[i].size, header.counts[i], reply);
+            fwrite(*arrays.items[i].items, arrays.items[i].size, *arrays.items[i].count, reply);
     fwrite(magic, sizeof magic, 1, reply);
 }
 
