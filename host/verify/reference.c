@@ -58,7 +58,7 @@ Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shin
     Quad facing = quad3_dot(normal, to_light);
     if (facing <= 0) return 0;
     Quad alignment = quad3_dot(quad3_subtract(quad3_scale(normal, 2 * facing), to_light), to_eye);
-    return powl(alignment > 0 ? (long double)alignment : 0, shininess);
+    return alignment > 0 ? QUAD_CALL(pow)(alignment, (Quad)shininess) : shininess == 0;
 }
 
 Object reference_round_object(const Object *object)

@@ -36,11 +36,11 @@ typedef struct {
     Color base;
 } Surface;
 
-static long double square_of(Quad coordinate, double size, Quad *margin)
+static Quad square_of(Quad coordinate, double size, Quad *margin)
 {
-    long double place = (long double)(coordinate / size);
-    *margin = quad_minimum(*margin, 2 * size * quad_absolute(place - roundl(place)));
-    return floorl(place);
+    const Quad place = coordinate / size;
+    *margin = quad_minimum(*margin, 2 * size * quad_absolute(place - QUAD_CALL(round)(place)));
+    return QUAD_CALL(floor)(place);
 }
 
 // Solids are cut from a checkered block of the world, the cube found a 1024th of its side behind the surface,
@@ -50,7 +50,7 @@ static Color checker_color(const Object *object, const Material *material, const
 {
     bool flat = object->kind == SHAPE_PLANE || object->kind == SHAPE_DISC;
     double size = material->checker_size;
-    long double squares;
+    Quad squares;
     if (flat) {
         Vector3 given = object->kind == SHAPE_PLANE ? object->as.plane.normal : object->as.disc.normal;
         Quad3 normal = quad3_unit(quad3(given));
@@ -62,18 +62,18 @@ static Color checker_color(const Object *object, const Material *material, const
         squares = square_of(point.x, size, margin) + square_of(point.y, size, margin) +
                   square_of(point.z, size, margin);
     }
-    return material->checker_colors[fmodl(squares, 2) != 0];
+    return material->checker_colors[QUAD_CALL(fmod)(squares, 2) != 0];
 }
 
 // Full within half_angle - penumbra, none beyond half_angle, the smooth step 3 x^2 - 2 x^3 of 1 - cos
 // between.
 static Quad spot_factor(const Light *light, Quad3 from_light)
 {
-    const long double degree = acosl(-1) / 180;
+    const Quad degree = QUAD_CALL(acos)(-1) / 180;
     Quad along = quad3_dot(quad3_unit(quad3(light->direction)), quad3_unit(from_light));
     Quad versine = 1 - along;
-    Quad outer = 1 - cosl(light->half_angle * degree);
-    Quad inner = 1 - cosl((light->half_angle - light->penumbra) * degree);
+    Quad outer = 1 - QUAD_CALL(cos)(light->half_angle * degree);
+    Quad inner = 1 - QUAD_CALL(cos)((light->half_angle - light->penumbra) * degree);
     if (versine <= inner) return 1;
     if (versine >= outer) return 0;
     Quad x = (outer - versine) / (outer - inner);
