@@ -1,4 +1,5 @@
 #include "host/compile/stages.h"
+#include "host/scene/portable.h"
 
 _Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL == LIGHT_KIND_DIRECTIONAL &&
                    (int)LIGHT_SPOT == LIGHT_KIND_SPOT,
@@ -7,7 +8,7 @@ _Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL ==
 // 1 - cos of an angle in degrees, without cancellation.
 static double versine(double degrees)
 {
-    double half = sin(degrees * (M_PI / 360));
+    double half = portable_sine(degrees * (M_PI / 360));
     return 2 * half * half;
 }
 

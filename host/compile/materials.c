@@ -1,11 +1,12 @@
 #include "host/compile/stages.h"
+#include "host/scene/portable.h"
 
 #include <float.h>
 
 static uint4 optical_depth_of(double transmission)
 {
     if (transmission == 0) return (uint4){OPAQUE, 0, 0, 0};
-    const double log2_loss = fmin(-log2(transmission), PASSING_DEPTH_MAX);
+    const double log2_loss = fmin(-portable_log2(transmission), PASSING_DEPTH_MAX);
     uint64_t fine = (uint64_t)llround(ldexp(log2_loss, 48));
     return (uint4){(uint32_t)llround(ldexp(log2_loss, 24)), (uint32_t)fine, (uint32_t)(fine >> 32), 0};
 }

@@ -4,6 +4,7 @@
 #include "host/import/line.h"
 #include "host/import/load.h"
 #include "host/import/place.h"
+#include "host/scene/portable.h"
 
 #include <string.h>
 
@@ -105,9 +106,10 @@ static void cylinder_finish(CfgReader *reader, const BlockValues *values)
 
 static void cone_finish(CfgReader *reader, const BlockValues *values)
 {
-    Object object = {
-        .kind = SHAPE_CONE,
-        .as.cone = {.from = values->center, .axis = values->normal, .slope = tan(values->angle)}};
+    Object object = {.kind = SHAPE_CONE,
+                     .as.cone = {.from = values->center,
+                                 .axis = values->normal,
+                                 .slope = portable_tangent(values->angle)}};
     object_finish(reader, values, object);
 }
 

@@ -5,6 +5,7 @@
 #include "host/import/load.h"
 #include "host/import/place.h"
 #include "host/scene/polygon.h"
+#include "host/scene/portable.h"
 
 #include <stdlib.h>
 
@@ -72,7 +73,7 @@ static bool read_angle(NffReader *reader)
 {
     double degrees;
     if (!read_number(reader, "angle", &range_field_of_view, &degrees)) return false;
-    reader->scene->camera.half_tangent = tan(degrees * (M_PI / 360));
+    reader->scene->camera.half_tangent = portable_tangent(degrees * (M_PI / 360));
     return true;
 }
 

@@ -4,6 +4,7 @@
 #include "host/import/line.h"
 #include "host/import/load.h"
 #include "host/import/place.h"
+#include "host/scene/portable.h"
 
 typedef struct {
     Report report;
@@ -107,7 +108,7 @@ static bool read_camera(RtReader *reader, Camera *camera)
     camera->look_at = vector_add(camera->position, vector_scale(direction, step));
     camera->up = (Vector3){0, 1, 0};
     camera->field_axis = FIELD_HORIZONTAL;
-    camera->half_tangent = tan(fov_degrees * (M_PI / 360));
+    camera->half_tangent = portable_tangent(fov_degrees * (M_PI / 360));
     return true;
 }
 

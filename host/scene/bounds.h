@@ -51,7 +51,7 @@ static inline Bounds bounds_of_triangle(Vector3 a, Vector3 b, Vector3 c)
 // which does not cancel.
 static inline Vector3 circle_half_extents(Vector3 n)
 {
-    return (Vector3){hypot(n.y, n.z), hypot(n.x, n.z), hypot(n.x, n.y)};
+    return (Vector3){hypotenuse(n.y, n.z), hypotenuse(n.x, n.z), hypotenuse(n.x, n.y)};
 }
 
 // `normal` need not be unit.

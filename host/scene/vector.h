@@ -1,8 +1,13 @@
 // Double vectors of the host.
 #pragma once
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
+
+#if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__)
+#error "glint needs IEEE arithmetic: no -ffast-math, and on 32-bit x86 -msse2 -mfpmath=sse"
+#endif
 
 typedef struct {
     double x, y, z;
@@ -61,19 +66,35 @@ static inline Vector3 triangle_normal(Vector3 a, Vector3 b, Vector3 c)
     return vector_cross(vector_subtract(b, a), vector_subtract(c, a));
 }
 
+// Returns `a` divided by 2^exponent, the least power of two above its largest component; 0 for the zero
+// vector.
+static inline Vector3 vector_scaled_down(Vector3 a, int *exponent)
+{
+    frexp(vector_largest(a), exponent);
+    return (Vector3){ldexp(a.x, -*exponent), ldexp(a.y, -*exponent), ldexp(a.z, -*exponent)};
+}
+
+// Neither overflows nor underflows. Does not call hypot, which differs in the last bit between processors.
 static inline double vector_length(Vector3 a)
 {
-    return hypot(hypot(a.x, a.y), a.z);
+    const double square = vector_dot(a, a);
+    if (square > 0x1p-900 && square < 0x1p900) return sqrt(square);
+    int exponent;
+    const Vector3 scaled = vector_scaled_down(a, &exponent);
+    return ldexp(sqrt(vector_dot(scaled, scaled)), exponent);
+}
+
+static inline double hypotenuse(double a, double b)
+{
+    return vector_length((Vector3){a, b, 0});
 }
 
 // Unit vector, without overflow or underflow; the zero vector stays zero.
 static inline Vector3 vector_normalize(Vector3 a)
 {
-    double largest = vector_largest(a);
-    if (largest == 0) return a;
+    if (vector_largest(a) == 0) return a;
     int exponent;
-    frexp(largest, &exponent);
-    Vector3 scaled = {ldexp(a.x, -exponent), ldexp(a.y, -exponent), ldexp(a.z, -exponent)};
+    const Vector3 scaled = vector_scaled_down(a, &exponent);
     return vector_scale(scaled, 1 / sqrt(vector_dot(scaled, scaled)));
 }
 

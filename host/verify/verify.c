@@ -3,6 +3,7 @@
 
 #include "host/base/fault.h"
 #include "host/base/text.h"
+#include "host/scene/portable.h"
 #include "host/verify/rays.h"
 #include <float.h>
 #include <math.h>
@@ -324,7 +325,7 @@ Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
     return (Camera){.position = position,
                     .look_at = look_at,
                     .up = {0, 1, 0},
-                    .half_tangent = tan(fov_degrees * (M_PI / 360))};
+                    .half_tangent = portable_tangent(fov_degrees * (M_PI / 360))};
 }
 
 const char *verify_case_name(size_t i)

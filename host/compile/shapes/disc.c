@@ -21,7 +21,8 @@ static void disc_take_power(Disc *disc, Flattening *flattening, const Object *ob
     const Quad height = quad3_dot(unit, center), squared = quad3_dot(center, center);
     const Quad3 foot = quad3_scale(unit, height);
     const double to_rim = (double)quad3_length(quad3_subtract(center, foot)) - radius;
-    const double from_rim = hypot((double)height, to_rim), from_disc = hypot((double)height, fmax(to_rim, 0));
+    const double from_rim = hypotenuse((double)height, to_rim),
+                 from_disc = hypotenuse((double)height, fmax(to_rim, 0));
     const double rim_moved = (double)quad3_length(quad3_subtract(center, quad3(stored))) +
                              fabs(radius - rounded(rounding, radius));
     if (rim_moved <= 4 * u * from_rim && (double)quad3_dot_magnitude(unit, center) <= 4 * from_disc) return;

@@ -30,13 +30,14 @@ static bool paraboloid_moves(const Rounding *rounding, const Object *object, con
     const double tolerance = 2 * roundoff_of(rounding), below = (double)exact->below_end;
     const double beyond = object->as.paraboloid.finite ? fmax(-below, 0) : 0;
     const double side = fabs((double)(stored_from_eye.outside - exact->outside));
-    if (!(side <= tolerance * hypot((double)exact->outside, beyond)))
+    if (!(side <= tolerance * hypotenuse((double)exact->outside, beyond)))
         return true; // nor if it is not a number
     if (!object->as.paraboloid.finite) return false;
     const double rim = 2 * sqrt(object->as.paraboloid.focal_length * object->as.paraboloid.height),
                  from_rim = (double)quad3_length(exact->foot) - rim;
     const double across = object->as.paraboloid.caps ? fmax(from_rim, 0) : from_rim;
-    return fabs((double)(stored_from_eye.below_end - exact->below_end)) > tolerance * hypot(below, across);
+    return fabs((double)(stored_from_eye.below_end - exact->below_end)) >
+           tolerance * hypotenuse(below, across);
 }
 
 // Where rounding matters, the eye's power defines it.
@@ -138,7 +139,7 @@ static void paraboloid_randomize(RandomShape *made, unsigned form, Random *rando
     made->object.as.paraboloid.height = height;
     made->object.as.paraboloid.finite = form != PARABOLOID_INFINITE;
     made->object.as.paraboloid.caps = form == PARABOLOID_CAPPED;
-    made->radius = hypot(height / 2, rim);
+    made->radius = hypotenuse(height / 2, rim);
 }
 
 const ShapeOps paraboloid_ops = {

@@ -90,7 +90,7 @@ static bool revolution_is_far(const Rounding *rounding, const RevolutionGiven *g
 {
     const Vector3 from = vector_subtract(given->from, rounding->eye), to = vector_add(from, given->axis);
     const double radius = fmax(given->base_radius, given->end_radius);
-    const double reach = hypot(vector_length(given->axis) / 2, radius); // from its middle
+    const double reach = hypotenuse(vector_length(given->axis) / 2, radius); // from its middle
     const double distance = vector_length(vector_scale(vector_add(from, to), 0.5)) - reach;
     return given->finite && 2 * distance > fmax(vector_length(from), vector_length(to)) + radius;
 }
@@ -101,7 +101,8 @@ static bool revolution_moves(const RevolutionGiven *given, const RevolutionFromE
                              const RevolutionFromEye *stored, double tolerance)
 {
     const double beyond = given->finite ? (double)quad_maximum(quad_maximum(exact->low, -exact->high), 0) : 0;
-    if (!(difference(exact->outside, stored->outside) <= tolerance * hypot((double)exact->outside, beyond)))
+    if (!(difference(exact->outside, stored->outside) <=
+          tolerance * hypotenuse((double)exact->outside, beyond)))
         return true;
     if (!given->finite) return false;
     const double off_axis = (double)quad3_length(exact->foot);
@@ -111,7 +112,7 @@ static bool revolution_moves(const RevolutionGiven *given, const RevolutionFromE
     for (int end = 0; end < 2; end++) {
         const double from_rim = off_axis - radii[end];
         const double across = given->caps ? fmax(from_rim, 0) : from_rim;
-        if (!(moved[end] <= tolerance * hypot(heights[end], across))) return true;
+        if (!(moved[end] <= tolerance * hypotenuse(heights[end], across))) return true;
     }
     return false;
 }
@@ -231,7 +232,7 @@ static Vector3 random_axis(RandomShape *made, double radii[2], Random *random)
     radii[0] = size * random_between(random, 0.2, 1);
     radii[1] = size * random_between(random, 0.2, 1);
     made->axis = vector_on_grid(vector_scale(random_unit_vector(random), length));
-    made->radius = hypot(length / 2, fmax(radii[0], radii[1]));
+    made->radius = hypotenuse(length / 2, fmax(radii[0], radii[1]));
     return vector_on_grid(vector_subtract(made->center, vector_scale(made->axis, 0.5)));
 }
 

@@ -1,4 +1,5 @@
 #include "host/import/mesh/affine.h"
+#include "host/scene/portable.h"
 
 #include <string.h>
 
@@ -60,7 +61,7 @@ static void turn_of(double degrees, double *sine, double *cosine)
 {
     int quarters;
     double rest = remquo(degrees, 90, &quarters) * (M_PI / 180);
-    const double s = sin(rest), c = cos(rest);
+    const double s = portable_sine(rest), c = portable_cosine(rest);
     const double turned[4] = {s, c, -s, -c};
     *sine = turned[quarters & 3];
     *cosine = turned[(quarters + 1) & 3];

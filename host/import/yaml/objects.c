@@ -2,6 +2,7 @@
 #include "host/import/place.h"
 #include "host/import/yaml/yaml.h"
 #include "host/scene/polygon.h"
+#include "host/scene/portable.h"
 
 #include <string.h>
 
@@ -100,7 +101,7 @@ static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
     object->as.cone.finite = form == FORM_FINITE;
     object->as.cone.caps &= object->as.cone.finite;
     if (form == FORM_INFINITE) {
-        object->as.cone.slope = tan(object->as.cone.slope * (M_PI / 180));
+        object->as.cone.slope = portable_tangent(object->as.cone.slope * (M_PI / 180));
         return true;
     }
     if (object->as.cone.radius[0] == 0 && object->as.cone.radius[1] == 0)

@@ -2,6 +2,7 @@
 #include "host/import/yaml/yaml.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
+#include "host/scene/portable.h"
 
 #include <stdlib.h>
 
@@ -36,7 +37,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
                      "'look_at' must differ from 'position'");
     if (form == FORM_FIRST) {
         camera->field_axis = FIELD_VERTICAL;
-        camera->half_tangent = tan(read.fov_degrees * (M_PI / 360));
+        camera->half_tangent = portable_tangent(read.fov_degrees * (M_PI / 360));
     } else {
         camera->field_axis = FIELD_HORIZONTAL;
         camera->half_tangent = read.frame[0] / 2 / read.focal_length;

@@ -1,0 +1,26 @@
+// Functions of a double whose values reach the flat arrays. The C library's own functions differ in the last
+// bit between processors, and on one processor between sets of instructions. Rounded from 113 bits they give
+// the nearest double, except in about one case of 2^59, so that a scene has the same arrays everywhere.
+#pragma once
+
+#include "host/scene/quad.h"
+
+static inline double portable_sine(double angle)
+{
+    return (double)QUAD_CALL(sin)((Quad)angle);
+}
+
+static inline double portable_cosine(double angle)
+{
+    return (double)QUAD_CALL(cos)((Quad)angle);
+}
+
+static inline double portable_tangent(double angle)
+{
+    return (double)QUAD_CALL(tan)((Quad)angle);
+}
+
+static inline double portable_log2(double value)
+{
+    return (double)QUAD_CALL(log2)((Quad)value);
+}
