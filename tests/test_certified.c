@@ -1,8 +1,9 @@
 // Images at `certified` of scenes that nearly touch the rays of pixels: round shapes and boxes that rays
 // graze, edges of triangles and rims through pixels' centers, faces that all but coincide, bodies of glass,
-// ground that is a planet's, mirrors, a spot's edge; shadows of all of them. Each object, shadow and path
-// must be the reference's, where `single` errs. So must those of the hard cases' images. The program takes a
-// pattern of its tests' names. run_tests: sanitize-long-only
+// ground that is a planet's, mirrors, a spot's edge; shadows of all of them. Also of lights on surfaces,
+// checkers far out, paths of little weight, needles, and sizes from 1e-29 to 1e29 in one scene. Each object,
+// shadow and path must be the reference's, where `single` errs. So must those of the hard cases' images. The
+// program takes a pattern of its tests' names. run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
@@ -409,7 +410,7 @@ static void hard_cases_are_decided(void **state)
     assert_int_equal(pictures.wrong_decided, 0);
 }
 
-// The colors of decided pixels that are off by more than a 256th of full light.
+// Counts the decided pixels whose color is off by more than a 256th of full light.
 static size_t count_wrong_colors(const CertifySample *sample, const Film *film)
 {
     size_t wrong = 0;
@@ -425,8 +426,8 @@ static size_t count_wrong_colors(const CertifySample *sample, const Film *film)
 
 enum { SMALL_SIDE = 15 }; // odd: the image has a pixel in its center
 
-// Renders a small image at certified, whose decided pixels must be the reference's, in color as well. Returns
-// the number of those left undecided. Frees the scene.
+// Renders a small image at certified. Its decided pixels must have the reference's decisions and colors.
+// Returns the number of undecided samples and frees the scene.
 static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what, double number)
 {
     CertifySample reference;

@@ -11,11 +11,11 @@
 // A torus' turning points are the zeros of a cubic of its size, which must be in range to the last bit. A
 // smaller one may be open everywhere: where the error of a point exceeds its size.
 typedef struct {
-    double reach_min, reach_max, torus_min, torus_max, roundoff;
+    double reach_min, reach_max, plane_min, plane_max, torus_min, torus_max, roundoff;
 } CertifiedRange;
 
-static const CertifiedRange of_float = {0x1p-36, 0x1p48, 0x1p-30, 0x1p36, 0x1p-24},
-                            of_double = {0x1p-220, 0x1p220, 0x1p-220, 0x1p220, 0x1p-53};
+static const CertifiedRange of_float = {0x1p-36, 0x1p48, 0x1p-60, 0x1p60, 0x1p-30, 0x1p36, 0x1p-24},
+                            of_double = {0x1p-220, 0x1p220, 0x1p-440, 0x1p440, 0x1p-220, 0x1p220, 0x1p-53};
 
 typedef struct {
     const CompiledScene *compiled;
@@ -36,7 +36,7 @@ static bool is_in_range(const CertifiedRange *range, size_t kind, const void *pr
 {
     const double reach = primitive_reach(kind, primitive);
     // no square is taken of a plane's distance
-    if (kind == KIND_PLANES) return reach == 0 || (reach >= 0x1p-60 && reach <= 0x1p60);
+    if (kind == KIND_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
     if (kind != KIND_TORI) return true;
     const Torus *torus = primitive;
