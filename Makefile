@@ -22,7 +22,7 @@ window_flags    := $(if $(has_window),$(shell $(PKG_CONFIG) --cflags $(window_pa
 ifneq ($(filter %-sanitize,$(BUILD)),)
 sanitize := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
-# The same bits wherever the source and BUILD are.
+# Keeps the source's folder and BUILD out of the output.
 reproducible := -ffile-prefix-map=$(CURDIR)=. -ffile-prefix-map=$(BUILD)/=build/
 # A scene has the same flat arrays, and so the same image, whatever the host's processor. Therefore a * b + c is rounded
 # twice even where an instruction rounds it once, which clang would use by default, on arm64 without any option. 32-bit
@@ -41,8 +41,8 @@ LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson libpng libturbojpeg as
             $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail
-# In a clone what git says, such as 0.2.0-3-g5d2aaa6; elsewhere, or without tags, VERSION. An archive by git has its commit in
-# version.c.
+# In a clone what git describe prints, such as 0.2.0-3-g5d2aaa6; elsewhere, or without tags, VERSION. git archive writes the
+# commit into version.c.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
 GLINT_COMMIT  := $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null))
@@ -260,7 +260,7 @@ docs-measurements: $(BUILD)/glint
 	cp $(measured:%=$(BUILD)/%.json) docs/measurements
 	tools/report docs/accuracy.md docs/performance.md docs/verify.md
 
-# make install [DESTDIR=…] [PREFIX=…] and what else stands here. Debian has ZSHDIR=/usr/share/zsh/vendor-completions.
+# Where make install puts files, below DESTDIR. Debian needs ZSHDIR=/usr/share/zsh/vendor-completions.
 PREFIX  ?= /usr/local
 BINDIR  ?= $(PREFIX)/bin
 DATADIR ?= $(PREFIX)/share
@@ -271,7 +271,7 @@ ZSHDIR  ?= $(DATADIR)/zsh/site-functions
 FISHDIR ?= $(DATADIR)/fish/vendor_completions.d
 
 man_pages := $(wildcard docs/glint*.[15])
-# Source:target of the files that the programs $1 come with.
+# Lists source:target for each file that belongs to the programs $1.
 installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(program).1) \
     docs/glint-scene.5:$(MANDIR)/man5/glint-scene.5 \
     tools/completions/glint.bash:$(BASHDIR)/glint \
@@ -291,7 +291,7 @@ install: all
 	    install -D -m 644 $${pair%%:*} $(DESTDIR)$${pair#*:} || exit; \
 	done
 
-# Leaves what others put there, and folders that are not glint's alone.
+# Leaves other files, and the folders that other programs use.
 uninstall: every := glint glint-view glint-mpi
 uninstall:
 	rm -f $(every:%=$(DESTDIR)$(BINDIR)/%) $(foreach pair,$(call installed_files,$(every)),$(DESTDIR)$(lastword $(subst :, ,$(pair))))

@@ -1,6 +1,6 @@
 #!/bin/bash
-# make install and uninstall put files where they are told and nowhere else, and what they installed works. The user's flags
-# reach every compiler, and neither they nor folders are in what it writes. An archive by git knows its commit.
+# Tests make install and uninstall: files go where the variables say and nowhere else, and the installed programs work. The
+# user's flags reach every command of a build, and neither flags nor folders are compiled in. Archives by git know their commit.
 . "$(dirname "$0")/support.bash"
 make=${MAKE:-make}
 build=${BUILD:-build}
@@ -9,7 +9,6 @@ version=$(sed -n 's/^VERSION := //p' Makefile)
 check "CHANGELOG.md starts with $version" test "$(grep -om 1 '^## \[.*]' CHANGELOG.md)" = "## [$version]"
 check "metainfo has $version" grep -q "<release version=\"$version\" " tools/desktop/glint-view.metainfo.xml
 
-# Installs, or removes what it installed.
 stage=$scratch/stage
 at_stage() { $make -s BUILD="$build" DESTDIR="$stage" PREFIX=/p BINDIR=/b MANDIR=/m DOCDIR=/d ZSHDIR=/z "$1"; }
 check "make install" at_stage install
@@ -29,7 +28,7 @@ if [ -e "$build/glint-view" ]; then
     desktop=$stage/p/share/applications/glint-view.desktop
     printf '#!/bin/sh\necho "$@"\n' >"$scratch/glint"
     chmod +x "$scratch/glint"
-    # desktop_starts FILE: what the desktop entry runs, its backslashes read once.
+    # desktop_starts FILE: prints what the desktop entry starts for it. Its strings have doubled backslashes.
     desktop_starts() {
         local line file=
         line=$(sed -n 's/^Exec=//p' "$desktop" | sed 's/\\\\/\\/g')
@@ -47,17 +46,17 @@ check "make uninstall" at_stage uninstall
 check "make uninstall leaves only what others put there" test "$(find "$stage" -type f -printf '%P ')" = 'd/mine '
 check "make uninstall removes glint's folders" test ! -e "$stage/p/share/glint" -a ! -e "$stage/d/docs"
 
-# The commands of a whole build, which is not made.
+# Lists the commands of a whole build without running them.
 $make -n BUILD="$scratch/none" CC=ccc CPPFLAGS=-DPREPROCESS CFLAGS=-DCOMPILE LDFLAGS=-DLINK all >"$scratch/commands"
 compiling=$(grep -c '^ccc.* -c ' "$scratch/commands")
 check "each of $compiling commands to compile has CPPFLAGS and CFLAGS" test "$compiling" -gt 100 -a \
     "$(grep -c '^ccc.* -DPREPROCESS -DCOMPILE .*-c ' "$scratch/commands")" = "$compiling"
 check "commands to link have CFLAGS and LDFLAGS" grep -q '^ccc.* -DCOMPILE -DLINK .*-o .*/none/glint$' "$scratch/commands"
-check "warnings fail no build" test "$(WERROR='' $make -n BUILD="$scratch/none" all | grep -c -e -Werror)" = 0
+check "warnings fail no build" test "$($make -n BUILD="$scratch/none" WERROR= all | grep -c -e -Werror)" = 0
 check "warnings fail with WERROR=1" test "$($make -n BUILD="$scratch/none" WERROR=1 all | grep -c -e '-Werror .*-c ')" = "$compiling"
 check "PKG_CONFIG finds libraries" grep -q 'Libraries are missing' <($make -n PKG_CONFIG=false all 2>&1)
 
-# Two folders with the same source, built at two places.
+# Compiles copies of the source in two folders.
 mkdir -p "$scratch/one" "$scratch/two/deeper"
 objects='kernel_files.o page_files.o host/base/fault.o host/cli/version.o host/image/png.o'
 compile() {

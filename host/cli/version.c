@@ -10,7 +10,7 @@ const char *glint_commit(void)
 #ifdef GLINT_COMMIT
     return GLINT_COMMIT;
 #else
-    // git archive puts the hash here
+    // git archive replaces this with the hash
     static const char commit[] = "$Format:%H$";
     return commit[0] == '$' ? "unknown" : commit;
 #endif
