@@ -27,11 +27,12 @@ reproducible := -ffile-prefix-map=$(CURDIR)=. -ffile-prefix-map=$(BUILD)/=build/
 # A scene has the same flat arrays, and so the same image, whatever the host's processor. Therefore a * b + c is rounded
 # twice even where an instruction rounds it once, which clang would use by default, on arm64 without any option. 32-bit
 # x86 calculates in SSE registers, because x87's round to 64 bits.
-is_i386    := $(shell $(CC) $(CFLAGS) -dM -E -x c /dev/null | grep -w __i386__)
-arithmetic := -ffp-contract=off $(if $(is_i386),-msse2 -mfpmath=sse)
+has_macro   = $(shell $(CC) $(CFLAGS) -dM -E -x c /dev/null | grep -w $1)
+arithmetic := -ffp-contract=off $(if $(call has_macro,__i386__),-msse2 -mfpmath=sse)
+large_files := $(if $(call has_macro,__LP64__),,-D_FILE_OFFSET_BITS=64 -D_TIME_BITS=64)
 # Newer compilers warn of named constants, which are enums, in floating-point arithmetic, and of OpenEXR's own initializers.
 fine     := -Wno-enum-float-conversion -Wno-missing-field-initializers
-OURS     := -std=c11 -D_GNU_SOURCE -D_FILE_OFFSET_BITS=64 -D_TIME_BITS=64 $(arithmetic) -I. \
+OURS     := -std=c11 -D_GNU_SOURCE $(large_files) $(arithmetic) -I. \
             -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes \
             $(fine) $(if $(filter 1,$(WERROR)),-Werror) \
             $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
@@ -233,8 +234,8 @@ lint-format:
 	@$(CLANG_FORMAT) --dry-run -Werror $(formatted)
 
 lint-tidy:
-	@printf '%s\n' $(linted) | xargs -P $(LINT_JOBS) -I FILE \
-	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) FILE -- $(OURS) $(mpi_flags) $(version_flags) 2>/dev/null
+	@printf '%s\n' $(linted) | xargs -P $(LINT_JOBS) -I @ \
+	    $(CLANG_TIDY) --quiet $(TIDY_OPTIONS) @ -- $(OURS) $(mpi_flags) $(version_flags) 2>/dev/null
 
 # It takes the first argument of cmocka's assert_int_equal(fclose(file), 0) to be used once more.
 lint-cppcheck:

@@ -106,8 +106,8 @@ static void corners_of(const Mesh *mesh, size_t triangle, Vector3 corners[3])
         corners[i] = mesh->vertices[mesh->triangles[triangle][i]];
 }
 
-// Returns the angle between two vectors, 0 where one is zero. Uses arithmetic alone, since atan2 differs in the
-// last bit between processors. An angle of at most a quarter turn is halved three times, by
+// Returns the angle between two vectors, 0 where one is zero. Uses arithmetic alone, since atan2 differs in
+// the last bit between processors. An angle of at most a quarter turn is halved three times, by
 //     tan(x / 2) = opposite / (adjacent + hypotenuse),
 // which leaves a tangent of at most 0.2, whose series ends soon.
 static double angle_between(Vector3 a, Vector3 b)

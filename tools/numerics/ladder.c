@@ -166,7 +166,7 @@ static int compare_doubles(const void *a, const void *b)
 static void errors_write(Json *json, const char *key, Errors *errors)
 {
     json_begin_object(json, key);
-    json_integer(json, "hits", (int64_t)errors->count);
+    json_int64(json, "hits", (int64_t)errors->count);
     if (errors->count > 0) {
         qsort(errors->ulps, errors->count, sizeof *errors->ulps, compare_doubles);
         json_number(json, "p999", errors->ulps[(size_t)(0.999 * (double)(errors->count - 1))]);
@@ -294,11 +294,11 @@ static void tally_write(Tally *tally, const char *shape, Precision precision, do
     json_text(json, "shape", shape);
     json_text(json, "precision", precision_names[precision]);
     json_number(json, "distance", distance);
-    json_integer(json, "rays", (int64_t)tally->compared);
+    json_int64(json, "rays", (int64_t)tally->compared);
     errors_write(json, "steep", &tally->steep);
     errors_write(json, "grazing", &tally->grazing);
-    json_integer(json, "wrong", (int64_t)tally->wrong);
-    json_integer(json, "undecided", (int64_t)tally->undecided);
+    json_int64(json, "wrong", (int64_t)tally->wrong);
+    json_int64(json, "undecided", (int64_t)tally->undecided);
     json_number(json, "bound_fraction", tally->bound_fraction);
     json_end(json);
 }
