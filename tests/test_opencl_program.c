@@ -196,7 +196,7 @@ static Text the_entry(char **key)
     assert_true(text_read_file(&entry, entry_path_found, &messages));
     uint64_t key_length;
     memcpy(&key_length, entry.items + 16, sizeof key_length);
-    *key = strndup(entry.items + 64, key_length);
+    *key = strndup(entry.items + 64, (size_t)key_length);
     return entry;
 }
 
