@@ -95,17 +95,19 @@ static void test_quad_roots(void **state)
     (void)state;
     Random random = {.state = 1};
     Quad scale = 1;
-    for (int i = 0; i < 16000; i++, scale = i % 2000 == 0 ? 1 : i / 2000 % 2 ? scale * 2 : scale / 2) {
+    for (int i = 0; i < 16000; i++) {
         const Quad integer = (Quad)(random_bits(&random) >> 40) * scale;
         assert_true(quad_root(integer * integer) == integer);
         const Quad a = integer * (Quad)random_between(&random, 1, 2), root = quad_root(a);
         const Quad by_library = QUAD_CALL(sqrt)(a);
         assert_true(quad_absolute(root - by_library) * 0x1p52 * 0x1p52 <= by_library);
+        const int next = i + 1;
+        scale = next % 2000 == 0 ? 1 : next / 2000 % 2 ? scale * 2 : scale / 2;
     }
     Quad least = 0x1p-1074;
     assert_true(quad_root(0) == 0 && quad_root(-1) == 0);
-    for (Quad half = least / 2; half > 0; half /= 2)
-        least = half;
+    while (least / 2 > 0)
+        least /= 2;
     const Quad root = quad_root(least);
     assert_true(root > 0 && root * root >= least / 2 && root * root <= 2 * least);
 }

@@ -493,7 +493,8 @@ static void lights_on_surfaces_are_decided(void **state)
         undecided += check_small(&scene, 0, "a light that grazes a wall", heights[i]);
         if (heights[i] >= 1e-9) assert_int_equal(undecided, 0); // double tells them apart
     }
-    for (double distance = 1e15; distance < 1e24; distance *= 100) {
+    for (int digits = 15; digits < 24; digits += 2) {
+        const double distance = pow(10, digits);
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         array_push(scene.objects,
                    ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, -distance}, {0, 0, 1}}}));
@@ -507,8 +508,9 @@ static void checkers_far_out_are_decided(void **state)
 {
     (void)state;
     if (!probe_compute.device->fp64) skip();
-    for (double far = 1e3; far < 1e13; far *= 100)
+    for (int digits = 3; digits < 13; digits += 2)
         for (unsigned form = 0; form < 3; form++) {
+            const double far = pow(10, digits);
             const double size = far < 1e7 ? 1e-14 * far : 0.1; // of a view zoomed in, and of an ordinary one
             const Vector3 from = {far + 0.3 * size, -3 * far - 0.4 * size, 7 * far};
             Scene scene = scene_seen_from(from, 3 * size);
@@ -563,7 +565,8 @@ static void needles_have_an_area(void **state)
 {
     (void)state;
     if (!probe_compute.device->fp64) skip();
-    for (double far = 1e3; far < 1e31; far *= 1e3) {
+    for (int digits = 3; digits < 31; digits += 3) {
+        const double far = pow(10, digits);
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         scene.materials.items[0].ambient = 1;
         array_push(scene.objects,

@@ -533,8 +533,8 @@ static void plates_far_away(Precision precision)
 {
     const char *const shapes[] = {"cylinder: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: 1e6}",
                                   "cone: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: [1e6, 9e5]}",
-                                  "cylinder: {from: [0, -2e7, -2e7], to: [0, -20000000.5, -20000000.5], "
-                                  "radius: 1e6}"};
+                                  ("cylinder: {from: [0, -2e7, -2e7], to: [0, -20000000.5, -20000000.5], "
+                                   "radius: 1e6}")};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         Text text = {0};
         text_appendf(&text,
