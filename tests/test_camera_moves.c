@@ -1,4 +1,5 @@
 // The camera's movements, its YAML, and the pace of coarse frames: without a window or a device.
+#include "host/scene/portable.h"
 #include "host/view/camera_file.h"
 #include "host/view/camera_moves.h"
 #include "host/view/camera_yaml.h"
@@ -136,11 +137,11 @@ static void yaml_gives_the_same_camera(void **state)
     camera.field_axis = FIELD_VERTICAL;
     for (int i = 1; i < 2000; i++) {
         double degrees = i % 2 ? 0.09 * i : i / 11.3;
-        camera.half_tangent = tan(degrees * (M_PI / 360));
+        camera.half_tangent = portable_tangent(degrees * (M_PI / 360));
         camera.position = vector_scale(camera.position, 1.0 + 1.0 / i);
         check_yaml(&camera);
     }
-    camera.half_tangent = tan(50 * (M_PI / 360));
+    camera.half_tangent = portable_tangent(50 * (M_PI / 360));
     camera.position = (Vector3){0.1, 1e300, -40};
     Text text = {0};
     camera_write_yaml(&text, &camera, 1.5);

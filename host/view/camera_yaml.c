@@ -1,5 +1,7 @@
 #include "host/view/camera_yaml.h"
 
+#include "host/scene/portable.h"
+
 #include <stdlib.h>
 
 // The fewest digits that read back as the same number.
@@ -34,7 +36,7 @@ static void vector_write(Text *text, const char *name, Vector3 v)
 // As the reader computes it.
 static double half_tangent_of(double degrees)
 {
-    return tan(degrees * (M_PI / 360));
+    return portable_tangent(degrees * (M_PI / 360));
 }
 
 // The fewest digits that give the same half_tangent; rounded to 17 digits, a neighbor may.
