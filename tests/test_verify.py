@@ -62,7 +62,9 @@ class Verify(VerifyTestCase):
         self.assertNotIn("perturb", report)
         report = self.json("verify P4 --precision single --perturb 1:1000 --json")
         self.assertEqual(report["perturb"], {"seed": 1, "scale": 1000})
-        self.assertIn("tier B: 1 of 1 cases passed", self.glint("verify P4 --precision single").stdout)
+        text = self.glint("verify P4 --precision single").stdout
+        self.assertIn("tier B: 1 of 1 cases passed", text)
+        self.assertIn(f"; reference of {report['reference_bits']} bits\n", text)
 
     def test_unknown_case(self):
         self.refuses("verify S1 S99", 'no case "S99".* S1, S2, ')

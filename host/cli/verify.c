@@ -201,7 +201,7 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
         origin_add_json(json, compute->device, &options->common);
         json_begin_array(json, "precisions");
     } else {
-        printf("%s\n", compute->device->name);
+        printf("%s; reference of %d bits\n", compute->device->name, verify_reference_bits());
     }
     size_t failed = 0;
     for (Precision precision = first; precision <= last && compute_ok(compute); precision++)
