@@ -309,7 +309,7 @@ MEANINGS = {
     "{surface_part,normal_part}": "number; the largest errors over their bounds",
     "cases[].{worst,bound}": "number or null; of the error closest to its bound",
     "unit": "text; of both, if there are any",
-    "hash": "hash; of all answers' bits: equal at `strict` on every device",
+    "hash": "hash; of all answers' bits: equal at `strict` on every device with IEEE arithmetic",
 }
 
 
