@@ -23,7 +23,7 @@ ifneq ($(filter %-sanitize,$(BUILD)),)
 sanitize := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 # Keeps the source's folder and BUILD out of the output.
-reproducible := -ffile-prefix-map=$(CURDIR)=. -ffile-prefix-map=$(BUILD)/=build/
+reproducible := -ffile-prefix-map=$(CURDIR)=. -ffile-prefix-map=$(abspath $(BUILD))/=build/
 # A scene has the same flat arrays, and so the same image, whatever the host's processor. Therefore a * b + c is rounded
 # twice even where an instruction rounds it once, which clang would use by default, on arm64 without any option. 32-bit
 # x86 calculates in SSE registers, because x87's round to 64 bits.

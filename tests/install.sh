@@ -78,7 +78,7 @@ check "the program names no folder" test "$(grep -cF "$PWD" "$build/glint")" = 0
 if commit=$(git rev-parse --verify -q HEAD 2>/dev/null); then
     mkdir "$scratch/archive"
     git archive HEAD | tar -x -C "$scratch/archive"
-    check "an archive compiles" $make -s -C "$scratch/archive" build/host/cli/version.o
+    check "an archive compiles" $make -s -C "$scratch/archive" BUILD=build build/host/cli/version.o
     check "an archive knows its commit" grep -q "$commit" "$scratch/archive/build/host/cli/version.o"
 fi
 finish

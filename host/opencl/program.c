@@ -266,6 +266,7 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
     cache_store(key, &binary);
     text_free(&binary);
     free(key);
+    free(text);
 }
 
 void program_close(Program *program)
