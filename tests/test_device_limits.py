@@ -7,7 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
-from glint import ROOT, SPHERE, TestCase, find_icd, main, need_device, npy_read, read, run, shim_build, skip_all, write
+from glint import IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, main, need_device, npy_read, read, run, shim_build, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 RENDER = "render sphere.yaml --quiet --size 320x200 -o image.npy"
@@ -216,6 +216,8 @@ class DeviceLimits(TestCase):
 
 
 if __name__ == "__main__":
+    if IS_SANITIZED:
+        skip_all("sanitizers must be loaded before a shim")
     need_device()
     if run("devices", env=POCL).returncode != 0:
         skip_all("PoCL is not installed")
