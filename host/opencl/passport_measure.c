@@ -293,21 +293,26 @@ static bool fma_is_exact(Measurement *measurement)
     return is_exact;
 }
 
-// The least time of fma over that of a product and a sum, by the host's clock, in launches that take turns:
-// more of them where fma seems slow, which on a busy machine may be chance.
+// The least time of fma over that of a product and a sum, by the host's clock, without the time of an empty
+// launch: in launches that take turns, more of them where fma seems slow, which on a busy machine may be
+// chance.
 static double fma_cost(Measurement *measurement)
 {
     enum { TURNS_MIN = 4, TURNS_MAX = 16 };
     const Operands chain = operands_of(measurement, (Reals){0.75, 0.5, 0.5});
     operands_write(measurement, &chain, 1);
     const cl_uint count = TIMED_ITEMS * measurement->passport->lanes;
+    double launch = INFINITY;
+    for (cl_uint turn = 0; turn < TURNS_MIN; turn++)
+        launch = fmin(launch, probe_launch(measurement, PROBE_TIME_SEPARATE, 0, 0, 1, count).host_seconds);
+    // at PASSPORT_FMA_COST_MAX the faster of the two then takes as long as an empty launch
+    const double wanted = fmax(timed_seconds_wanted, PASSPORT_FMA_COST_MAX * launch);
     double least[2] = {INFINITY, INFINITY};
     for (cl_uint rounds = 8, turn = 0; compute_ok(measurement->compute);) {
         const double fused = probe_launch(measurement, PROBE_TIME_FMA, 0, rounds, 1, count).host_seconds;
         const double separate =
             probe_launch(measurement, PROBE_TIME_SEPARATE, 0, rounds, 1, count).host_seconds;
-        if (turn == 0 && fmin(fused, separate) < timed_seconds_wanted &&
-            fmax(fused, separate) < 10 * timed_seconds_wanted && rounds < 1u << 26) {
+        if (turn == 0 && fmax(fused, separate) - launch < wanted && rounds < 1u << 26) {
             rounds *= 2;
             continue;
         }
@@ -315,11 +320,12 @@ static double fma_cost(Measurement *measurement)
         least[0] = fmin(least[0], fused);
         least[1] = fmin(least[1], separate);
         turn++;
-        const bool seems_slow = least[0] >= PASSPORT_FMA_COST_MAX * least[1];
+        const bool seems_slow = least[0] - launch >= PASSPORT_FMA_COST_MAX * (least[1] - launch);
         if (turn >= (seems_slow ? TURNS_MAX : TURNS_MIN)) break;
-        if (fmax(fused, separate) > 50 * timed_seconds_wanted) break;
+        if (fmax(fused, separate) > 50 * wanted) break;
     }
-    return least[0] / least[1];
+    const double separate_min = 0.01 * wanted; // what is less is the launches' noise
+    return (least[0] - launch) / fmax(least[1] - launch, separate_min);
 }
 
 static void fma_measure(Measurement *measurement)
