@@ -6,10 +6,11 @@ import os
 import re
 
 import glint
-from glint import SPHERE, TestCase, main, need_device, shim_build, skip_all, write
+from glint import IS_LONG, SPHERE, TestCase, main, need_device, shim_build, skip_all, write
 
 # Replaces each FIND by REPLACE in the text of every kernel, where EDITS has FIND and REPLACE in turn, with \1 between them.
-# TIMER changes the times of events, DRIVER the driver's version; LAUNCHES is a file that gets a line for each launch.
+# TIMER changes the times of events, DRIVER the driver's version; WITHOUT_FMA takes away the claim that fma is in hardware.
+# LAUNCHES is a file that gets a line for each launch.
 SHIM = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -63,8 +64,12 @@ int clGetEventProfilingInfo(void *event, unsigned what, size_t size, unsigned lo
 int clGetDeviceInfo(void *device, unsigned what, size_t size, char *value, size_t *needed)
 {
     const char *driver = getenv("DRIVER");
-    if (!driver || what != 0x102D) // CL_DRIVER_VERSION
-        return ((int (*)())next("clGetDeviceInfo"))(device, what, size, value, needed);
+    if (!driver || what != 0x102D) { // CL_DRIVER_VERSION
+        int status = ((int (*)())next("clGetDeviceInfo"))(device, what, size, value, needed);
+        if (getenv("WITHOUT_FMA") && what == 0x101B && value) // CL_DEVICE_SINGLE_FP_CONFIG
+            *(unsigned long *)value &= ~32ul; // CL_FP_FMA
+        return status;
+    }
     if (needed) *needed = strlen(driver) + 1;
     if (value) strcpy(value, driver);
     return 0;
@@ -158,8 +163,19 @@ VIOLATIONS = {
         "LANES_CONVERT(float)(real_from_bits(a))": "JOIN(LANES_CONVERT(float), _rtz)(real_from_bits(a))"},
         ["double", "certified"]),
 }
+# Violations that do not touch each other. They are probed at once, unless tests are long.
+TOGETHER = (
+    ("contraction", "division, by an ulp", "NaN", "integer to real"),
+    ("contraction of a difference", "square root, by an ulp", "infinity", "real to integer"),
+    ("two-sum", "division, by three ulp", "double to float"),
+    ("two-product", "division, of some mantissas", "subnormals mixed", "square root, by four ulp"),
+)
 TIMERS = {"zero": "reports no times", "microseconds": "do not count nanoseconds but some 1.*e\\+03|do not count nanoseconds",
           "counter": "counter", "backward": "backward"}
+
+
+def merged(edits):
+    return {find: replacement for edit in edits for find, replacement in edit.items()}
 
 
 class PassportTest(TestCase):
@@ -169,10 +185,13 @@ class PassportTest(TestCase):
         write("sphere.yaml", SPHERE)
 
     def violated(self, edits=None, **variables):
-        """Options of run: the shim, and a cache for each violation, since keys have the text before it is edited."""
+        """Options of run: the shim, and a cache for each violation, since keys have the text before it is edited; the driver's
+        version tells faults of timers apart."""
         edits = {TYPES: TYPES + HELPERS} | edits if edits else {}
         text = "\1".join(word for edit in edits.items() for word in edit)
-        folder = "cache-" + hashlib.md5((text + variables.get("TIMER", "")).encode()).hexdigest()
+        folder = "cache-" + hashlib.md5(text.encode()).hexdigest()
+        if "TIMER" in variables:
+            variables["DRIVER"] = variables["TIMER"]
         return {"env": {"LD_PRELOAD": self.shim, "XDG_CACHE_HOME": os.path.abspath(folder), "EDITS": text} | variables}
 
     def probe(self, **options):
@@ -202,24 +221,28 @@ class PassportTest(TestCase):
 
     def test_each_violation_is_named(self):
         usual = self.abnormal(self.probe(**self.violated()))
-        for what, (name, finding, value, edits, refused) in VIOLATIONS.items():
-            with self.subTest(what):
-                device = self.probe(**self.violated(edits))
-                found = self.findings(device, name)
-                named = [mode for mode in found if re.search(value, found[mode]["value"])]
-                expected = ["double"] if what == "double to float" else list(found)
-                if not HAS_DOUBLE and expected == ["double"]:
-                    continue
-                self.assertEqual(named, expected, found)
-                for mode in named:
-                    self.assertRegex(found[mode]["finding"], f"^({finding})$", found[mode])
-                others = {other: value for other, value in self.abnormal(device).items() if other not in usual and other[1] != name}
+        together = () if IS_LONG else TOGETHER
+        alone = [(what,) for what in VIOLATIONS if not any(what in group for group in together)]
+        for group in [*together, *alone]:
+            with self.subTest(group):
+                violations = [VIOLATIONS[what] for what in group]
+                device = self.probe(**self.violated(merged(edits for *_, edits, _ in violations)))
+                for what, (name, finding, value, _, _) in zip(group, violations):
+                    found = self.findings(device, name)
+                    named = [mode for mode in found if re.search(value, found[mode]["value"])]
+                    expected = [mode for mode in found if what != "double to float" or mode == "double"]
+                    self.assertEqual(named, expected, (what, found))
+                    for mode in named:
+                        self.assertRegex(found[mode]["finding"], f"^({finding})$", (what, found[mode]))
                 # what is computed from it may break, too
                 allowed = {"fma that rounds twice": {"two-product"}, "rounding": {"inf and NaN"},
-                           "subnormals flushed": {"conversions"}}.get(what, set())
-                self.assertLessEqual({other[1] for other in others}, allowed, others)
+                           "subnormals flushed": {"conversions"}}.get(group[0], set())
+                names = {name for mode, name in self.abnormal(device).keys() - usual.keys()}
+                # on a busy machine events may seem too short
+                self.assertLessEqual(names - {"event timers"}, allowed | {name for name, *_ in violations})
                 if HAS_DOUBLE:
-                    self.assertEqual([refusal["precision"] for refusal in device["refused"]], refused)
+                    refused = set().union(*(refused for *_, refused in violations))
+                    self.assertEqual({refusal["precision"] for refusal in device["refused"]}, refused)
 
     def test_text_names_it(self):
         broken = self.violated(VIOLATIONS["two-sum"][3])
@@ -245,15 +268,16 @@ class PassportTest(TestCase):
 
     def test_bits_at_strict(self):
         """Whatever glint allows for leaves the bits as they are: an inexact division is repaired, and fma emulated."""
-        command = "render sphere.yaml --size 32x24 --quiet --precision strict -o"
+        command = "render sphere.yaml --size 32x24 --lanes 4 --quiet --precision strict -o"
         self.glint(f"{command} right.npy", **self.violated())
-        for what in "division, by three ulp", "square root, by four ulp", "division, of some mantissas", "fma that rounds twice":
-            with self.subTest(what):
-                self.glint(f"{command} other.npy", **self.violated(VIOLATIONS[what][3]))
+        inexact = "division, by three ulp", "square root, by four ulp", "fma that rounds twice"
+        for group in inexact, ("division, of some mantissas",):
+            with self.subTest(group):
+                self.glint(f"{command} other.npy", **self.violated(merged(VIOLATIONS[what][3] for what in group)))
                 self.assertSameBytes("right.npy", "other.npy")
 
     def test_slow_fma(self):
-        """An fma that is emulated at many times its cost is not used; its time counts, not what the driver claims."""
+        """An fma that is emulated at many times its cost is not used, whatever the driver claims, nor one that is not claimed."""
         slow = """
 static inline real shim_fma(real a, real b, real c)
 {
@@ -270,7 +294,10 @@ static inline real shim_fma(real a, real b, real c)
             self.assertEqual(passport["uses_fma"], passport["precision"] == "double")
         self.assertEqual(self.findings(device, "fma")["strict"]["finding"], "unusual")
         self.assertEqual(device["refused"], [])
-        self.assertTrue(all(passport["uses_fma"] for passport in self.probe(**self.violated())["passports"]))
+        for claim, used in ({}, MODES), ({"WITHOUT_FMA": "1", "DRIVER": "7.7"}, ["double"]):
+            passports = self.probe(**self.violated(**claim))["passports"]
+            self.assertEqual([passport["precision"] for passport in passports if passport["uses_fma"]],
+                             used if HAS_DOUBLE else used[:2], claim)
 
     def test_timers(self):
         """Each fault is named, refuses nothing, and makes reports use the host's clock."""

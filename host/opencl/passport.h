@@ -40,7 +40,7 @@ typedef struct {
     PassportMode mode;
     uint32_t lanes;
     bool is_thorough;  // divided and took roots of all mantissas, as far as PASSPORT_SECONDS_MAX allowed
-    bool uses_fma;     // HAS_FMA of kernels: fma is fused and costs less than PASSPORT_FMA_COST_MAX
+    bool uses_fma;     // HAS_FMA of kernels: fma is in hardware, fused and below PASSPORT_FMA_COST_MAX
     bool fma_is_fused; // the device's own
     bool fma_is_exact; // as kernels have it, perhaps emulated
     double fma_cost;   // its time over that of a product and a sum; 0: not fused, not measured

@@ -293,39 +293,42 @@ static bool fma_is_exact(Measurement *measurement)
     return is_exact;
 }
 
-// The least time of fma over that of a product and a sum, by the host's clock, without the time of an empty
-// launch: in launches that take turns, more of them where fma seems slow, which on a busy machine may be
-// chance.
+// The least time by the host's clock that a chain takes in so many launches.
+static double chain_seconds(Measurement *measurement, cl_uint probe, cl_uint rounds, int launches)
+{
+    const cl_uint count = TIMED_ITEMS * measurement->passport->lanes;
+    double least = INFINITY;
+    for (int i = 0; i < launches; i++)
+        least = fmin(least, probe_launch(measurement, probe, 0, rounds, 1, count).host_seconds);
+    return least;
+}
+
+// The time of fma over that of a product and a sum, without the time of an empty launch: the least of
+// launches that take turns, more of them where fma seems slow, which may be chance.
 static double fma_cost(Measurement *measurement)
 {
     enum { TURNS_MIN = 4, TURNS_MAX = 16 };
     const Operands chain = operands_of(measurement, (Reals){0.75, 0.5, 0.5});
     operands_write(measurement, &chain, 1);
-    const cl_uint count = TIMED_ITEMS * measurement->passport->lanes;
-    double launch = INFINITY;
-    for (cl_uint turn = 0; turn < TURNS_MIN; turn++)
-        launch = fmin(launch, probe_launch(measurement, PROBE_TIME_SEPARATE, 0, 0, 1, count).host_seconds);
+    const double launch = chain_seconds(measurement, PROBE_TIME_SEPARATE, 0, TURNS_MIN);
     // at PASSPORT_FMA_COST_MAX the faster of the two then takes as long as an empty launch
     const double wanted = fmax(timed_seconds_wanted, PASSPORT_FMA_COST_MAX * launch);
-    double least[2] = {INFINITY, INFINITY};
-    for (cl_uint rounds = 8, turn = 0; compute_ok(measurement->compute);) {
-        const double fused = probe_launch(measurement, PROBE_TIME_FMA, 0, rounds, 1, count).host_seconds;
-        const double separate =
-            probe_launch(measurement, PROBE_TIME_SEPARATE, 0, rounds, 1, count).host_seconds;
-        if (turn == 0 && fmax(fused, separate) - launch < wanted && rounds < 1u << 26) {
-            rounds *= 2;
-            continue;
-        }
-        measurement->timed_rounds = rounds;
-        least[0] = fmin(least[0], fused);
-        least[1] = fmin(least[1], separate);
-        turn++;
-        const bool seems_slow = least[0] - launch >= PASSPORT_FMA_COST_MAX * (least[1] - launch);
-        if (turn >= (seems_slow ? TURNS_MAX : TURNS_MIN)) break;
-        if (fmax(fused, separate) > 50 * wanted) break;
+    cl_uint rounds = 8;
+    for (; compute_ok(measurement->compute) && rounds < 1u << 26; rounds *= 2) {
+        const double slower = fmax(chain_seconds(measurement, PROBE_TIME_FMA, rounds, 2),
+                                   chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 2));
+        if (slower - launch >= wanted) break;
+    }
+    measurement->timed_rounds = rounds;
+    double fused = INFINITY, separate = INFINITY;
+    for (int turn = 1; turn <= TURNS_MAX && compute_ok(measurement->compute); turn++) {
+        fused = fmin(fused, chain_seconds(measurement, PROBE_TIME_FMA, rounds, 1));
+        separate = fmin(separate, chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 1));
+        const bool seems_slow = fused - launch >= PASSPORT_FMA_COST_MAX * (separate - launch);
+        if ((turn >= TURNS_MIN && !seems_slow) || fmax(fused, separate) > 50 * wanted) break;
     }
     const double separate_min = 0.01 * wanted; // what is less is the launches' noise
-    return (least[0] - launch) / fmax(least[1] - launch, separate_min);
+    return (fused - launch) / fmax(separate - launch, separate_min);
 }
 
 static void fma_measure(Measurement *measurement)
@@ -336,9 +339,10 @@ static void fma_measure(Measurement *measurement)
     passport->fma_is_fused = passport->fma_is_exact = fma_is_exact(measurement);
     const double cost = fma_cost(measurement);
     if (passport->fma_is_fused) passport->fma_cost = cost;
-    // doubles have no emulation, and OpenCL demands that their fma rounds once
+    // doubles have no replacement, and OpenCL demands that their fma rounds once
     passport->uses_fma =
-        measurement->is_double || (passport->fma_is_fused && passport->fma_cost < PASSPORT_FMA_COST_MAX);
+        measurement->is_double || (measurement->compute->device->fma_in_hardware && passport->fma_is_fused &&
+                                   passport->fma_cost < PASSPORT_FMA_COST_MAX);
     if (passport->uses_fma) return;
     kernel_close(measurement);
     const double before = passport->build_seconds;
@@ -671,11 +675,14 @@ static void timer_measure(Measurement *measurement)
 {
     const double sure = 1e-6; // more than what a double loses of the nanoseconds since 1970
     TimerFindings *timer = &measurement->passport->timer;
-    // on a busy machine the host may wait much longer than the event lasts, but hardly each time
+    // on a busy machine the host may wait much longer than an event lasts, but hardly each time or for long
+    // ones
     enum { TRIES = 16 };
-    const cl_uint count = TIMED_ITEMS * measurement->passport->lanes;
-    for (int i = 0; i < TRIES && timer_ratio(measurement) < 0.5 && measurement->timed_rounds > 0; i++)
-        probe_launch(measurement, PROBE_TIME_SEPARATE, 0, measurement->timed_rounds, 1, count);
+    cl_uint rounds = measurement->timed_rounds;
+    for (int i = 0; i < TRIES && timer_ratio(measurement) < 0.5 && rounds > 0; i++) {
+        const double seconds = chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 1);
+        if (seconds < 20 * timed_seconds_wanted && rounds < 1u << 26) rounds *= 2;
+    }
     bool is_absent = true, is_counter = true, goes_back = false;
     for (size_t i = 0; i < measurement->launches.count; i++) {
         const LaunchTime *time = &measurement->launches.items[i], *before = i > 0 ? time - 1 : time;
@@ -687,12 +694,13 @@ static void timer_measure(Measurement *measurement)
         timer->step_nanoseconds =
             greatest_divisor(timer->step_nanoseconds, (uint64_t)llround(1e9 * time->event_seconds));
     }
+    // known devices tick in 10 nanoseconds or more; on a busy machine the host may be late after every launch
     const double ratio = timer_ratio(measurement);
     timer->tick_nanoseconds = ratio > 0 ? 1 / ratio : 0;
     timer->fault = is_absent                                    ? TIMER_ABSENT
                    : goes_back                                  ? TIMER_BACKWARD
                    : is_counter                                 ? TIMER_COUNTER
-                   : ratio > 0 && (ratio < 0.25 || ratio > 1.1) ? TIMER_UNIT
+                   : ratio > 0 && (ratio < 0.15 || ratio > 1.1) ? TIMER_UNIT
                                                                 : TIMER_SOUND;
 }
 
