@@ -9,12 +9,12 @@ static inline real hit_distance(const Hit *hit)
     return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
 }
 
-#define LAYER_REAL                                         scalar
-#define LAYER_LENGTH                                       scalar
-#define LAYER_INTEGER                                      int
-#define LAYER_ARGUMENT(NAME, name, type, components, note) , global LAYER_##type *name
-#define LAYER_MEMBER(NAME, name, type, components, note)   global LAYER_##type *name;
-#define LAYER_VALUE(NAME, name, type, components, note)    name,
+#define LAYER_REAL                                       scalar
+#define LAYER_LENGTH                                     scalar
+#define LAYER_INTEGER                                    int
+#define LAYER_MEMBER(NAME, name, type, components, note) global LAYER_##type *name;
+#define LAYER_POINTER(NAME, name, type, components, note)                                                    \
+    (global LAYER_##type *)(film + (size_t)layers.name * ARENA_UNIT),
 
 typedef struct {
     HIT_AOV_LIST(LAYER_MEMBER)
@@ -46,14 +46,14 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     if (IS_CERTIFIED) film_note_doubts(doubts, tile, doubt, true);
 }
 
-kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels HIT_AOV_LIST(LAYER_ARGUMENT), uint light_count,
-                global int *doubts, global const uint *pixels)
+kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
+                global int *doubts, global const uint *pixels, uint light_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, pixels};
-    const HitLayers layers = {HIT_AOV_LIST(LAYER_VALUE)};
+    const HitLayers hit_layers = {HIT_AOV_LIST(LAYER_POINTER)};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &layers, light_count, doubts);
+        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &hit_layers, light_count, doubts);
     }
 }

@@ -1,6 +1,6 @@
 // The layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), which describe
-// the ray through its center. From these lists follow the layers' numbers and names, the kernels' arguments,
-// the host's buffers and the files; what remains is to compute an AOV in its kernel and to document it.
+// the ray through its center. From these lists follow the layers' numbers and names, their places on the
+// device and the files; what remains is to compute an AOV in its kernel and to document it.
 //
 // LAYER(NAME, name, type, components, note). Type: REAL, of the kernel's precision; LENGTH, a real in the
 // scene's unit of length; INTEGER, of 32 bits. Components: values per pixel; PER_LIGHT: one for each light.
@@ -10,7 +10,7 @@
 #define PER_LIGHT 0
 
 // clang-format off
-// aov.cl, in the order of its arguments
+// aov.cl
 #define HIT_AOV_LIST(LAYER)                                                                                    \
     LAYER(T,        t,        LENGTH,  1, "distance from the eye; infinite where nothing is hit")               \
     LAYER(NORMAL,   normal,   REAL,    3, "unit shading normal, facing the eye; 0 where nothing is hit")        \
@@ -33,5 +33,12 @@
 
 #define LAYER_LIST(LAYER) HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)
 // clang-format on
+
+// Where each layer begins in a band's buffer, in units of ARENA_UNIT. The sum of each pixel's colors is
+// first, and the compensation of its rounding follows (render.cl).
+#define LAYER_OFFSET(NAME, name, type, components, note) unsigned name;
+typedef struct {
+    LAYER_LIST(LAYER_OFFSET)
+} LayerOffsets;
 
 #endif

@@ -1,5 +1,6 @@
 // The signature of the ray tree at each pixel's center.
 #define COMPUTE_SIGNATURE 1
+#include "aovs.h"
 #include "film.h"
 #include "shading/path.h"
 
@@ -15,10 +16,11 @@ static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 
-kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global int *paths, global int *doubts,
-                 global const uint *pixels)
+kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
+                 global int *doubts, global const uint *pixels)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
+    global int *paths = (global int *)(film + (size_t)layers.path * ARENA_UNIT);
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, pixels};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);

@@ -56,14 +56,15 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
     }
 }
 
-kernel void render(SCENE_ARGUMENTS, global const scalar *offsets, global scalar *film,
-                   global scalar *compensation, uint4 band_pixels, uint first_sample, uint last_sample,
-                   global uint *ray_counts, uint cell, global int *doubts, global const uint *pixels)
+kernel void render(SCENE_ARGUMENTS, global const scalar *sample_offsets, global scalar *film,
+                   uint4 band_pixels, uint first_sample, uint last_sample, global uint *ray_counts, uint cell,
+                   global int *doubts, global const uint *pixels)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
     Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, pixels};
+    global scalar *compensation = film + (size_t)band.width * band.height * 3;
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
-        tiles_render(&scene, &band, first_tile, offsets, film, compensation, first_sample, last_sample,
+        tiles_render(&scene, &band, first_tile, sample_offsets, film, compensation, first_sample, last_sample,
                      doubts);
 }

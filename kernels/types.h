@@ -282,4 +282,27 @@ typedef struct {
     uint4 bvh_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
 } SceneHeader;
 
+// The arena is one buffer with the header and then these arrays, because devices allow a kernel as few as 8
+// buffers. Nodes and texels have separate ones, because devices limit the size of each. ARRAY(NAME, struct, a
+// shape's name, name of the array).
+// clang-format off
+#define ARENA_LIST(ARRAY)                                              \
+    SHAPE_LIST(ARRAY)                                                  \
+    ARRAY(TRIANGLE_NORMALS, TriangleNormals, , triangle_normals)       \
+    ARRAY(TRIANGLE_UVS, TriangleUvs, , triangle_uvs)                   \
+    ARRAY(TRIANGLE_NEIGHBORS, TriangleNeighbors, , triangle_neighbors) \
+    ARRAY(CULL_SPHERES, CullSphere, , cull_spheres)                    \
+    ARRAY(OBJECTS, ObjectEntry, , objects)                             \
+    ARRAY(MATERIALS, Material, , materials)                            \
+    ARRAY(LIGHTS, Light, , lights)                                     \
+    ARRAY(TEXTURE_LEVELS, TextureLevel, , texture_levels)
+// clang-format on
+
+// Where each begins, in units of the largest alignment, that of a double16.
+enum { ARENA_UNIT = 128 };
+#define ARENA_OFFSET(NAME, Type, name, names) unsigned names;
+typedef struct {
+    ARENA_LIST(ARENA_OFFSET)
+} ArenaOffsets;
+
 #endif

@@ -298,34 +298,39 @@ static void list_is_complete(void **state)
     }
 }
 
-// As many structs as several threads narrow, of each layout.
-static void arrays_taken_are_arrays_written(void **state)
+// Writes enough structs of each layout for several threads. Each must equal the same struct written alone.
+static void threads_write_what_one_does(void **state)
 {
-    (void)state;
+    const bool is_double = *(const bool *)*state;
     enum { COUNT = 5 * FLAT_RANGE_MIN + 1 };
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         const FlatLayout *layout = &layouts[kind];
         const size_t words = COUNT * layout->size / sizeof(uint32_t);
-        FlatArray array = {memory_allocate_large(COUNT * layout->size), COUNT, *layout};
+        FlatArray array = {memory_allocate_large(COUNT, layout->size), COUNT, *layout};
         for (size_t i = 0; i < words; i++) // doubles that are floats, about 1
             ((uint32_t *)array.items)[i] = i % 2 ? 0x3ff00000u + (uint32_t)(i & 0xffff) : 0;
-        const size_t size = flat_array_size(&array, false);
-        char *written = memory_allocate(size, 1);
-        flat_array_write(&array, false, written);
-        char *taken = flat_array_take(&array, false);
-        assert_memory_equal(taken, written, size);
-        assert_null(array.items);
+        char *written = memory_allocate(flat_array_size(&array, is_double), 1);
+        flat_array_write(&array, is_double, written);
+        for (size_t i = 0; i < COUNT; i++) {
+            const FlatArray one = {flat_array_at(&array, i), 1, *layout};
+            const size_t size = flat_array_size(&one, is_double);
+            char bytes[2048];
+            assert_in_range(size, 1, sizeof bytes);
+            flat_array_write(&one, is_double, bytes);
+            assert_memory_equal(bytes, written + i * size, size);
+        }
         free(written);
-        free(taken);
+        free(array.items);
     }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(arrays_taken_are_arrays_written),
+        {"threads_narrow_as_one_does", threads_write_what_one_does, NULL, NULL, &(bool){false}},
+        {"threads_copy_as_one_does", threads_write_what_one_does, NULL, NULL, &(bool){true}},
         cmocka_unit_test(list_is_complete),
         {"layout_in_float", layout_check, NULL, NULL, &(bool){false}},
         {"layout_in_double", layout_check, NULL, NULL, &(bool){true}},

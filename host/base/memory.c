@@ -1,6 +1,7 @@
 #include "host/base/memory.h"
 
 #include "host/base/fault.h"
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -56,21 +57,15 @@ char *memory_copy_part(const char *text, size_t length)
 // The largest type of OpenCL C has 128 bytes, and no device requires more alignment than that.
 enum { DEVICE_ALIGNMENT = 128, LARGE_PAGE = 1 << 21 };
 
-void *memory_allocate_large(size_t size)
+void *memory_allocate_large(size_t count, size_t size)
 {
-    const size_t alignment = size >= MEMORY_LARGE_MIN ? LARGE_PAGE : DEVICE_ALIGNMENT;
-    const size_t rounded = (size / alignment + 1) * alignment;
-    void *memory = memory_must(aligned_alloc(alignment, rounded), rounded, 1);
+    const size_t total = memory_size(count, size),
+                 alignment = total >= MEMORY_LARGE_MIN ? LARGE_PAGE : DEVICE_ALIGNMENT;
+    if (total > SIZE_MAX - alignment) fault("out of memory: %zu x %zu bytes", count, size);
+    const size_t rounded = (total / alignment + 1) * alignment;
+    void *memory = memory_must(aligned_alloc(alignment, rounded), count, size);
 #ifdef MADV_HUGEPAGE
     if (alignment == LARGE_PAGE) madvise(memory, rounded, MADV_HUGEPAGE); // a hint: no harm if ignored
 #endif
     return memory;
-}
-
-void memory_discard(void *memory, size_t begin, size_t end)
-{
-    if (end < MEMORY_LARGE_MIN) return; // not on large pages
-    begin = (begin / LARGE_PAGE + 1) * LARGE_PAGE;
-    end = end / LARGE_PAGE * LARGE_PAGE;
-    if (begin < end) madvise((char *)memory + begin, end - begin, MADV_DONTNEED);
 }

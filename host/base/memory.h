@@ -18,7 +18,5 @@ enum { MEMORY_LARGE_MIN = 1 << 22 };
 
 // Memory that an OpenCL device may use as it is, for free(): aligned for its largest type, and where it is
 // large on large pages if the system has them, which spares a CPU that reads it at random most address
-// translations.
-void *memory_allocate_large(size_t size);
-// Returns to the system what pages of such memory lie from `begin` up to `end`; what they held is lost.
-void memory_discard(void *memory, size_t begin, size_t end);
+// translations. A page takes memory once it is written.
+void *memory_allocate_large(size_t count, size_t size);

@@ -31,11 +31,6 @@ static const FlatLayout layouts[FLAT_COUNT] = {
 };
 // clang-format on
 
-enum { FLAT_STRUCT_MAX = 1024 };
-_Static_assert(sizeof(SceneHeader) <= FLAT_STRUCT_MAX, "no flat struct is larger");
-_Static_assert(BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)) <= FLAT_STRUCT_MAX,
-               "nor a node");
-
 static void range_zero(void *context, size_t begin, size_t end)
 {
     const FlatArray *array = context;
@@ -46,7 +41,7 @@ static void array_renew(CompiledScene *compiled, size_t kind, FlatLayout layout,
 {
     FlatArray *array = &compiled->arrays[kind];
     free(array->items);
-    *array = (FlatArray){memory_allocate_large(memory_product(count, layout.size)), count, layout};
+    *array = (FlatArray){memory_allocate_large(count, layout.size), count, layout};
     parallel_run(count, FLAT_RANGE_MIN, range_zero, array);
     compiled->changed[kind] = true;
 }
@@ -97,19 +92,23 @@ size_t flat_array_size(const FlatArray *array, bool is_double)
 typedef struct {
     const FlatArray *array;
     char *target;
-    size_t first; // of the array's structs, which the ranges count from
-} Narrowing;
+} ArrayWrite;
 
-// The target may be the array's own memory: a struct is copied before its place is written.
+static void range_copy(void *context, size_t begin, size_t end)
+{
+    const ArrayWrite *write = context;
+    const size_t size = write->array->layout.size;
+    memcpy(write->target + begin * size, flat_array_at(write->array, begin), (end - begin) * size);
+}
+
 static void range_narrow(void *context, size_t begin, size_t end)
 {
-    const Narrowing *narrowing = context;
-    const FlatLayout *layout = &narrowing->array->layout;
+    const ArrayWrite *write = context;
+    const FlatLayout *layout = &write->array->layout;
     const size_t number_count = 4 * layout->scalar4_count;
-    double item[FLAT_STRUCT_MAX / sizeof(double)];
-    for (size_t i = narrowing->first + begin; i < narrowing->first + end; i++) {
-        memcpy(item, flat_array_at(narrowing->array, i), layout->size);
-        float *narrow = (float *)(void *)(narrowing->target + i * narrow_size(layout));
+    for (size_t i = begin; i < end; i++) {
+        const double *item = flat_array_at(write->array, i);
+        float *narrow = (float *)(void *)(write->target + i * narrow_size(layout));
         for (size_t k = 0; k < number_count; k++)
             narrow[k] = (float)item[k];
         memcpy(narrow + number_count, item + number_count, sizeof(uint4) * layout->uint4_count);
@@ -118,34 +117,6 @@ static void range_narrow(void *context, size_t begin, size_t end)
 
 void flat_array_write(const FlatArray *array, bool is_double, void *target)
 {
-    Narrowing narrowing = {array, target, 0};
-    if (is_double)
-        memcpy(target, array->items, flat_array_size(array, is_double));
-    else
-        parallel_run(array->count, FLAT_RANGE_MIN, range_narrow, &narrowing);
-}
-
-// By threads as far as what they write stays before what they read, which is ever farther.
-static void array_narrow(const FlatArray *array)
-{
-    const size_t from_size = array->layout.size, to_size = narrow_size(&array->layout);
-    if (from_size == to_size) return;
-    Narrowing narrowing = {array, array->items, 0};
-    size_t end = array->count < FLAT_RANGE_MIN ? array->count : FLAT_RANGE_MIN;
-    range_narrow(&narrowing, 0, end);
-    while (end < array->count) {
-        narrowing.first = end;
-        end = end * from_size / to_size;
-        if (end > array->count) end = array->count;
-        parallel_run(end - narrowing.first, FLAT_RANGE_MIN / 4, range_narrow, &narrowing);
-    }
-    memory_discard(array->items, array->count * to_size, array->count * from_size);
-}
-
-void *flat_array_take(FlatArray *array, bool is_double)
-{
-    if (!is_double) array_narrow(array);
-    void *items = array->items;
-    array->items = NULL;
-    return items;
+    ArrayWrite write = {array, target};
+    parallel_run(array->count, FLAT_RANGE_MIN, is_double ? range_copy : range_narrow, &write);
 }

@@ -18,20 +18,14 @@ typedef struct {
     FlatLayout layout;
 } FlatArray;
 
+// The arrays in the arena, in its order, then those with separate buffers.
+#define FLAT_NUMBER(NAME, Type, name, names) FLAT_##NAME,
 typedef enum {
     FLAT_HEADER,
-    FLAT_FIRST_SHAPE,
-    FLAT_TRIANGLE_NORMALS = FLAT_FIRST_SHAPE + KIND_COUNT,
-    FLAT_TRIANGLE_UVS,
-    FLAT_TRIANGLE_NEIGHBORS,
-    FLAT_NODES,
-    FLAT_CULL_SPHERES,
-    FLAT_OBJECTS,
-    FLAT_MATERIALS,
-    FLAT_LIGHTS,
-    FLAT_TEXTURE_LEVELS,
+    ARENA_LIST(FLAT_NUMBER) FLAT_NODES,
     FLAT_TEXELS,
-    FLAT_COUNT
+    FLAT_COUNT,
+    FLAT_FIRST_SHAPE = FLAT_HEADER + 1
 } FlatKind;
 
 // A texture's full size, and its levels in FLAT_TEXTURE_LEVELS.
@@ -40,7 +34,7 @@ typedef struct CompiledTexture {
 } CompiledTexture;
 
 typedef struct {
-    FlatArray arrays[FLAT_COUNT];  // in the order of the kernels' arguments
+    FlatArray arrays[FLAT_COUNT];
     bool changed[FLAT_COUNT];      // since the caller cleared it
     FeatureSet features;           // that the kernels need
     double unit;                   // scene units per unit of length in the arrays, a power of two
@@ -82,6 +76,3 @@ enum { FLAT_RANGE_MIN = 16384 };
 // Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
 size_t flat_array_size(const FlatArray *array, bool is_double);
 void flat_array_write(const FlatArray *array, bool is_double, void *target);
-// The same in the array's own memory (memory_allocate_large), which the caller then owns; the array has none
-// left.
-void *flat_array_take(FlatArray *array, bool is_double);

@@ -58,11 +58,16 @@ static double span_covers(const Span *span, uint32_t texel)
     return fmin(span->end, texel + 1.0) - fmax(span->start, texel);
 }
 
+static uint32_t half_of(uint32_t side)
+{
+    return (side + 1) / 2;
+}
+
 // Half as many texels in each dimension, rounded up; each is the mean of what it covers, so that the
 // texture's mean stays.
 static Level level_halved(const Level *fine)
 {
-    Level coarse = level_open((fine->width + 1) / 2, (fine->height + 1) / 2);
+    Level coarse = level_open(half_of(fine->width), half_of(fine->height));
     for (uint32_t y = 0; y < coarse.height; y++) {
         Span rows = span_of(y, coarse.height, fine->height);
         for (uint32_t x = 0; x < coarse.width; x++) {
@@ -144,20 +149,33 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
     return done;
 }
 
-static void levels_flatten(CompiledScene *compiled, const LevelList *list)
+static void texels_flatten(CompiledScene *compiled, const LevelList *list)
 {
-    flat_array_renew(compiled, FLAT_TEXTURE_LEVELS, list->levels.count);
     flat_array_renew(compiled, FLAT_TEXELS, list->texel_count);
-    TextureLevel *levels = compiled->arrays[FLAT_TEXTURE_LEVELS].items;
-    Texel *texels = compiled->arrays[FLAT_TEXELS].items;
-    uint32_t first = 0;
+    Texel *texel = compiled->arrays[FLAT_TEXELS].items;
     for (size_t i = 0; i < list->levels.count; i++) {
         const Level *level = &list->levels.items[i];
-        uint32_t count = level->width * level->height;
-        levels[i].place = (uint4){first, level->width, level->height, 0};
-        for (uint32_t k = 0; k < count; k++)
-            memcpy(&texels[first + k].color, level->colors[k], sizeof level->colors[k]);
-        first += count;
+        for (size_t k = 0; k < (size_t)level->width * level->height; k++)
+            memcpy(&texel++->color, level->colors[k], sizeof level->colors[k]);
+    }
+}
+
+static void levels_flatten(CompiledScene *compiled, size_t texture_count)
+{
+    size_t level_count = 0;
+    for (size_t i = 0; i < texture_count; i++)
+        level_count += compiled->textures[i].level_count;
+    flat_array_renew(compiled, FLAT_TEXTURE_LEVELS, level_count);
+    TextureLevel *level = compiled->arrays[FLAT_TEXTURE_LEVELS].items;
+    uint32_t first = 0;
+    for (size_t i = 0; i < texture_count; i++) {
+        uint32_t width = compiled->textures[i].width, height = compiled->textures[i].height;
+        for (uint32_t k = 0; k < compiled->textures[i].level_count; k++) {
+            *level++ = (TextureLevel){{first, width, height, 0}};
+            first += width * height;
+            width = half_of(width);
+            height = half_of(height);
+        }
     }
 }
 
@@ -168,6 +186,7 @@ bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSet
     compiled->textures = memory_allocate_zeroed(scene->textures.count + 1, sizeof *compiled->textures);
     if (settings->textures) {
         memcpy(compiled->textures, settings->textures, scene->textures.count * sizeof *compiled->textures);
+        levels_flatten(compiled, scene->textures.count);
         return true;
     }
     bool done = true;
@@ -175,7 +194,10 @@ bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSet
         stage_begin(settings->stage, "reading", scene->textures.items[i].path, 0);
         done = texture_add(&list, &compiled->textures[i], scene, &scene->textures.items[i], messages);
     }
-    if (done) levels_flatten(compiled, &list);
+    if (done) {
+        levels_flatten(compiled, scene->textures.count);
+        texels_flatten(compiled, &list);
+    }
     levels_free(&list);
     return done;
 }

@@ -38,9 +38,8 @@ static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm
     if (!is_sender) compiled->textures = NULL; // only a renderer that moves reads them
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         FlatArray *array = &compiled->arrays[kind];
-        const size_t size = array->count * array->layout.size;
-        if (!is_sender) array->items = memory_allocate_large(size);
-        broadcast(array->items, size, ranks);
+        if (!is_sender) array->items = memory_allocate_large(array->count, array->layout.size);
+        broadcast(array->items, array->count * array->layout.size, ranks);
     }
 }
 

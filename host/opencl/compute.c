@@ -172,13 +172,13 @@ bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *byte
                        clEnqueueWriteBuffer(compute->queue, buffer, CL_TRUE, 0, size, bytes, 0, NULL, NULL));
 }
 
-void *buffer_map(Compute *compute, cl_mem buffer, size_t size)
+void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size)
 {
     if (!compute_ok(compute)) return NULL;
     cl_int status;
     fault_note_call("clEnqueueMapBuffer");
-    void *mapped = clEnqueueMapBuffer(compute->queue, buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0,
-                                      size ? size : 1, 0, NULL, NULL, &status);
+    void *mapped = clEnqueueMapBuffer(compute->queue, buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, begin,
+                                      size, 0, NULL, NULL, &status);
     return compute_check_object(compute, mapped, status, "clEnqueueMapBuffer") ? mapped : NULL;
 }
 

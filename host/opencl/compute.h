@@ -109,8 +109,9 @@ void buffer_release(cl_mem buffer); // accepts NULL
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
-// Memory to which to write all of a buffer's new contents; NULL: failed. buffer_write_mapped hands them over.
-void *buffer_map(Compute *compute, cl_mem buffer, size_t size);
+// Returns memory to which to write `size` bytes of a buffer's new contents, at least 1, that begin at
+// `begin`; NULL if the device failed. buffer_write_mapped hands them over.
+void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size);
 void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
 
 // A read-only buffer of bytes of memory_allocate_large. Takes ownership of them, even on failure: a CPU may

@@ -53,18 +53,26 @@ size_t film_tile_count(const Renderer *renderer, const Film *film)
     return divide_up(film->width, item.width) * divide_up(film->height, item.height) * lanes;
 }
 
-void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
+size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
 {
     // a kernel fills all of its layers, but computes shadows only on request
-    unsigned filled =
+    const unsigned filled =
         AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & (AOVS_OF_PATH | AOV_DOUBT));
-    buffers->rows = film.height;
+    size_t end = (size_t)padded_size(2 * film_layer_size(film, LAYER_COLOR)); // with its compensation
+    if (buffers) buffers->layers = filled;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
-        bool empty = layer == LAYER_SHADOW && !(aovs & AOV_SHADOW);
-        if (layer_in(filled, layer))
-            buffers->layers[layer] = film_buffer(renderer, empty ? 0 : film_layer_size(&film, layer));
+        if (layer == LAYER_COLOR || !layer_in(filled, layer)) continue;
+        if (buffers) buffers->layer_begins[layer] = end;
+        if (layer != LAYER_SHADOW || aovs & AOV_SHADOW)
+            end += (size_t)padded_size(film_layer_size(film, layer));
     }
-    buffers->compensation = film_buffer(renderer, film_layer_size(&film, LAYER_COLOR));
+    return end;
+}
+
+void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
+{
+    buffers->rows = film.height;
+    buffers->film = film_buffer(renderer, band_film_size(&film, aovs, buffers));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = renderer->pass != PASS_ALL;
     const size_t pixel_count = film_pixel_count(&film),
@@ -77,13 +85,11 @@ void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, 
 
 void band_buffers_close(BandBuffers *buffers)
 {
+    buffer_release(buffers->film);
     buffer_release(buffers->ray_counts);
-    buffer_release(buffers->compensation);
     buffer_release(buffers->doubts);
     buffer_release(buffers->center_doubts);
     buffer_release(buffers->pixels);
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        buffer_release(buffers->layers[layer]);
     *buffers = (BandBuffers){0};
 }
 
@@ -198,38 +204,41 @@ static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
 bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
                  uint32_t last)
 {
+    Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof(cl_mem), &renderer->offsets);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 1, sizeof(cl_mem), &buffers->layers[LAYER_COLOR]);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 2, sizeof(cl_mem), &buffers->compensation);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 3, sizeof place->band, &place->band);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 4, sizeof first, &first);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 5, sizeof last, &last);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 6, sizeof(cl_mem), &buffers->ray_counts);
     const uint32_t cell = settings_cell(&renderer->settings);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 7, sizeof cell, &cell);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 8, sizeof(cl_mem), &buffers->doubts);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT + 9, sizeof(cl_mem), &buffers->pixels);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof(cl_mem), &renderer->sample_offsets);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof(cl_mem), &buffers->film);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof place->band, &place->band);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof first, &first);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof last, &last);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 5, sizeof(cl_mem), &buffers->ray_counts);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 7, sizeof(cl_mem), &buffers->doubts);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 8, sizeof(cl_mem), &buffers->pixels);
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
     const bool go_on = place_launch(renderer, KERNEL_RENDER, place, last - first);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);
     return go_on;
 }
 
-bool band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
-               unsigned aovs, const Place *place)
+bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, unsigned aovs,
+               const Place *place)
 {
+    Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, kind);
-    kernel_argument(renderer->compute, kernel, FLAT_COUNT, sizeof place->band, &place->band);
-    cl_uint argument = FLAT_COUNT + 1;
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (layer_in(layers, layer))
-            kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->layers[layer]);
-    cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
-    if (layers & AOV_SHADOW)
-        kernel_argument(renderer->compute, kernel, argument++, sizeof shadow_count, &shadow_count);
-    kernel_argument(renderer->compute, kernel, argument++, sizeof(cl_mem), &buffers->center_doubts);
-    kernel_argument(renderer->compute, kernel, argument, sizeof(cl_mem), &buffers->pixels);
+    LayerOffsets offsets;
+#define OFFSET_SET(NAME, name, ...)                                                                          \
+    offsets.name = (unsigned)(buffers->layer_begins[LAYER_##NAME] / ARENA_UNIT);
+    LAYER_LIST(OFFSET_SET)
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof place->band, &place->band);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof(cl_mem), &buffers->film);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof offsets, &offsets);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof(cl_mem), &buffers->center_doubts);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof(cl_mem), &buffers->pixels);
+    const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
+    if (kind == KERNEL_AOV)
+        kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 5, sizeof shadow_count, &shadow_count);
     pace_begin_band(renderer_pace(renderer, kind));
     return place_launch(renderer, kind, place, 1);
 }

@@ -5,7 +5,10 @@
 
 typedef struct {
     uint32_t rows;
-    cl_mem ray_counts, compensation, layers[LAYER_COUNT];
+    cl_mem film;                      // layer after layer
+    unsigned layers;                  // in the film, as a set
+    size_t layer_begins[LAYER_COUNT]; // in the film, in bytes
+    cl_mem ray_counts;
     // at `certified`: of each tile which pixels' colors are in doubt, as bits; of a list's pixels how many
     // samples
     cl_mem doubts;
@@ -13,6 +16,10 @@ typedef struct {
     cl_mem pixels;        // where a list is rendered: x and y of each
     RepeatCounts repeats; // of the band, since its last delivery
 } BandBuffers;
+
+// Returns the size of the buffer for a film's color and the layers that the kernels of these AOVs fill.
+// Unless `buffers` is NULL, its `layers` and `layer_begins` are set.
+size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 
 // For as many pixels as the film has.
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film);
@@ -61,7 +68,6 @@ static inline uint32_t settings_cell(const RenderSettings *settings)
 bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
                  uint32_t last);
 
-// Launches a kernel that fills its layers, whose buffers follow the band in its arguments. Paced and stopped
-// as band_render.
-bool band_fill(Renderer *renderer, KernelKind kind, unsigned layers, const BandBuffers *buffers,
-               unsigned aovs, const Place *place);
+// Launches a kernel that fills the AOVs of its list (kernels/aovs.h), paced and stopped as band_render is.
+bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, unsigned aovs,
+               const Place *place);

@@ -58,14 +58,14 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
         size_t size = film_layer_size(&band, layer);
         if (!layer_in(layers, layer) || size == 0) continue;
         band.layers[layer] = mapped[layer] =
-            renderer_map(renderer, buffers->layers[layer], size, CL_MAP_READ);
+            renderer_map(renderer, buffers->film, buffers->layer_begins[layer], size, CL_MAP_READ);
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
             band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
     }
     bool go_on = compute_ok(renderer->compute) && deliver(delivery, &band);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
-        renderer_unmap(renderer, buffers->layers[layer], mapped[layer]);
+        renderer_unmap(renderer, buffers->film, mapped[layer]);
     }
     return go_on;
 }
@@ -99,6 +99,12 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     size_t row_bytes = film_layer_size(&row, LAYER_COLOR);
     if (aovs & AOV_SHADOW) row_bytes += film_layer_size(&row, LAYER_SHADOW);
     size_t rows = BAND_BYTES_MAX / row_bytes;
+    // the film fits one buffer, even where all of its pixels are re-rendered in double precision
+    for (const Renderer *pass = renderer; pass; pass = pass->repeat) {
+        const uint64_t largest = pass->compute->device->largest_buffer_bytes,
+                       fitting = largest / (2 * band_film_size(&row, aovs, NULL));
+        if (largest > 0 && rows > fitting) rows = (size_t)fitting;
+    }
     size_t step = group_shape(renderer).height;
     rows = rows < step ? step : rows - rows % step;
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
@@ -138,7 +144,7 @@ static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned ao
     } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}};
     for (size_t i = 0; i < sizeof fills / sizeof *fills; i++) {
         if (!(aovs & fills[i].layers)) continue;
-        if (!band_fill(renderer, fills[i].kind, fills[i].layers, buffers, aovs, &place)) return false;
+        if (!band_fill(renderer, fills[i].kind, buffers, aovs, &place)) return false;
         if (renderer->repeat && !band_repeat(renderer, fills[i].kind, fills[i].layers, buffers, aovs, rows))
             return false;
     }

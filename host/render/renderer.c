@@ -46,27 +46,52 @@ static bool settings_fit(const RenderSettings *settings, const Compute *compute,
     return true;
 }
 
-// False with a message where the arrays exceed the memory that the device reports; if it does not, buffers
-// fail when they are created.
+static SceneBuffer buffer_of(size_t kind)
+{
+    return kind < FLAT_NODES ? BUFFER_ARENA : kind == FLAT_NODES ? BUFFER_NODES : BUFFER_TEXELS;
+}
+
+// Returns the layout of the scene's buffers once the arrays that have changed are uploaded.
+static SceneLayout scene_layout(const CompiledScene *compiled, const Renderer *renderer)
+{
+    SceneLayout layout = {.begins = {0}};
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+        uint64_t *end = &layout.buffer_sizes[buffer_of(kind)];
+        layout.array_sizes[kind] = compiled->changed[kind]
+                                       ? flat_array_size(&compiled->arrays[kind], renderer->report.is_double)
+                                       : renderer->layout.array_sizes[kind];
+        layout.begins[kind] = *end;
+        *end += padded_size(layout.array_sizes[kind]);
+    }
+    return layout;
+}
+
+// The largest buffer that the host and the arena's offsets can address.
+static const uint64_t BUFFER_BYTES_MAX =
+    SIZE_MAX / ARENA_UNIT < UINT32_MAX ? SIZE_MAX : (uint64_t)UINT32_MAX * ARENA_UNIT;
+
+// Returns false with a message where a buffer exceeds BUFFER_BYTES_MAX, or the buffers exceed the memory that
+// the device reports. Where it reports none, creating them may fail.
 static bool device_has_room(const CompiledScene *compiled, const Renderer *renderer, MessageList *messages)
 {
     const Device *device = renderer->compute->device;
-    const bool is_double = renderer->report.is_double;
-    uint64_t sum = 0, largest = 0; // of all arrays, which may exceed a 32-bit host's size_t
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        const uint64_t size = flat_array_size(&compiled->arrays[kind], is_double);
-        sum += size;
-        if (size > largest) largest = size;
+    const SceneLayout layout = scene_layout(compiled, renderer);
+    const bool is_known = device->memory_bytes > 0 && device->largest_buffer_bytes > 0;
+    const uint64_t memory = is_known ? device->memory_bytes : UINT64_MAX,
+                   reported = is_known ? device->largest_buffer_bytes : UINT64_MAX,
+                   most = reported < BUFFER_BYTES_MAX ? reported : BUFFER_BYTES_MAX;
+    uint64_t sum = 0, largest = 0;
+    for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
+        sum += layout.buffer_sizes[i];
+        if (layout.buffer_sizes[i] > largest) largest = layout.buffer_sizes[i];
     }
-    bool is_known = device->memory_bytes > 0 && device->largest_buffer_bytes > 0;
-    if (!is_known || (sum <= device->memory_bytes && largest <= device->largest_buffer_bytes)) return true;
+    if (sum <= memory && largest <= most) return true;
     const double mebi = 1024.0 * 1024.0;
     return message_error(
         messages,
         "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
         "%.1f MiB, and at most %.1f MiB in one buffer",
-        (double)sum / mebi, (double)largest / mebi, device->name, (double)device->memory_bytes / mebi,
-        (double)device->largest_buffer_bytes / mebi);
+        (double)sum / mebi, (double)largest / mebi, device->name, (double)memory / mebi, (double)most / mebi);
 }
 
 // Whether scene_move leaves an array as it is, and does not read it.
@@ -76,56 +101,81 @@ static bool is_without_eye(size_t kind)
            kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS;
 }
 
-// `takes`: the host array is not needed any more.
-static void array_upload(Renderer *renderer, size_t kind, FlatArray *array, bool takes)
+// Stages the buffers whose size differs. Then all arrays in them have changed: only scene_compile changes the
+// size of an array, and it writes all but the texels, which have a separate buffer.
+static void buffers_stage(Renderer *renderer, const CompiledScene *compiled)
 {
-    Compute *compute = renderer->compute;
-    const bool is_double = renderer->report.is_double;
-    const size_t size = flat_array_size(array, is_double);
-    if (renderer->arrays[kind] && renderer->array_sizes[kind] == size) {
-        void *mapped = buffer_map(compute, renderer->arrays[kind], size);
-        if (!mapped) return;
-        flat_array_write(array, is_double, mapped);
-        buffer_write_mapped(compute, renderer->arrays[kind], mapped);
-        return;
+    const SceneLayout layout = scene_layout(compiled, renderer);
+    for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
+        if (renderer->buffers[i] && renderer->layout.buffer_sizes[i] == layout.buffer_sizes[i]) continue;
+        buffer_release(renderer->buffers[i]);
+        renderer->buffers[i] = NULL;
+        renderer->staged[i] = memory_allocate_large((size_t)layout.buffer_sizes[i], 1);
     }
-    void *bytes = takes ? flat_array_take(array, is_double) : memory_allocate_large(size);
-    if (!takes) flat_array_write(array, is_double, bytes);
-    if (renderer->settings.hashes_scene && kind != FLAT_NODES)
-        renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
-    buffer_release(renderer->arrays[kind]);
-    renderer->arrays[kind] = buffer_take(compute, size, bytes);
-    renderer->array_sizes[kind] = size;
+    renderer->layout = layout;
 }
 
-// The arrays that have changed, to each of the renderers. The last takes each host array, so that the scene
-// is never in memory twice, unless the renderer moves.
+// Writes an array to its staged buffer, or to its part of the one on the device.
+static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array)
+{
+    const SceneBuffer buffer = buffer_of(kind);
+    char *staged = renderer->staged[buffer];
+    const size_t begin = (size_t)renderer->layout.begins[kind],
+                 size = (size_t)renderer->layout.array_sizes[kind];
+    if (size == 0) return;
+    void *bytes =
+        staged ? staged + begin : buffer_map(renderer->compute, renderer->buffers[buffer], begin, size);
+    if (!bytes) return;
+    flat_array_write(array, renderer->report.is_double, bytes);
+    if (renderer->settings.hashes_scene && kind != FLAT_NODES)
+        renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
+    if (!staged) buffer_write_mapped(renderer->compute, renderer->buffers[buffer], bytes);
+}
+
+static void staged_upload(Renderer *renderer)
+{
+    for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
+        if (!renderer->staged[i]) continue;
+        renderer->buffers[i] =
+            buffer_take(renderer->compute, (size_t)renderer->layout.buffer_sizes[i], renderer->staged[i]);
+        renderer->staged[i] = NULL;
+    }
+}
+
+// Uploads the arrays that have changed to each renderer. Frees each array once all have it, unless the
+// renderer moves, so that at most one array is in memory twice.
 static void arrays_upload(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
     if (count > 0) stage_begin(renderers[0]->settings.stage, "uploading the scene", NULL, 0);
+    for (size_t i = 0; i < count; i++)
+        buffers_stage(renderers[i], compiled);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        const bool stays = count > 0 && renderers[0]->settings.moves && !is_without_eye(kind);
         for (size_t i = 0; i < count && compiled->changed[kind]; i++) {
             const double start = clock_seconds();
-            array_upload(renderers[i], kind, &compiled->arrays[kind], i + 1 == count && !stays);
+            array_upload(renderers[i], kind, &compiled->arrays[kind]);
             renderers[i]->report.upload_seconds += clock_seconds() - start;
         }
         compiled->changed[kind] = false;
-        if (stays) continue;
+        if (count > 0 && renderers[0]->settings.moves && !is_without_eye(kind)) continue;
         free(compiled->arrays[kind].items);
         compiled->arrays[kind].items = NULL;
     }
+    for (size_t i = 0; i < count; i++) {
+        const double start = clock_seconds();
+        staged_upload(renderers[i]);
+        renderers[i]->report.upload_seconds += clock_seconds() - start;
+    }
 }
 
-static void offsets_upload(Renderer *renderer)
+static void sample_offsets_upload(Renderer *renderer)
 {
     const uint32_t count = renderer->settings.sample_count;
     const size_t size = 2 * count * renderer_scalar_size(renderer);
     void *offsets = sample_pattern(count, renderer->report.is_double);
     if (renderer->settings.hashes_scene)
         renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, offsets, size);
-    buffer_release(renderer->offsets);
-    renderer->offsets = buffer_create(renderer->compute, size, offsets, CL_MEM_READ_ONLY);
+    buffer_release(renderer->sample_offsets);
+    renderer->sample_offsets = buffer_create(renderer->compute, size, offsets, CL_MEM_READ_ONLY);
     free(offsets);
 }
 
@@ -221,7 +271,7 @@ static void scene_changed(Renderer *renderer)
     if (renderer->settings.hashes_scene) // lengths are restored with it
         renderer->report.scene_hash =
             hash_bytes(renderer->report.scene_hash, &compiled->unit, sizeof compiled->unit);
-    offsets_upload(renderer);
+    sample_offsets_upload(renderer);
     renderer_kernels_choose(renderer);
 }
 
@@ -364,12 +414,12 @@ uint64_t renderer_scene_hash(const Renderer *renderer)
 void renderer_release_scene(Renderer *renderer)
 {
     for (; renderer; renderer = renderer->repeat) {
-        for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-            buffer_release(renderer->arrays[kind]);
-            renderer->arrays[kind] = NULL;
+        for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
+            buffer_release(renderer->buffers[i]);
+            renderer->buffers[i] = NULL;
         }
-        buffer_release(renderer->offsets);
-        renderer->offsets = NULL;
+        buffer_release(renderer->sample_offsets);
+        renderer->sample_offsets = NULL;
         compiled_scene_free(&renderer->compiled);
     }
 }
@@ -390,7 +440,7 @@ size_t renderer_scalar_size(const Renderer *renderer)
     return renderer->report.is_double ? sizeof(double) : sizeof(float);
 }
 
-void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size, cl_map_flags access)
+void *renderer_map(Renderer *renderer, cl_mem buffer, size_t begin, size_t size, cl_map_flags access)
 {
     Compute *compute = renderer->compute;
     if (!compute_ok(compute)) return NULL;
@@ -399,7 +449,7 @@ void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size, cl_map_flags 
     cl_int status;
     fault_note_call("clEnqueueMapBuffer");
     void *mapped =
-        clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, access, 0, size, 0, NULL, &event, &status);
+        clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, access, begin, size, 0, NULL, &event, &status);
     if (!compute_check_object(compute, mapped, status, "clEnqueueMapBuffer")) {
         if (event) clReleaseEvent(event);
         return NULL;

@@ -18,8 +18,14 @@ static const struct {
 
 static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
 {
-    for (cl_uint i = 0; i < FLAT_COUNT; i++)
-        kernel_argument(renderer->compute, kernel, i, sizeof(cl_mem), &renderer->arrays[i]);
+    Compute *compute = renderer->compute;
+    const cl_mem *buffers = renderer->buffers;
+#define OFFSET_VALUE(NAME, Type, name, names) (unsigned)(renderer->layout.begins[FLAT_##NAME] / ARENA_UNIT),
+    const ArenaOffsets offsets = {ARENA_LIST(OFFSET_VALUE)};
+    kernel_argument(compute, kernel, ARGUMENT_ARENA, sizeof(cl_mem), &buffers[BUFFER_ARENA]);
+    kernel_argument(compute, kernel, ARGUMENT_OFFSETS, sizeof offsets, &offsets);
+    kernel_argument(compute, kernel, ARGUMENT_NODES, sizeof(cl_mem), &buffers[BUFFER_NODES]);
+    kernel_argument(compute, kernel, ARGUMENT_TEXELS, sizeof(cl_mem), &buffers[BUFFER_TEXELS]);
 }
 
 // At least `count`: few sizes, so that few kernels are built. Most scenes are served by `usual`, which is

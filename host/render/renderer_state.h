@@ -22,6 +22,20 @@ typedef struct {
     KernelSlot kernels[KERNEL_COUNT];
 } KernelVariant;
 
+// The scene on the device: the arena (kernels/types.h), and the arrays that are not in it.
+typedef enum { BUFFER_ARENA, BUFFER_NODES, BUFFER_TEXELS, SCENE_BUFFER_COUNT } SceneBuffer;
+
+// Returns the size of an array with the padding up to the next one in its buffer.
+static inline uint64_t padded_size(uint64_t size)
+{
+    return (size + ARENA_UNIT - 1) / ARENA_UNIT * ARENA_UNIT;
+}
+
+// Where each array begins in its buffer, in bytes.
+typedef struct {
+    uint64_t begins[FLAT_COUNT], array_sizes[FLAT_COUNT], buffer_sizes[SCENE_BUFFER_COUNT];
+} SceneLayout;
+
 struct Renderer {
     Compute *compute;
     RenderSettings settings;
@@ -29,9 +43,10 @@ struct Renderer {
     const Passport *passport; // of its kernels
     RenderReport report;
     CompiledScene compiled; // without the arrays that are only on the device
-    cl_mem arrays[FLAT_COUNT];
-    size_t array_sizes[FLAT_COUNT];
-    cl_mem offsets; // of a pixel's samples
+    cl_mem buffers[SCENE_BUFFER_COUNT];
+    void *staged[SCENE_BUFFER_COUNT]; // the contents of a buffer until it is created
+    SceneLayout layout;
+    cl_mem sample_offsets; // in the pixel
     size_t light_count;
     // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
     KernelVariant variant, other_variant;
@@ -53,8 +68,10 @@ void renderer_kernels_choose(Renderer *renderer);
 void renderer_kernels_take(Renderer *renderer, Renderer *earlier);
 void renderer_kernels_close(Renderer *renderer);
 
-// The kernel with the scene's arrays set as its first FLAT_COUNT arguments; built when first requested. NULL:
-// the device failed.
+// The numbers of SCENE_ARGUMENTS (kernels/scene.h); a kernel's other arguments follow.
+enum { ARGUMENT_ARENA, ARGUMENT_OFFSETS, ARGUMENT_NODES, ARGUMENT_TEXELS, SCENE_ARGUMENT_COUNT };
+
+// The kernel with the scene's arguments set; built when first requested. NULL: the device failed.
 cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
 
 // Launches as kernel_launch_from does and adds the time to the report. Returns the launch's seconds: the
@@ -65,7 +82,7 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
 // The pace of a kernel's launches, with its target by the settings.
 Pace *renderer_pace(Renderer *renderer, KernelKind kind);
 
-// Maps a buffer for the host, to read or also to write, and adds the time to the report; NULL: the device
-// failed. Released with renderer_unmap, which accepts NULL.
-void *renderer_map(Renderer *renderer, cl_mem buffer, size_t size, cl_map_flags access);
+// Maps `size` bytes of a buffer, which begin at `begin`, for the host to read or write, and adds the time to
+// the report. Returns NULL if the device failed. Released with renderer_unmap, which accepts NULL.
+void *renderer_map(Renderer *renderer, cl_mem buffer, size_t begin, size_t size, cl_map_flags access);
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

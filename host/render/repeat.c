@@ -45,21 +45,17 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
 }
 
 // Puts a layer of the list's pixels, of doubles, into the band's, of floats.
-static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem of_band,
-                        const PixelList *list, const Film *band)
+static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_list,
+                        const BandBuffers *of_band, const PixelList *list, const Film *film, const Film *band)
 {
-    Renderer *repeat = renderer->repeat;
-    const Film film = {.width = (uint32_t)list->index.count,
-                       .height = 1,
-                       .light_count = band->light_count,
-                       .real_size = renderer_scalar_size(repeat)};
+    Renderer *repeat = renderer->repeat; // perhaps on another device
     const size_t components = film_components(band, layer);
     const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
-    void *values = renderer_map(renderer, of_band, film_layer_size(band, layer), CL_MAP_READ | CL_MAP_WRITE);
-    if (!values) return;
-    void *repeated = memory_allocate(film_layer_size(&film, layer), 1);
-    const bool is_read = buffer_read(repeat->compute, of_list, film_layer_size(&film, layer), repeated);
-    for (size_t i = 0; i < list->index.count && is_read; i++)
+    void *values = renderer_map(renderer, of_band->film, of_band->layer_begins[layer],
+                                film_layer_size(band, layer), CL_MAP_READ | CL_MAP_WRITE);
+    const void *repeated = renderer_map(repeat, of_list->film, of_list->layer_begins[layer],
+                                        film_layer_size(film, layer), CL_MAP_READ);
+    for (size_t i = 0; i < list->index.count && values && repeated; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->index.items[i] * components + k;
             if (layer_types[layer] == LAYER_TYPE_INTEGER)
@@ -68,19 +64,21 @@ static void layer_merge(Renderer *renderer, Layer layer, cl_mem of_list, cl_mem 
                 ((float *)values)[to] =
                     (float)(((const double *)repeated)[from] / (is_length ? renderer->compiled.unit : 1));
         }
-    renderer_unmap(renderer, of_band, values);
-    free(repeated);
+    renderer_unmap(repeat, of_list->film, repeated);
+    renderer_unmap(renderer, of_band->film, values);
 }
 
 static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
 {
     for (size_t i = 0; i < of_repeat->launches.count; i++)
         array_push(report->launches, ((NamedLaunch){"repeat", of_repeat->launches.items[i].time}));
+    for (size_t i = 0; i < of_repeat->reads.count; i++)
+        array_push(report->reads, of_repeat->reads.items[i]);
     report->build_seconds += of_repeat->build_seconds;
     report->build_from_cache &= of_repeat->build_from_cache;
     report->is_out_of_line |= of_repeat->is_out_of_line;
     of_repeat->build_seconds = 0;
-    of_repeat->launches.count = 0;
+    of_repeat->launches.count = of_repeat->reads.count = 0;
 }
 
 // A band of which pixels are repeated: the kernel, the layers that it fills, and their buffers.
@@ -93,26 +91,27 @@ typedef struct {
 
 void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows rows)
 {
-    if (!buffers->layers[LAYER_DOUBT]) return;
+    if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
     const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
     const size_t size = film_layer_size(&band, LAYER_DOUBT);
-    void *values = renderer_map(renderer, buffers->layers[LAYER_DOUBT], size, CL_MAP_WRITE);
+    void *values =
+        renderer_map(renderer, buffers->film, buffers->layer_begins[LAYER_DOUBT], size, CL_MAP_WRITE);
     if (values) memset(values, 0, size);
-    renderer_unmap(renderer, buffers->layers[LAYER_DOUBT], values);
+    renderer_unmap(renderer, buffers->film, values);
 }
 
 // Raises the doubt of the list's pixels.
 static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const PixelList *list, uint32_t doubt)
 {
-    cl_mem layer = band->buffers->layers[LAYER_DOUBT];
-    if (!layer) return;
-    uint32_t *values =
-        renderer_map(renderer, layer, film_layer_size(&band->film, LAYER_DOUBT), CL_MAP_READ | CL_MAP_WRITE);
+    const BandBuffers *buffers = band->buffers;
+    if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
+    uint32_t *values = renderer_map(renderer, buffers->film, buffers->layer_begins[LAYER_DOUBT],
+                                    film_layer_size(&band->film, LAYER_DOUBT), CL_MAP_READ | CL_MAP_WRITE);
     for (size_t i = 0; values && i < list->index.count; i++) {
         uint32_t *value = &values[list->index.items[i]];
         if (*value < doubt) *value = doubt;
     }
-    renderer_unmap(renderer, layer, values);
+    renderer_unmap(renderer, buffers->film, values);
 }
 
 // Renders all samples of a list. Returns false as band_render does.
@@ -144,12 +143,11 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
                  list->pixels.items);
     const bool whole = band->kind == KERNEL_RENDER
                            ? list_render(repeat, &repeated, &place)
-                           : band_fill(repeat, band->kind, band->layers, &repeated, band->aovs, &place);
+                           : band_fill(repeat, band->kind, &repeated, band->aovs, &place);
     for (Layer layer = 0; layer < LAYER_COUNT && whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
             film_layer_size(&band->film, layer) > 0)
-            layer_merge(renderer, layer, repeated.layers[layer], band->buffers->layers[layer], list,
-                        &band->film);
+            layer_merge(renderer, layer, &repeated, band->buffers, list, &film, &band->film);
     if (undecided && whole)
         buffer_read(repeat->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
                     list->index.count * sizeof *undecided, undecided);
@@ -183,7 +181,7 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
     const RepeatedBand band = {kind, layers, aovs, buffers,
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
     const size_t tile_count = film_tile_count(renderer, &band.film);
-    uint32_t *values = renderer_map(renderer, doubts, tile_count * sizeof *values, CL_MAP_READ);
+    uint32_t *values = renderer_map(renderer, doubts, 0, tile_count * sizeof *values, CL_MAP_READ);
     if (!values) return false;
     PixelList list = doubts_list(renderer, rows, values, tile_count);
     renderer_unmap(renderer, doubts, values);

@@ -70,10 +70,10 @@ static double trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_m
 {
     Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
-    kernel_argument(compute, kernel, FLAT_COUNT, sizeof rays, &rays);
-    kernel_argument(compute, kernel, FLAT_COUNT + 1, sizeof count, &count);
-    kernel_argument(compute, kernel, FLAT_COUNT + 2, sizeof results, &results);
-    kernel_argument(compute, kernel, FLAT_COUNT + 3, sizeof objects, &objects);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof rays, &rays);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof count, &count);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof results, &results);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof objects, &objects);
     size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = TRACE_GROUP;
     return renderer_launch(renderer, KERNEL_TRACE, 1, NULL, &items, &group);
 }
@@ -82,8 +82,8 @@ static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_m
 {
     Compute *compute = renderer->compute;
     size_t result_size = (size_t)count * RESULT_SCALARS * renderer_scalar_size(renderer);
-    const void *result = renderer_map(renderer, results, result_size, CL_MAP_READ);
-    const uint32_t *object = renderer_map(renderer, objects, (size_t)count * sizeof *object, CL_MAP_READ);
+    const void *result = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
+    const uint32_t *object = renderer_map(renderer, objects, 0, (size_t)count * sizeof *object, CL_MAP_READ);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
         hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i],
                          renderer->compiled.unit);

@@ -45,7 +45,7 @@ bool work(Compute *compute, Answer *answer)
     MessageList messages = {0};
     memset(answer, 0, sizeof *answer);
     compute_open(compute, work_device);
-    cl_mem large = buffer_take(compute, LARGE_BYTES, memory_allocate_large(LARGE_BYTES));
+    cl_mem large = buffer_take(compute, LARGE_BYTES, memory_allocate_large(LARGE_BYTES, 1));
     Renderer *renderer = renderer_open(compute, &work_scene, &work_settings, &messages);
     bool done = renderer && renderer_render(renderer, AOVS_ALL, work_take_band, answer) &&
                 renderer_trace(renderer, rays, RAY_COUNT, answer->hits);

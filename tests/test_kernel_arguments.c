@@ -1,0 +1,142 @@
+// Every kernel's arguments fit small devices: at most 8 buffers, which is V3D's limit, and 256 bytes in
+// total, which is the least CL_DEVICE_MAX_PARAMETER_SIZE that OpenCL's embedded profile permits.
+#include "host/compile/compiled_scene.h"
+#include "tests/probe.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+enum { BUFFERS_MAX = 8, BYTES_MAX = 256, POINTER_BYTES = 8, KERNELS_MIN = 6 };
+
+typedef struct {
+    size_t buffer_count, byte_count;
+} Arguments;
+
+// The types that kernels take by value, by the names that the device's compiler reports.
+static const struct {
+    const char *name;
+    size_t size, alignment;
+} value_types[] = {
+    {"uint", 4, 4},
+    {"float", 4, 4},
+    {"scalar", 8, 8}, // at `double`
+    {"uint4", 16, 16},
+    {"ArenaOffsets", sizeof(ArenaOffsets), 4},
+    {"LayerOffsets", sizeof(LayerOffsets), 4},
+};
+
+static void bytes_add(Arguments *arguments, size_t size, size_t alignment)
+{
+    arguments->byte_count = (arguments->byte_count + alignment - 1) / alignment * alignment + size;
+}
+
+static void value_add(Arguments *arguments, const char *type, const char *kernel)
+{
+    for (size_t i = 0; i < sizeof value_types / sizeof *value_types; i++) {
+        if (strcmp(type, value_types[i].name) != 0) continue;
+        bytes_add(arguments, value_types[i].size, value_types[i].alignment);
+        return;
+    }
+    fail_msg("%s has an argument of type %s, whose size is not listed here", kernel, type);
+}
+
+// Returns the size of a kernel's arguments. Skips the test where the device does not report them.
+static Arguments arguments_of(cl_kernel kernel, const char *name)
+{
+    Arguments arguments = {0};
+    cl_uint count = 0;
+    assert_int_equal(clGetKernelInfo(kernel, CL_KERNEL_NUM_ARGS, sizeof count, &count, NULL), CL_SUCCESS);
+    for (cl_uint i = 0; i < count; i++) {
+        cl_kernel_arg_address_qualifier space;
+        char type[64] = "";
+        cl_int status =
+            clGetKernelArgInfo(kernel, i, CL_KERNEL_ARG_ADDRESS_QUALIFIER, sizeof space, &space, NULL);
+        if (status == CL_KERNEL_ARG_INFO_NOT_AVAILABLE) skip();
+        assert_int_equal(status, CL_SUCCESS);
+        status = clGetKernelArgInfo(kernel, i, CL_KERNEL_ARG_TYPE_NAME, sizeof type, type, NULL);
+        assert_int_equal(status, CL_SUCCESS);
+        if (space == CL_KERNEL_ARG_ADDRESS_PRIVATE) {
+            value_add(&arguments, type, name);
+        } else {
+            arguments.buffer_count++;
+            bytes_add(&arguments, POINTER_BYTES, POINTER_BYTES);
+        }
+    }
+    return arguments;
+}
+
+static cl_program program_with_arguments(const char *text)
+{
+    Text prelude = {0};
+    static const char *const zeros[] = {"IS_FAST",      "IS_STRICT",     "IS_DOUBLE",
+                                        "IS_CERTIFIED", "IS_PIXEL_LIST", "REPAIRS_DIVIDE",
+                                        "IS_COUNTING",  "PERTURB",       "PERTURB_SEED"};
+    static const char *const ones[] = {"LANES", "HAS_FMA", "PENDING_MAX", "PERTURB_SCALE"};
+    for (size_t i = 0; i < sizeof zeros / sizeof *zeros; i++)
+        text_appendf(&prelude, "#define %s 0\n", zeros[i]);
+    for (size_t i = 0; i < sizeof ones / sizeof *ones; i++)
+        text_appendf(&prelude, "#define %s 1\n", ones[i]);
+    text_appendf(&prelude, "#define STACK_CAPACITY 40\n");
+    features_write_prelude(&prelude, FEATURE_ALL);
+    cl_program program = probe_program(text, text_c(&prelude), "-cl-std=CL1.2 -cl-kernel-arg-info");
+    text_free(&prelude);
+    return program;
+}
+
+// The test's own kernel has arguments of known sizes.
+static void arguments_are_counted(void **state)
+{
+    (void)state;
+    cl_program program = program_with_arguments(
+        "kernel void many(global int *a, global float *b, constant float *c, uint d, uint4 e, "
+        "global const int *f, uint g)\n{\n    if (d + e.x + g > 0) *a = *f + (int)*b + (int)*c;\n}\n");
+    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "many");
+    const Arguments arguments = arguments_of(kernel, "many");
+    assert_int_equal(arguments.buffer_count, 4);
+    assert_int_equal(arguments.byte_count, 3 * 8 + 4 + 4 + 16 + 8 + 4); // 4 of padding before the uint4
+    clReleaseKernel(kernel);
+    clReleaseProgram(program);
+}
+
+static size_t file_check(const char *file)
+{
+    char text[64];
+    snprintf(text, sizeof text, "#include \"%s\"\n", file);
+    cl_program program = program_with_arguments(text);
+    cl_kernel kernels[8];
+    cl_uint count = 0;
+    compute_try(&probe_compute, clCreateKernelsInProgram(program, 8, kernels, &count));
+    for (cl_uint i = 0; i < count; i++) {
+        char name[64] = "";
+        clGetKernelInfo(kernels[i], CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
+        const Arguments arguments = arguments_of(kernels[i], name);
+        printf("%s: %zu buffers, %zu bytes of arguments\n", name, arguments.buffer_count,
+               arguments.byte_count);
+        if (arguments.buffer_count > BUFFERS_MAX)
+            fail_msg("%s takes %zu buffers", name, arguments.buffer_count);
+        if (arguments.byte_count > BYTES_MAX) fail_msg("%s takes %zu bytes", name, arguments.byte_count);
+        clReleaseKernel(kernels[i]);
+    }
+    clReleaseProgram(program);
+    return count;
+}
+
+static void every_kernel_has_few(void **state)
+{
+    (void)state;
+    size_t count = 0;
+    for (const EmbeddedFile *file = kernel_files; file->name; file++)
+        if (strcmp(file->name + strlen(file->name) - 3, ".cl") == 0) count += file_check(file->name);
+    assert_in_range(count, KERNELS_MIN, 64);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(arguments_are_counted),
+        cmocka_unit_test(every_kernel_has_few),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
