@@ -25,6 +25,10 @@ WORKS = (
     ("constant=16384", f"{RENDER} --precision strict --lanes 1"),
     (f"address=32,memory={8192 * MEBI}", f"{RENDER} --precision strict --lanes 1"),
     (f"memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision strict --lanes 1 --size 3840x2160 --aov {ALL_AOVS}"),
+    ("buffers=8", f"{RENDER} --precision strict --lanes 1 --aov {ALL_AOVS}"),
+    ("buffers=8", f"{RENDER} --precision certified --lanes 1 --samples 2 --aov t,path,doubt"),
+    ("buffers=8", "trace sphere.yaml --rays rays.txt --lanes 1"),
+    ("buffers=8", "verify S1 M1 --precision strict --lanes 1"),
     # the watchdog: no launch grows more than fourfold
     ("first=4096", f"{RENDER} --precision strict --lanes 1 --size 3840x400 --aov {ALL_AOVS}"),
     ("first=4096", f"{RENDER} --precision strict --lanes 1 --size 8x8 --samples 100"),
@@ -50,7 +54,8 @@ REFUSED = (
     ("kernel=5", f"{RENDER} --no-cache --lanes 4", 2, "clCreateKernel: CL_OUT_OF_RESOURCES .*: the kernel needs more registers"),
     ("kernel=6", f"{RENDER} --no-cache --lanes 4", 2, "clCreateKernel: CL_OUT_OF_HOST_MEMORY .*: the driver ran out of memory"),
     ("kernel=46", f"{RENDER} --no-cache --lanes 4", 2, "clCreateKernel: CL_INVALID_KERNEL_NAME .*: the driver's build left the kernel out"),
-    # a limit that the device does not report
+    # limits that the device does not report
+    ("buffers=7", f"{RENDER} --lanes 1", 2, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES .* on "),
     ("first=1000", f"{RENDER} --lanes 1", 2, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES .* on "),
 )
 

@@ -12,7 +12,7 @@
 //   buffer=N       a buffer has at most N bytes
 //   address=N      addresses have N bits, and of 32 no more than 4 GiB of memory are allocated
 //   no-timer       the times of events are 0
-//   buffers=N      a kernel takes at most N buffers
+//   buffers=N      a kernel's launch fails if more than N of its arguments are buffers, NULL or not
 //   build=N        the compiler fails with status -N at kernels that have large functions inlined
 //   kernel=N       and so does clCreateKernel
 //   khr, nv, amd   the extensions of that vendor that tell devices of one name apart
@@ -265,17 +265,14 @@ cl_int clReleaseMemObject(cl_mem buffer)
 
 cl_int clSetKernelArg(cl_kernel kernel, cl_uint index, size_t size, const void *value)
 {
-    size_t most, count = 0;
     cl_mem buffer = NULL;
     if (size == sizeof buffer && value) memcpy(&buffer, value, size);
     pthread_mutex_lock(&mutex);
-    const size_t place = kernel_find(kernel);
+    bool *is_buffer = &kernels[kernel_find(kernel)].is_buffer[index];
+    *is_buffer = size == sizeof buffer && !buffer;
     for (size_t i = 0; i < BUFFERS_MAX && buffer; i++)
-        if (buffers[i].buffer == buffer) kernels[place].is_buffer[index] = true;
-    for (size_t i = 0; i < ARGUMENTS_MAX; i++)
-        count += kernels[place].is_buffer[i];
+        if (buffers[i].buffer == buffer) *is_buffer = true;
     pthread_mutex_unlock(&mutex);
-    if (limit_get("buffers", &most) && count > most) return CL_OUT_OF_RESOURCES;
     return NEXT(clSetKernelArg)(kernel, index, size, value);
 }
 
@@ -291,17 +288,21 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
                               const size_t *first, const size_t *global, const size_t *local,
                               cl_uint wait_count, const cl_event *wait, cl_event *event)
 {
-    size_t items = 1, group = 1, most;
+    size_t items = 1, group = 1, buffer_count = 0, most;
     for (cl_uint i = 0; i < dimensions; i++) {
         items *= global[i];
         group *= local ? local[i] : 1;
     }
     if (limit_get("group", &most) && group > most) return CL_INVALID_WORK_GROUP_SIZE;
     pthread_mutex_lock(&mutex);
-    size_t *last = &kernels[kernel_find(kernel)].last_items;
+    const size_t place = kernel_find(kernel);
+    size_t *last = &kernels[place].last_items;
     const bool is_too_long = limit_get("first", &most) && items > most && items > 4 * *last;
     *last = items;
+    for (size_t i = 0; i < ARGUMENTS_MAX; i++)
+        buffer_count += kernels[place].is_buffer[i];
     pthread_mutex_unlock(&mutex);
+    if (limit_get("buffers", &most) && buffer_count > most) return CL_OUT_OF_RESOURCES;
     if (is_too_long) return CL_OUT_OF_RESOURCES;
     return NEXT(clEnqueueNDRangeKernel)(queue, kernel, dimensions, first, global, local, wait_count, wait,
                                         event);
