@@ -90,7 +90,7 @@ static bool extensions_have(const char *extensions, const char *name)
     return false;
 }
 
-// Of extensions, by their specifications.
+// The values that the extensions' specifications give their queries.
 enum {
     QUERY_NV_PCI_BUS = 0x4008,
     QUERY_NV_PCI_SLOT = 0x4009, // device and function

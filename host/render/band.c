@@ -121,8 +121,8 @@ static size_t least(size_t a, size_t b)
     return a < b ? a : b;
 }
 
-// Of `left` groups, at most `most`. The last two parts are about equal, since a small launch would slow the
-// growth of the next ones.
+// Returns how many of the `left` groups are next, at most `most`. The last two parts are about equal, since a
+// small launch would slow the growth of the next ones.
 static size_t groups_of_part(size_t most, size_t left)
 {
     return left <= most ? left : left < 2 * most ? (left + 1) / 2 : most;
