@@ -176,7 +176,7 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     *error_count = message_count(&messages, MESSAGE_ERROR);
     if (*error_count) {
         char *expected;
-        assert_true(asprintf(&expected, "'%s' is no report of glint bench --json with schema 5", path) > 0);
+        assert_true(asprintf(&expected, "'%s' is no report of glint bench --json with schema 6", path) > 0);
         assert_string_equal(messages.items[0].text, expected);
         free(expected);
     }
@@ -188,27 +188,33 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
 #define BASELINE_ROW(hash, frames)                                                                           \
     "{\"scene\": \"elsewhere.yaml\", \"scene_hash\": \"" hash                                                \
     "\", \"precision\": \"single\", \"lanes\": 16, \"bvh\": \"auto\", \"samples\": 4, \"bounces\": 5, "      \
-    "\"size\": [40, 30], \"frame_samples_ms\": " frames "}"
+    "\"size\": [40, 30], \"frame_samples_ms\": " frames ", \"processor_samples_ms\": [7, 8]}"
 #define ROW_HASH "abcdef0123456789"
+// What a report starts with.
+#define BASELINE_HEAD "{\"schema\": 6, \"calibration\": {\"rounds\": 1048576}, "
 
 static void test_baseline(void **state)
 {
     (void)state;
     size_t errors;
     Baseline *baseline =
-        baseline_of("{\"schema\": 5, \"device\": {\"name\": \"d\"}, \"host\": {\"name\": \"h\"}, "
-                    "\"calibration_ms\": [1, 1.5], \"runs\": [" BASELINE_ROW(
+        baseline_of("{\"schema\": 6, \"device\": {\"name\": \"d\"}, \"host\": {\"name\": \"h\"}, "
+                    "\"calibration\": {\"rounds\": 1048576, \"samples_ms\": [1, 1.5], "
+                    "\"processor_samples_ms\": [2, 2.5]}, \"runs\": [" BASELINE_ROW(
                         "0000000000000000", "[1, 1]") "," BASELINE_ROW(ROW_HASH, "[90, 91.5]") "]}",
                     &errors);
     assert_non_null(baseline);
     assert_string_equal(baseline_device(baseline), "d");
     assert_string_equal(baseline_host(baseline), "h");
     BenchRow row = row_make();
-    ReportTimes times;
-    assert_true(baseline_find(baseline, &row.key, &times));
-    assert_true(times.frame->count == 2 && times.calibration->count == 2);
-    assert_near(times.frame->items[1], 0.0915, 1e-12);
-    assert_near(times.calibration->items[1], 0.0015, 1e-12);
+    ReportTimes wall, processor;
+    assert_true(baseline_find(baseline, &row.key, &wall, &processor));
+    assert_true(wall.frame->count == 2 && wall.calibration->count == 2);
+    assert_near(wall.frame->items[1], 0.0915, 1e-12);
+    assert_near(wall.calibration->items[1], 0.0015, 1e-12);
+    assert_true(processor.frame->count == 2 && processor.calibration->count == 2);
+    assert_near(processor.frame->items[1], 0.008, 1e-12);
+    assert_near(processor.calibration->items[1], 0.0025, 1e-12);
     BenchKey others[6];
     for (int i = 0; i < 6; i++)
         others[i] = row.key;
@@ -219,7 +225,7 @@ static void test_baseline(void **state)
     others[4].precision = "double";
     others[5].height = 31;
     for (int i = 0; i < 6; i++)
-        assert_false(baseline_find(baseline, &others[i], &times));
+        assert_false(baseline_find(baseline, &others[i], &wall, &processor));
     baseline_close(baseline);
     bench_row_free(&row);
 }
@@ -238,30 +244,30 @@ static void test_broken_baselines(void **state)
     const char *refused[] = {"",
                              "no json: [",
                              "[1, 2]",
-                             "{\"schema\": 4, \"runs\": []}",
-                             "{\"schema\": \"5\", \"runs\": []}",
+                             "{\"schema\": 5, \"runs\": []}",
+                             "{\"schema\": \"6\", \"runs\": []}",
                              "{\"runs\": []}",
                              "\"",
                              "4",
                              "null",
-                             "{\"schema\": 5}",
-                             "{\"schema\": 5, \"runs\": 3}",
-                             "{\"schema\": 5, \"runs\": {}}",
-                             "{\"schema\": 5, \"runs\": []} {}",
-                             "{\"schema\": 5, \"runs\": [],}",
+                             "{\"schema\": 6}",
+                             "{\"schema\": 6, \"runs\": 3}",
+                             "{\"schema\": 6, \"runs\": {}}",
+                             "{\"schema\": 6, \"runs\": []} {}",
+                             "{\"schema\": 6, \"runs\": [],}",
                              "{'schema': 5, 'runs': []}",
-                             "{\"schema\": 5, \"schema\": 5, \"runs\": []}",
-                             "{\"schema\": 5, \"runs\": [1e999]}",
-                             "{\"schema\": 5, \"runs\": [99999999999999999999]}",
-                             "{\"schema\": 5, \"runs\": [NaN]}",
-                             "{\"schema\": 5, \"runs\": [\"\xFF\"]}",
-                             "{\"schema\": 5, \"runs\": [\"\n\"]}",
-                             "{\"schema\": 5, \"runs\": [\"\\u0000\"]}",
-                             "{\"schema\": 5, \"runs\": [\"\\uD800\"]}"};
+                             "{\"schema\": 6, \"schema\": 6, \"runs\": []}",
+                             "{\"schema\": 6, \"runs\": [1e999]}",
+                             "{\"schema\": 6, \"runs\": [99999999999999999999]}",
+                             "{\"schema\": 6, \"runs\": [NaN]}",
+                             "{\"schema\": 6, \"runs\": [\"\xFF\"]}",
+                             "{\"schema\": 6, \"runs\": [\"\n\"]}",
+                             "{\"schema\": 6, \"runs\": [\"\\u0000\"]}",
+                             "{\"schema\": 6, \"runs\": [\"\\uD800\"]}"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
         check_refused(refused[i]);
     // cut short anywhere
-    char whole[] = "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1.5e0, 2]") "]}";
+    char whole[] = BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1.5e0, 2]") "]}";
     for (size_t i = sizeof whole - 1; i-- > 0;) {
         whole[i] = '\0';
         check_refused(whole);
@@ -271,20 +277,20 @@ static void test_broken_baselines(void **state)
     memset(deep, '[', sizeof deep - 1);
     check_refused(deep);
     // rows that say nothing are never found
-    const char *empty[] = {"{\"schema\": 5, \"runs\": [3, null, {}, [], {\"size\": 4}]}",
-                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "{}") "]}",
-                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[]") "]}",
-                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 0]") "]}",
-                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, -1e308]") "]}",
-                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, \"2\"]") "]}",
-                           "{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
+    const char *empty[] = {BASELINE_HEAD "\"runs\": [3, null, {}, [], {\"size\": 4}]}",
+                           BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "{}") "]}",
+                           BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[]") "]}",
+                           BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 0]") "]}",
+                           BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, -1e308]") "]}",
+                           BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, \"2\"]") "]}",
+                           BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
     for (size_t i = 0; i < sizeof empty / sizeof *empty; i++) {
         size_t errors;
-        ReportTimes times;
+        ReportTimes wall, processor;
         Baseline *baseline = baseline_of(empty[i], &errors);
         assert_non_null(baseline);
         assert_string_equal(baseline_device(baseline), "");
-        assert_false(baseline_find(baseline, &row.key, &times));
+        assert_false(baseline_find(baseline, &row.key, &wall, &processor));
         baseline_close(baseline);
     }
     bench_row_free(&row);
@@ -294,7 +300,7 @@ static void baseline_read(void *left)
 {
     size_t errors;
     allocations_left = *(long *)left;
-    baseline_close(baseline_of("{\"schema\": 5, \"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 2]") "]}", &errors));
+    baseline_close(baseline_of(BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, 2]") "]}", &errors));
     *(long *)left = allocations_left;
 }
 

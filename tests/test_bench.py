@@ -51,7 +51,7 @@ class Bench(TestCase):
         process = self.glint(f"bench sphere.yaml {TRIANGLES} {QUICK} --precision single,double --launches --json")
         self.assertEqual(process.stderr, "")
         report = json.loads(process.stdout)
-        self.assertEqual(report["schema"], 5)
+        self.assertEqual(report["schema"], 6)
         self.assertRegex(report["date"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
         self.assertTrue(report["host"]["name"] and report["build"]["compiler"])
         self.assertRegex(report["build"]["commit"], "^([0-9a-f]{40}(-dirty)?|unknown)$")
@@ -79,12 +79,19 @@ class Bench(TestCase):
     def test_comparison(self):
         """A busy machine may take many times as long, but not a million times; the speed of the calibration goes along."""
         report = self.json(f"bench sphere.yaml {QUICK} --json")
-        for times in report["calibration_ms"], report["runs"][0]["frame_samples_ms"]:
+        run, calibration = report["runs"][0], report["calibration"]
+        for times in (run["frame_samples_ms"], run["processor_samples_ms"], calibration["samples_ms"],
+                      calibration["processor_samples_ms"]):
             times[:] = [times[0]] * 20  # enough for an interval
-        report["runs"][0]["scene"] = "moved.yaml"
+        run["scene"] = "moved.yaml"
         write("report", json.dumps(report))
-        report["runs"][0]["frame_samples_ms"] = [1e-6 * time for time in report["runs"][0]["frame_samples_ms"]]
+        times = run["frame_samples_ms"]
+        run["frame_samples_ms"] = [1e-6 * time for time in times]
         write("faster", json.dumps(report))
+        run["frame_samples_ms"], run["processor_samples_ms"] = times, [1e-6 * time for time in run["processor_samples_ms"]]
+        write("less-work", json.dumps(report))
+        calibration["rounds"] //= 2
+        write("other-calibration", json.dumps(report))
         command, long = f"bench sphere.yaml {QUICK} --compare", "--seconds 0.5"
         self.assertRegex(self.glint(f"{command} report {long} --tolerance 1e6").stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
         process = self.glint(f"{command} faster {long} --json", status=3)
@@ -92,6 +99,11 @@ class Bench(TestCase):
         self.assertEqual(comparison["verdict"], "slower")
         self.assertTrue(10 < comparison["low"] <= comparison["ratio"] <= comparison["high"], comparison)
         self.assertRegex(process.stderr, "1 of 1 rows are slower than faster")
+        if report["device"]["type"] == "cpu":
+            process = self.glint(f"{command} less-work {long} --tolerance 1e6", status=3)
+            self.assertRegex(process.stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
+            self.assertRegex(process.stdout, r"(?m)processor time: [0-9.]+ \(.*\): slower by")
+        self.refuses(f"{command} other-calibration", "'other-calibration' was not calibrated by the work of this glint")
         write("sphere.yaml", SPHERE + "# another file\n")
         self.glint(f"{command} report", status=1)  # without a row in common
         self.glint(f"{command} sphere.yaml", status=1)

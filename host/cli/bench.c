@@ -104,11 +104,19 @@ static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
     RowComparison *comparisons = memory_allocate_zeroed(set->count, sizeof *comparisons);
     for (size_t i = 0; i < set->count; i++) {
         const BenchRow *row = &set->rows[i];
-        ReportTimes old_times, new_times = {&row->times.frame, &set->calibration};
-        if (!row->failure && baseline_find(baseline, &row->key, &old_times))
-            comparisons[i].result = comparison_of_reports(new_times, old_times, set->count, tolerance);
-        else
-            comparisons[i].why_not = "the baseline has no such row";
+        ReportTimes old_wall, wall = {&row->times.frame, &set->calibration.wall};
+        ReportTimes old_processor, processor = {&row->times.processor, &set->calibration.processor};
+        RowComparison *comparison = &comparisons[i];
+        if (row->failure || !baseline_find(baseline, &row->key, &old_wall, &old_processor)) {
+            comparison->why_not = "the baseline has no such row";
+            continue;
+        }
+        comparison->has_processor = bench->open.compute.device->type & CL_DEVICE_TYPE_CPU;
+        const size_t count = set->count * (comparison->has_processor ? 2 : 1);
+        comparison->frame = comparison_of_reports(wall, old_wall, count, tolerance);
+        if (comparison->has_processor)
+            comparison->processor = comparison_of_reports(processor, old_processor, count, tolerance);
+        comparison->verdict = verdict_of_both(comparison->frame.verdict, comparison->processor.verdict);
     }
     return comparisons;
 }

@@ -228,9 +228,10 @@ static bool rows_judge(Against *against, size_t look)
     for (size_t i = 0; i < against->set->count; i++) {
         RowComparison *comparison = &against->comparisons[i];
         if (comparison->why_not) continue;
-        comparison->result = comparison_of_pairs(comparison->result, &against->ratios[i], look,
-                                                 against->set->count, against->options->tolerance);
-        decided = decided && comparison->result.verdict != VERDICT_UNDECIDED;
+        comparison->frame = comparison_of_pairs(comparison->frame, &against->ratios[i], look,
+                                                against->set->count, against->options->tolerance);
+        comparison->verdict = comparison->frame.verdict;
+        decided = decided && comparison->verdict != VERDICT_UNDECIDED;
     }
     return decided;
 }

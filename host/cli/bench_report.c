@@ -13,14 +13,9 @@
 #include <time.h>
 #include <unistd.h>
 
-void comparison_print(const RowComparison *comparison, FILE *stream)
+static void ratio_print(const char *of_what, const Comparison *result, FILE *stream)
 {
-    if (comparison->why_not) {
-        fprintf(stream, "    %s\n", comparison->why_not);
-        return;
-    }
-    const Comparison *result = &comparison->result;
-    fprintf(stream, "    new over old frame time: %.3f", result->ratio);
+    fprintf(stream, "    new over old %s time: %.3f", of_what, result->ratio);
     if (isfinite(result->high)) fprintf(stream, " (%.3f to %.3f)", result->low, result->high);
     switch (result->verdict) {
     case VERDICT_UNDECIDED:
@@ -38,13 +33,23 @@ void comparison_print(const RowComparison *comparison, FILE *stream)
     }
 }
 
+void comparison_print(const RowComparison *comparison, FILE *stream)
+{
+    if (comparison->why_not) {
+        fprintf(stream, "    %s\n", comparison->why_not);
+        return;
+    }
+    ratio_print("frame", &comparison->frame, stream);
+    if (comparison->has_processor) ratio_print("processor", &comparison->processor, stream);
+}
+
 int comparisons_status(const RowComparison *comparisons, size_t count, const char *other)
 {
     size_t counts[VERDICT_FASTER + 1] = {0}, compared = 0;
     for (size_t i = 0; i < count; i++) {
         if (comparisons[i].why_not) continue;
         compared++;
-        counts[comparisons[i].result.verdict]++;
+        counts[comparisons[i].verdict]++;
     }
     if (compared == 0) {
         fprintf(stderr, "glint bench: %s has none of these rows\n", other);
@@ -199,16 +204,26 @@ static void launches_json(Json *json, const RenderReport *report)
     json_end(json);
 }
 
+static void ratio_json(Json *json, const Comparison *result)
+{
+    json_number(json, "ratio", result->ratio);
+    json_number(json, "low", result->low);
+    json_number(json, "high", result->high);
+}
+
 void comparison_json(Json *json, const RowComparison *comparison)
 {
     json_begin_object(json, "comparison");
     if (comparison->why_not) {
         unavailable_json(json, comparison->why_not);
     } else {
-        json_text(json, "verdict", verdict_names[comparison->result.verdict]);
-        json_number(json, "ratio", comparison->result.ratio);
-        json_number(json, "low", comparison->result.low);
-        json_number(json, "high", comparison->result.high);
+        json_text(json, "verdict", verdict_names[comparison->verdict]);
+        ratio_json(json, &comparison->frame);
+        if (comparison->has_processor) {
+            json_begin_object(json, "processor");
+            ratio_json(json, &comparison->processor);
+            json_end(json);
+        }
     }
     json_end(json);
 }
@@ -265,6 +280,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);
     samples_json(json, "kernel_samples_ms", bench_doubt(&row->times) ? &row->times.host : &row->times.event);
+    samples_json(json, "processor_samples_ms", &row->times.processor);
     json_begin_object(json, "build_ms");
     figure_json(json, "cold", 1e3, row->build_cold);
     figure_json(json, "cached", 1e3, row->build_cached);
@@ -281,7 +297,11 @@ void bench_print_json(const BenchReport *report)
     Json *json = json_open();
     report_start_json(json);
     report_device_json(json, report);
-    samples_json(json, "calibration_ms", report->calibration);
+    json_begin_object(json, "calibration");
+    json_int64(json, "rounds", CALIBRATION_ROUNDS);
+    samples_json(json, "samples_ms", &report->calibration->wall);
+    samples_json(json, "processor_samples_ms", &report->calibration->processor);
+    json_end(json);
     json_begin_array(json, "runs");
     for (size_t i = 0; i < report->count; i++) {
         const BenchRow *row = &report->rows[i];

@@ -3,14 +3,18 @@
 
 #include "host/base/json.h"
 #include "host/measure/bench.h"
+#include "host/measure/calibration.h"
 #include "host/measure/comparison.h"
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
 // A row's comparison, or why there is none.
 typedef struct {
-    Comparison result;
-    const char *why_not; // NULL: there is a result
+    Comparison frame;     // of frame times
+    Comparison processor; // of the process's processor times
+    bool has_processor;   // with a CPU device, of two reports
+    Verdict verdict;      // of both
+    const char *why_not;  // NULL: there are comparisons
 } RowComparison;
 
 typedef struct {
@@ -19,7 +23,7 @@ typedef struct {
     const BenchRow *rows;
     const RenderReport *const *reports; // of each row's last run, for --launches; or NULL
     size_t count;
-    const Series *calibration;
+    const Calibration *calibration;
     const RowComparison *comparisons; // of each row with the baseline; or NULL
 } BenchReport;
 

@@ -173,11 +173,11 @@ bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds)
 }
 
 // Until the times converge, but a benchmark for a fifth of its time at least, to see other work come and go.
-static bool rounds_run(VariantSet *set, double seconds, Calibration *calibration, Progress *progress)
+static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progress *progress)
 {
     double start = clock_seconds(), spent = 0;
-    while (spent < seconds && ((calibration && spent < seconds / 5) || !all_converged(set))) {
-        if (calibration) series_add(&set->calibration, calibration_seconds(calibration));
+    while (spent < seconds && ((is_benchmark && spent < seconds / 5) || !all_converged(set))) {
+        if (is_benchmark) calibration_run(&set->calibration);
         if (!variant_set_round(set, false)) return false;
         spent = clock_seconds() - start;
         progress_show(progress, fmin(spent / seconds, 1));
@@ -190,9 +190,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
 {
     if (!variant_set_start(set, compute, is_benchmark)) return false;
     double seconds = options->seconds > 0 ? options->seconds : 5 * (double)set->count;
-    Calibration *calibration = is_benchmark ? calibration_open(compute) : NULL;
-    bool whole = rounds_run(set, seconds, calibration, progress);
-    calibration_close(calibration);
+    bool whole = rounds_run(set, seconds, is_benchmark, progress);
     for (size_t i = 0; i < set->count && whole; i++)
         if (set->variants[i].renderer)
             set->rows[i].kernel_hash = renderer_report(set->variants[i].renderer)->kernel_hash;
@@ -218,6 +216,6 @@ void variant_set_close(VariantSet *set)
     free(set->variants);
     free(set->rows);
     free(set->scene_indices);
-    series_free(&set->calibration);
+    calibration_free(&set->calibration);
     *set = (VariantSet){0};
 }

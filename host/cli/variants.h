@@ -5,6 +5,7 @@
 #include "host/cli/bench_variant.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
+#include "host/measure/calibration.h"
 
 enum { SAMPLE_CHOICES_MAX = 16 };
 
@@ -62,7 +63,7 @@ typedef struct {
     BenchRow *rows;
     size_t *scene_indices;
     size_t count;
-    Series calibration; // seconds, before each round of a benchmark
+    Calibration calibration; // before each round of a benchmark
 } VariantSet;
 
 // Reads the scenes. False with a message if one cannot be read; the set must still be closed.

@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/measure/calibration.h"
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
@@ -12,7 +13,7 @@
 typedef struct {
     const char *scene_hash, *precision, *bvh;
     uint32_t lanes, width, height, samples, bounces;
-    Series frame;
+    Series frame, processor;
 } BaselineRow;
 
 enum { HASH_DIGITS = 16 };
@@ -21,7 +22,7 @@ struct Baseline {
     BaselineRow *items;
     size_t count, capacity;
     json_t *report; // owns the rows' texts
-    Series calibration;
+    Calibration calibration;
 };
 
 // Returns "" where there is no text.
@@ -73,6 +74,7 @@ static void rows_read(Baseline *baseline, const json_t *runs)
             .samples = count_of(json_object_get(run, "samples")),
             .bounces = count_of(json_object_get(run, "bounces")),
             .frame = times_of(json_object_get(run, "frame_samples_ms")),
+            .processor = times_of(json_object_get(run, "processor_samples_ms")),
         };
         array_push(*baseline, row);
     }
@@ -101,9 +103,19 @@ Baseline *baseline_open(const char *path, MessageList *messages)
         json_decref(report);
         return NULL;
     }
+    const json_t *calibration = json_object_get(report, "calibration");
+    if (json_number_value(json_object_get(calibration, "rounds")) != CALIBRATION_ROUNDS) {
+        message_error(messages, "'%s' was not calibrated by the work of this glint, %d rounds", path,
+                      CALIBRATION_ROUNDS);
+        json_decref(report);
+        return NULL;
+    }
     Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);
     baseline->report = report;
-    baseline->calibration = times_of(json_object_get(report, "calibration_ms"));
+    baseline->calibration = (Calibration){
+        .wall = times_of(json_object_get(calibration, "samples_ms")),
+        .processor = times_of(json_object_get(calibration, "processor_samples_ms")),
+    };
     rows_read(baseline, runs);
     return baseline;
 }
@@ -111,10 +123,12 @@ Baseline *baseline_open(const char *path, MessageList *messages)
 void baseline_close(Baseline *baseline)
 {
     if (!baseline) return;
-    for (size_t i = 0; i < baseline->count; i++)
+    for (size_t i = 0; i < baseline->count; i++) {
         series_free(&baseline->items[i].frame);
+        series_free(&baseline->items[i].processor);
+    }
     free(baseline->items);
-    series_free(&baseline->calibration);
+    calibration_free(&baseline->calibration);
     json_decref(baseline->report);
     free(baseline);
 }
@@ -134,7 +148,7 @@ const char *baseline_host(const Baseline *baseline)
     return text_of(json_object_get(json_object_get(baseline->report, "host"), "name"));
 }
 
-bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *times)
+bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor)
 {
     char hash[HASH_DIGITS + 1];
     snprintf(hash, sizeof hash, "%016" PRIx64, key->scene_hash);
@@ -145,7 +159,8 @@ bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *t
             row->height != key->height || row->samples != key->samples || row->bounces != key->bounces ||
             row->frame.count == 0)
             continue;
-        *times = (ReportTimes){&row->frame, &baseline->calibration};
+        *wall = (ReportTimes){&row->frame, &baseline->calibration.wall};
+        *processor = (ReportTimes){&row->processor, &baseline->calibration.processor};
         return true;
     }
     return false;

@@ -7,9 +7,10 @@
 
 typedef struct Baseline Baseline;
 
-enum { BENCH_SCHEMA = 5 }; // of the reports
+enum { BENCH_SCHEMA = 6 }; // of the reports
 
-// Reads a file that glint bench --json wrote; NULL with a message where it is none.
+// Reads a file that glint bench --json wrote; NULL with a message where it is none, or was calibrated by
+// other work.
 Baseline *baseline_open(const char *path, MessageList *messages);
 void baseline_close(Baseline *baseline);
 // Names of the device, its board and the host, or "" where the report has none.
@@ -17,5 +18,6 @@ const char *baseline_device(const Baseline *baseline);
 const char *baseline_board(const Baseline *baseline);
 const char *baseline_host(const Baseline *baseline);
 
-// The times of the row with this key, but for the scene's path; false: the baseline has none.
-bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *times);
+// The wall and processor times of the row with this key, but for the scene's path; false: the baseline has
+// none.
+bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor);

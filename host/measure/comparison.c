@@ -132,3 +132,11 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
     covering.high += log(process_allowance);
     return comparison_judge(log_ratio, covering, tolerance);
 }
+
+Verdict verdict_of_both(Verdict one, Verdict other)
+{
+    static const Verdict strongest_first[] = {VERDICT_SLOWER, VERDICT_FASTER, VERDICT_SAME};
+    for (size_t i = 0; i < sizeof strongest_first / sizeof *strongest_first; i++)
+        if (one == strongest_first[i] || other == strongest_first[i]) return strongest_first[i];
+    return VERDICT_UNDECIDED;
+}

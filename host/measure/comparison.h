@@ -41,7 +41,8 @@ Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, siz
 // The logarithm of new over old time of one pair: the median over its rounds, in each of which both ran.
 double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds);
 
-// What one report knows of a row: run i took frame[i] right after the calibration took calibration[i].
+// What one report knows of a row, by one clock: run i took frame[i] right after the calibration took
+// calibration[i].
 typedef struct {
     const Series *frame, *calibration;
 } ReportTimes;
@@ -51,3 +52,7 @@ typedef struct {
 // of that. It is wider by an allowance for what differs between two processes, which a report cannot know.
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance);
+
+// A row's, of two comparisons by different clocks: slower or faster as soon as one of them is, the same as
+// soon as one of them is.
+Verdict verdict_of_both(Verdict one, Verdict other);

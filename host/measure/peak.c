@@ -1,12 +1,10 @@
 #include "host/measure/peak.h"
 
 #include "host/base/clock.h"
-#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <math.h>
-#include <stdlib.h>
 
-static const double launch_seconds_wanted = 0.03, calibration_seconds_wanted = 0.001;
+static const double launch_seconds_wanted = 0.03;
 static const double window_seconds = 0.1, seconds_max = 1;
 static const double stable_ratio = 1.03;
 
@@ -92,20 +90,6 @@ static void arithmetic_open(Arithmetic *arithmetic, Compute *compute, bool is_do
     kernel_argument(compute, arithmetic->kernel, 3, sizeof(cl_mem), &arithmetic->results);
 }
 
-static LaunchTime arithmetic_launch(Arithmetic *arithmetic, Compute *compute)
-{
-    kernel_argument(compute, arithmetic->kernel, 0, sizeof arithmetic->rounds, &arithmetic->rounds);
-    return kernel_launch(compute, arithmetic->kernel, 1, &arithmetic->items, &arithmetic->group);
-}
-
-// More rounds for the next launch if one took less than `wanted`.
-static bool arithmetic_lengthen(Arithmetic *arithmetic, double seconds, double wanted)
-{
-    if (seconds >= wanted || arithmetic->rounds >= 1u << 28) return false;
-    arithmetic->rounds *= 2;
-    return true;
-}
-
 static void arithmetic_close(Arithmetic *arithmetic, Compute *compute)
 {
     program_store(compute, &arithmetic->request, &arithmetic->program);
@@ -119,10 +103,11 @@ static void arithmetic_close(Arithmetic *arithmetic, Compute *compute)
 static double arithmetic_rate(Peak *peak, Compute *compute, void *context)
 {
     Arithmetic *arithmetic = context;
-    LaunchTime time = arithmetic_launch(arithmetic, compute);
+    kernel_argument(compute, arithmetic->kernel, 0, sizeof arithmetic->rounds, &arithmetic->rounds);
+    LaunchTime time = kernel_launch(compute, arithmetic->kernel, 1, &arithmetic->items, &arithmetic->group);
     double seconds = launch_seconds(peak, &time);
     double flops = (double)arithmetic->items * arithmetic->lanes * arithmetic->rounds * FLOPS_OF_ROUND;
-    arithmetic_lengthen(arithmetic, seconds, launch_seconds_wanted);
+    if (seconds < launch_seconds_wanted && arithmetic->rounds < 1u << 28) arithmetic->rounds *= 2;
     return flops / seconds;
 }
 
@@ -178,34 +163,4 @@ void peak_measure(Peak *peak, Compute *compute, bool with_double, double seconds
         if (!is_double) copy_measure(peak, compute, &arithmetic.program);
         arithmetic_close(&arithmetic, compute);
     }
-}
-
-struct Calibration {
-    Arithmetic arithmetic;
-    Compute *compute;
-};
-
-Calibration *calibration_open(Compute *compute)
-{
-    Calibration *calibration = memory_allocate_zeroed(1, sizeof *calibration);
-    calibration->compute = compute;
-    arithmetic_open(&calibration->arithmetic, compute, false);
-    calibration_seconds(calibration); // a driver may finish the build in the first launch
-    while (compute_ok(compute) &&
-           arithmetic_lengthen(&calibration->arithmetic, calibration_seconds(calibration),
-                               calibration_seconds_wanted))
-        ;
-    return calibration;
-}
-
-double calibration_seconds(Calibration *calibration)
-{
-    return arithmetic_launch(&calibration->arithmetic, calibration->compute).host_seconds;
-}
-
-void calibration_close(Calibration *calibration)
-{
-    if (!calibration) return;
-    arithmetic_close(&calibration->arithmetic, calibration->compute);
-    free(calibration);
 }

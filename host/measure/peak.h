@@ -27,11 +27,3 @@ typedef struct {
 void peak_windows_add(PeakWindows *windows, double rate);
 // Whether the three best rates agree within 3 %.
 bool peak_windows_stable(const PeakWindows *windows);
-
-// A short launch of the arithmetic that the peak is measured by; its time follows the machine's speed.
-typedef struct Calibration Calibration;
-
-// Closed by calibration_close, also where the device failed.
-Calibration *calibration_open(Compute *compute);
-double calibration_seconds(Calibration *calibration); // of one launch, by the host's clock
-void calibration_close(Calibration *calibration);     // accepts NULL
