@@ -168,7 +168,7 @@ $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(text)' | cmp -s - $@ || printf '%s\n' '$(text)' > $@
 
-tests: $(tests)
+tests: $(tests) kernel_text
 
 test:
 	+@tools/run_tests $(BUILD)

@@ -86,6 +86,19 @@ def need_device():
     return next(device for device in json.loads(process.stdout)["devices"] if device["default"])
 
 
+def need_clang(tool):
+    """Builds what one of tools/ needs to compile kernels by clang; returns the version of clang. Skips the whole test
+    where there is no clang, and for a sanitized build, whose kernels are those of the plain one."""
+    if IS_SANITIZED:
+        skip_all("the plain build's kernels are the same")
+    process = subprocess.run([ROOT / "tools" / tool, "--clang"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if process.returncode == 77:
+        skip_all(process.stdout)
+    build = os.environ.get("BUILD", PROGRAM.parent)
+    subprocess.run([os.environ.get("MAKE", "make"), "-s", f"BUILD={build}", "kernel_text"], cwd=ROOT, check=True)
+    return int(process.stdout)
+
+
 def need_modules(*modules):
     """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip; skips it where there is none."""
     if all(importlib.util.find_spec(module.partition("=")[0]) for module in modules):

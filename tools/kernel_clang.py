@@ -1,0 +1,55 @@
+"""Compiles the kernels by clang for one ray per work-item, for tools/gpu-resources."""
+import functools
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = Path(os.environ.get("BUILD", ROOT / "build"))
+OLDEST_CLANG, NEWEST_CLANG = 15, 40
+FIRST_FILE = '#line 1 "render.cl"'  # follows the scene's definitions
+# __OPENCL_VERSION__ is the drivers' to define.
+OPTIONS = ["-x", "cl", "-cl-std=CL1.2", "-D__OPENCL_VERSION__=120", "-Xclang", "-finclude-default-header", "-w",
+           "-I", ROOT / "kernels"]
+
+
+def fail(message, status=1):
+    print(f"{Path(sys.argv[0]).name}: {message}", file=sys.stderr)
+    sys.exit(status)
+
+
+def run(*command):
+    """Returns what a command printed to both its outputs."""
+    process = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if process.returncode != 0:
+        fail(f"{' '.join(map(str, command))} failed:\n{process.stdout}")
+    return process.stdout
+
+
+def clang_version(needs, is_usable):
+    """Returns the newest usable version of clang. Where there is none, exits with 77 and a message that names the needs."""
+    for version in range(NEWEST_CLANG, OLDEST_CLANG - 1, -1):
+        if shutil.which(f"clang-{version}") and is_usable(version):
+            return version
+    return fail(f"needs clang-N, N being {OLDEST_CLANG} or more, and {needs}", 77)
+
+
+def clang(version, source, output, *options):
+    return run(f"clang-{version}", *OPTIONS, *options, "-o", output, source)
+
+
+@functools.lru_cache(maxsize=None)
+def scene_definitions(path, precision):
+    text = run(BUILD / "tools/kernel_text", path, precision)
+    return text[:text.index(FIRST_FILE)]
+
+
+def kernel_write(name, kernel, folder):
+    """Writes the program that compiles a file of kernels/, such as "render", for SCENE[:PRECISION]; returns its path."""
+    scene, _, precision = name.partition(":")
+    path = scene if "/" in scene else ROOT / f"scenes/{scene}.yaml"
+    source = Path(folder) / f"program-{kernel}.cl"
+    source.write_text(f'{scene_definitions(path, precision or "single")}\n#include "{kernel}.cl"\n')
+    return source
