@@ -155,7 +155,7 @@ $(BUILD)/fuzz: $(fuzz_objects)
 # What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.
 features: $(BUILD)/tools/features
 
-# The kernel's text, for tools/gpu-resources.
+# The kernel's text, for tools/gpu-resources and tools/spirv-form.
 kernel_text: $(BUILD)/tools/kernel_text
 
 $(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)

@@ -1,4 +1,4 @@
-"""Compiles the kernels by clang for one ray per work-item, for tools/gpu-resources."""
+"""Compiles the kernels by clang for one ray per work-item, for tools/gpu-resources and tools/spirv-form."""
 import functools
 import os
 import shutil
