@@ -29,6 +29,8 @@ clean() {
     fi
 }
 
+# A passport is kept for the runs that follow. Oclgrind's checks slow it fivefold, so only long tests check its kernel.
+is_long || oclgrind --build-options -cl-opt-disable "$GLINT" devices --probe >/dev/null
 scene=tests/scenes/every_shape.yaml
 size=8x5 small=4x3
 is_long && size=16x9 small=7x5
