@@ -123,6 +123,18 @@ static void test_zeros_of_two_signs_differ(void **state)
     assert_false(metrics.has_color);
 }
 
+static void test_ulp_distance(void **state)
+{
+    (void)state;
+    const double inf = (double)INFINITY, nan = (double)NAN;
+    assert_true(ulp_distance(1, 1 + 0x1p-23, false) == 1 && ulp_distance(1, 1 - 0x1p-24, false) == 0.5);
+    assert_true(ulp_distance(-2, -2 - 0x1p-51, true) == 1);
+    assert_true(ulp_distance(0, 0x1p-149, false) == 1 && ulp_distance(0x1p-140, 0, false) == 0x1p9);
+    assert_true(ulp_distance(0, -0x1p-1074, true) == 1 && ulp_distance(0, -0.0, true) == 0);
+    assert_true(ulp_distance(inf, inf, true) == 0 && ulp_distance(nan, -nan, true) == 0);
+    assert_true(isinf(ulp_distance(inf, -inf, true)) && isinf(ulp_distance(1, nan, true)));
+}
+
 static void test_summary_by_hand(void **state)
 {
     (void)state;
@@ -184,15 +196,11 @@ static void test_heatmap_rises(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_equal_images),
-        cmocka_unit_test(test_one_black_pixel),
-        cmocka_unit_test(test_one_step_lighter),
-        cmocka_unit_test(test_black_and_white),
-        cmocka_unit_test(test_what_is_not_finite),
-        cmocka_unit_test(test_zeros_of_two_signs_differ),
-        cmocka_unit_test(test_summary_by_hand),
-        cmocka_unit_test(test_percentile),
-        cmocka_unit_test(test_kinds_that_do_not_compare),
+        cmocka_unit_test(test_equal_images),       cmocka_unit_test(test_one_black_pixel),
+        cmocka_unit_test(test_one_step_lighter),   cmocka_unit_test(test_black_and_white),
+        cmocka_unit_test(test_what_is_not_finite), cmocka_unit_test(test_zeros_of_two_signs_differ),
+        cmocka_unit_test(test_ulp_distance),       cmocka_unit_test(test_summary_by_hand),
+        cmocka_unit_test(test_percentile),         cmocka_unit_test(test_kinds_that_do_not_compare),
         cmocka_unit_test(test_heatmap_rises),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

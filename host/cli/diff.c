@@ -12,9 +12,24 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON };
+typedef enum { LIMIT_RMSE, LIMIT_FLIP, LIMIT_OFF, LIMIT_ULP, LIMIT_COUNT } LimitType;
+
+static const struct {
+    const char *name, *option, *quantity, *without; // without: what an image that has no such figure lacks
+} limit_types[LIMIT_COUNT] = {
+    [LIMIT_RMSE] = {"rmse", "max-rmse", "RMSE", NULL},
+    [LIMIT_FLIP] = {"flip", "max-flip", "mean FLIP", "colors"},
+    [LIMIT_OFF] = {"off", "max-off", "differing 8-bit values", "colors"},
+    [LIMIT_ULP] = {"ulp", "max-ulp", "ulp", "floating-point values"},
+};
+
+enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON, OPTION_LIMIT };
 
 static const struct option long_options[] = {
+    {"max-rmse", required_argument, NULL, OPTION_LIMIT + LIMIT_RMSE},
+    {"max-flip", required_argument, NULL, OPTION_LIMIT + LIMIT_FLIP},
+    {"max-off", required_argument, NULL, OPTION_LIMIT + LIMIT_OFF},
+    {"max-ulp", required_argument, NULL, OPTION_LIMIT + LIMIT_ULP},
     {"heatmap", required_argument, NULL, OPTION_HEATMAP},
     {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},
     {"json", no_argument, NULL, OPTION_JSON},
@@ -24,14 +39,19 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
-    "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal; 3: "
-    "different.\n\n"
+    "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal, or "
+    "within\nall limits that are given; 3: different, or beyond a limit.\n\n"
+    "      --max-rmse E      allow this RMSE, in linear light or in the units of other arrays\n"
+    "      --max-flip E      allow this mean FLIP\n"
+    "      --max-off N       allow N differing 8-bit sRGB values, of 3 in each pixel of a color image\n"
+    "      --max-ulp N       allow N units in the last place of any value of EXR or NPY, such as distances\n"
     "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_MAX_PIXELS
         HELP_JSON HELP_HELP;
 
 typedef struct {
     const char *reference_path, *test_path, *heatmap_path;
-    bool as_json;
+    bool as_json, has_limits, has_limit[LIMIT_COUNT];
+    double limits[LIMIT_COUNT];
 } DiffOptions;
 
 typedef struct {
@@ -53,6 +73,68 @@ static void worst_json(Json *json, const char *key, const Comparison *comparison
     for (uint32_t i = 0; i < image->channels; i++)
         json_number(json, NULL, worst_value(comparison, image, i));
     json_end(json);
+}
+
+// Returns what the limit bounds; requires limit_applies.
+static double limited_value(const ImageMetrics *metrics, LimitType type)
+{
+    switch (type) {
+    case LIMIT_RMSE:
+        return metrics->linear.rmse;
+    case LIMIT_FLIP:
+        return metrics->flip_mean;
+    case LIMIT_OFF:
+        return (double)(metrics->off_by_1 + metrics->off_by_more);
+    default:
+        return metrics->largest_ulp;
+    }
+}
+
+static bool limit_applies(const ImageMetrics *metrics, LimitType type)
+{
+    return type == LIMIT_RMSE || (type == LIMIT_ULP ? metrics->has_ulp : metrics->has_color);
+}
+
+// The figures leave out values that are finite in one image alone, so these exceed every limit.
+static bool limit_is_met(const DiffOptions *options, const ImageMetrics *metrics, LimitType type)
+{
+    return metrics->unmatched_count == 0 && limited_value(metrics, type) <= options->limits[type];
+}
+
+static bool limits_are_met(const DiffOptions *options, const ImageMetrics *metrics)
+{
+    bool met = true;
+    for (unsigned i = 0; i < LIMIT_COUNT; i++)
+        met &= !options->has_limit[i] || limit_is_met(options, metrics, i);
+    return met;
+}
+
+static void limits_json(Json *json, const DiffOptions *options, const ImageMetrics *metrics)
+{
+    if (!options->has_limits) return;
+    json_begin_object(json, "limits");
+    for (unsigned i = 0; i < LIMIT_COUNT; i++) {
+        if (!options->has_limit[i]) continue;
+        json_begin_object(json, limit_types[i].name);
+        json_number(json, "limit", options->limits[i]);
+        json_number(json, "value", limited_value(metrics, i));
+        json_bool(json, "met", limit_is_met(options, metrics, i));
+        json_end(json);
+    }
+    json_end(json);
+    json_bool(json, "met", limits_are_met(options, metrics));
+}
+
+static void limits_print(const DiffOptions *options, const ImageMetrics *metrics)
+{
+    for (unsigned i = 0; i < LIMIT_COUNT; i++)
+        if (options->has_limit[i])
+            printf("  %-10s --%s %.6g: %s %.6g\n", limit_is_met(options, metrics, i) ? "met" : "exceeded",
+                   limit_types[i].option, options->limits[i], limit_types[i].quantity,
+                   limited_value(metrics, i));
+    if (options->has_limits && metrics->unmatched_count > 0)
+        printf("  exceeded   every limit: %zu %s not finite and not the same in both\n",
+               metrics->unmatched_count, metrics->unmatched_count == 1 ? "value is" : "values are");
 }
 
 static const char *kind_word(const Image *image)
@@ -77,6 +159,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_int64(json, "reference", (int64_t)metrics->nonfinite_reference);
     json_int64(json, "image", (int64_t)metrics->nonfinite_test);
     json_end(json);
+    json_int64(json, "unmatched_values", (int64_t)metrics->unmatched_count);
     json_begin_object(json, "linear");
     json_int64(json, "values", (int64_t)metrics->linear.count);
     json_number(json, "max_abs", metrics->linear.largest);
@@ -86,6 +169,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
     json_number(json, "psnr", metrics->linear.psnr);
     json_number(json, "rel_mse", metrics->linear.rel_mse);
     json_end(json);
+    if (metrics->has_ulp) json_number(json, "max_ulp", metrics->largest_ulp);
     if (metrics->has_color) {
         json_begin_object(json, "srgb8");
         json_number(json, "psnr", metrics->srgb_psnr);
@@ -111,6 +195,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
         json_number(json, "black", metrics->linear.largest * pow(10, -HEATMAP_DECADES));
         json_end(json);
     }
+    limits_json(json, options, metrics);
     json_print(json, stdout);
 }
 
@@ -121,26 +206,15 @@ static void worst_print(const Comparison *comparison, const Image *image)
         printf(" %.*g", image->doubles ? 17 : 9, worst_value(comparison, image, i));
 }
 
-static void text_print(const DiffOptions *options, const Comparison *comparison)
+static void differences_print(const DiffOptions *options, const Comparison *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
     const ErrorSummary *linear = &metrics->linear;
     const Image *reference = &comparison->reference;
-    size_t value_count = (size_t)reference->width * reference->height * reference->channels;
-    printf("%s, %s: %ux%u, %u %s of %s\n", options->reference_path, options->test_path, reference->width,
-           reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
-           image_kind(reference));
-    if (metrics->differing_count == 0)
-        printf("  equal, bit for bit\n");
-    else
-        printf("  %zu of %zu values differ\n", metrics->differing_count, value_count);
-    if (metrics->nonfinite_reference + metrics->nonfinite_test > 0)
-        printf("  nonfinite pixels: %zu and %zu; excluded from the figures\n", metrics->nonfinite_reference,
-               metrics->nonfinite_test);
-    if (metrics->differing_count == 0) return;
     printf("  %-10s max %.4g, RMSE %.4g, bias %+.4g, 99.9 %% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
            reference->data ? "data" : "light", linear->largest, linear->rmse, linear->bias,
            linear->percentile_999, linear->rel_mse, linear->psnr);
+    if (reference->data && metrics->has_ulp) printf("  ulp        at most %.4g\n", metrics->largest_ulp);
     if (metrics->has_color) {
         printf("  8-bit sRGB %zu values differ by 1, %zu by more, PSNR %.2f dB\n", metrics->off_by_1,
                metrics->off_by_more, metrics->srgb_psnr);
@@ -155,6 +229,25 @@ static void text_print(const DiffOptions *options, const Comparison *comparison)
     if (options->heatmap_path)
         printf("  heat map   %s: logarithmic, white %.3g, black %.3g or less, red nonfinite\n",
                options->heatmap_path, linear->largest, linear->largest * pow(10, -HEATMAP_DECADES));
+}
+
+static void text_print(const DiffOptions *options, const Comparison *comparison)
+{
+    const ImageMetrics *metrics = &comparison->metrics;
+    const Image *reference = &comparison->reference;
+    size_t value_count = (size_t)reference->width * reference->height * reference->channels;
+    printf("%s, %s: %ux%u, %u %s of %s\n", options->reference_path, options->test_path, reference->width,
+           reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
+           image_kind(reference));
+    if (metrics->differing_count == 0)
+        printf("  equal, bit for bit\n");
+    else
+        printf("  %zu of %zu values differ\n", metrics->differing_count, value_count);
+    if (metrics->nonfinite_reference + metrics->nonfinite_test > 0)
+        printf("  nonfinite pixels: %zu and %zu; excluded from the figures\n", metrics->nonfinite_reference,
+               metrics->nonfinite_test);
+    if (metrics->differing_count > 0) differences_print(options, comparison);
+    limits_print(options, metrics);
 }
 
 static bool heatmap_make(const DiffOptions *options, const Comparison *comparison, MessageList *messages)
@@ -175,7 +268,25 @@ static bool images_compare(const DiffOptions *options, Comparison *comparison, M
         !image_comparable(&comparison->reference, &comparison->test, messages))
         return false;
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
+    for (unsigned i = 0; i < LIMIT_COUNT; i++)
+        if (options->has_limit[i] && !limit_applies(&comparison->metrics, i))
+            return message_error(messages, "--%s: \"%s\" has no %s to compare", limit_types[i].option,
+                                 options->reference_path, limit_types[i].without);
     return !options->heatmap_path || heatmap_make(options, comparison, messages);
+}
+
+static bool limit_read(DiffOptions *options, LimitType type, const char *value)
+{
+    char *end;
+    const double limit = strtod(value, &end);
+    if (end == value || *end != '\0' || !(limit >= 0 && isfinite(limit))) {
+        fprintf(stderr, "glint: --%s: expected a number, 0 or more, not \"%s\"\n", limit_types[type].option,
+                value);
+        return false;
+    }
+    options->limits[type] = limit;
+    options->has_limits = options->has_limit[type] = true;
+    return true;
 }
 
 int command_diff(int argument_count, char **arguments)
@@ -191,6 +302,12 @@ int command_diff(int argument_count, char **arguments)
             break;
         case OPTION_MAX_PIXELS:
             if (!option_max_pixels(optarg)) return EXIT_USER;
+            break;
+        case OPTION_LIMIT + LIMIT_RMSE:
+        case OPTION_LIMIT + LIMIT_FLIP:
+        case OPTION_LIMIT + LIMIT_OFF:
+        case OPTION_LIMIT + LIMIT_ULP:
+            if (!limit_read(&options, (LimitType)(option - OPTION_LIMIT), optarg)) return EXIT_USER;
             break;
         case 'h':
             return option_help(help_text);
@@ -215,5 +332,7 @@ int command_diff(int argument_count, char **arguments)
     image_free(&comparison.reference);
     image_free(&comparison.test);
     if (!compared) return EXIT_USER;
-    return comparison.metrics.differing_count == 0 ? EXIT_DONE : EXIT_CHECK;
+    const bool passes = options.has_limits ? limits_are_met(&options, &comparison.metrics)
+                                           : comparison.metrics.differing_count == 0;
+    return passes ? EXIT_DONE : EXIT_CHECK;
 }

@@ -58,6 +58,7 @@ typedef struct {
     Transfer transfer;
     bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
     bool data;       // no light: NPY of other than 3 channels, EXR without colors and luminance
+    bool integers;   // NPY of <u4 or |u1, such as numbers of objects
     double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL
 } Image;
 // Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message

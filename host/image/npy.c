@@ -135,6 +135,7 @@ static bool npy_dictionary_decode(Image *image, const ImageFile *file, const cha
         image->values[i] = (float)value;
     }
     image->data = image->channels != 3;
+    image->integers = type == NPY_UINT32 || type == NPY_UINT8;
     return true;
 }
 

@@ -4,6 +4,7 @@
 #include "host/base/percentile.h"
 #include "host/image/srgb.h"
 #include "host/measure/flip.h"
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -160,6 +161,36 @@ static void worst_find(ImageMetrics *metrics, const Image *reference, const Imag
     free(errors);
 }
 
+static bool is_same_number(double a, double b)
+{
+    return a == b || (isnan(a) && isnan(b));
+}
+
+double ulp_distance(double expected, double found, bool is_double)
+{
+    if (is_same_number(expected, found)) return 0;
+    if (!isfinite(expected) || !isfinite(found)) return INFINITY;
+    const int digits = is_double ? DBL_MANT_DIG : FLT_MANT_DIG, least = is_double ? DBL_MIN_EXP : FLT_MIN_EXP;
+    int exponent;
+    if (frexp(expected, &exponent) == 0 || exponent < least) exponent = least;
+    return ldexp(fabs(found - expected), digits - exponent);
+}
+
+static void values_compare(ImageMetrics *metrics, const Image *reference, const Image *test)
+{
+    const bool is_double = reference->doubles && test->doubles;
+    metrics->has_ulp = !reference->display && !reference->integers && !test->integers;
+    for (size_t i = 0; i < value_count(reference); i++) {
+        const double expected = image_value(reference, i), found = image_value(test, i);
+        if (memcmp(&expected, &found, sizeof expected) == 0) continue;
+        metrics->differing_count++;
+        if ((!isfinite(expected) || !isfinite(found)) && !is_same_number(expected, found))
+            metrics->unmatched_count++;
+        if (metrics->has_ulp)
+            metrics->largest_ulp = fmax(metrics->largest_ulp, ulp_distance(expected, found, is_double));
+    }
+}
+
 ImageMetrics image_metrics(const Image *reference, const Image *test)
 {
     ImageMetrics metrics = {
@@ -168,10 +199,7 @@ ImageMetrics image_metrics(const Image *reference, const Image *test)
         .has_color = !reference->data &&
                      (reference->channels == 3 || (reference->channels == 1 && reference->display)),
     };
-    for (size_t i = 0; i < value_count(reference); i++) {
-        double expected = image_value(reference, i), found = image_value(test, i);
-        metrics.differing_count += memcmp(&expected, &found, sizeof expected) != 0;
-    }
+    values_compare(&metrics, reference, test);
     double *expected = linear_values(reference), *found = linear_values(test);
     metrics.linear = error_summarize(expected, found, value_count(reference));
     free(expected);

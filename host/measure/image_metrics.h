@@ -20,14 +20,22 @@ ErrorSummary error_summarize(const double *reference, const double *test, size_t
 typedef struct {
     size_t differing_count;                     // values whose bits differ, at the files' own width
     size_t nonfinite_reference, nonfinite_test; // pixels
-    ErrorSummary linear;                        // of light, or of data as they are
-    uint32_t worst_x, worst_y;                  // where the largest difference is, or one of a number to none
+    size_t unmatched_count;    // values of which one is NaN or infinite and the other differs
+    ErrorSummary linear;       // of light, or of data as they are
+    uint32_t worst_x, worst_y; // where the largest difference is, or one of a number to none
+    // of floats and doubles from EXR and NPY only
+    bool has_ulp;
+    double largest_ulp; // see ulp_distance; infinite where a value is unmatched
     // of colors only
     bool has_color;
     double srgb_psnr;             // of 8-bit display values, dB
     size_t off_by_1, off_by_more; // 8-bit display values
     double flip_mean, flip_max;
 } ImageMetrics;
+
+// Returns the distance in units in the last place of `expected`, as a double or as a float: 0.5 at most where
+// the nearest value of the type was found. 0 if both are NaN or the same infinity; infinite if only one is.
+double ulp_distance(double expected, double found, bool is_double);
 
 const char *image_kind(const Image *image); // what the values are: "display values", "linear light", "data"
 // False, with an error message, where the two differ in size or kind, so that there is nothing to compare.
