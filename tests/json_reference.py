@@ -133,6 +133,10 @@ MEANINGS = {
     "{launches[],read_backs[]}.name": "text; kernel, or `read-back`",
     "{launches[],read_backs[]}.event_ms": "number or null or figure; the device's clock, where trusted",
     "{launches[],read_backs[]}.host_ms": "number; the host's clock",
+    "{launches[],read_backs[]}.{queued_ms,submitted_ms,start_ms,end_ms}": "number or null; by the device's clock, where trusted and reported, since its first command was queued",
+    "{launches[],read_backs[]}.global": "count; work-items in each dimension",
+    "{launches[],read_backs[]}.local": "count; work-items of a group in each dimension",
+    "build_options": "text; that the kernels were compiled with",
     "{launches[],read_backs[]}.doubt": "text; why the device's clock is not trusted",
     # check
     "valid": "boolean; if not, only the messages follow",

@@ -101,7 +101,24 @@ class Json(TestCase):
         outputs = [self.json(f"render plain.yaml {SMALL} {budget}--aov t,path --timing=json")]
         if fp64:
             outputs.append(self.json(f"render plain.yaml {SMALL} --precision certified --timing=json"))
+        for device in [device for output in outputs for device in output["by_device"]]:
+            self.check_launches(device["launches"], device["read_backs"])
+            self.assertIn("-cl-std=CL1.2", device["build_options"])
         self.check_members("glint render --timing=json", *outputs)
+
+    def check_launches(self, launches, reads):
+        """Moments begin with the first command's queueing and follow each other; groups fill the work-items."""
+        for launch in launches:
+            self.assertEqual(len(launch["local"]), len(launch["global"]))
+            self.assertTrue(all(items > 0 and items % group == 0 for items, group in zip(launch["global"], launch["local"])))
+        trusted = [command for command in launches + reads if "doubt" not in command]
+        names = "queued_ms", "submitted_ms", "start_ms", "end_ms"
+        moments = [[command[name] for name in names if command[name] is not None] for command in trusted]
+        self.assertEqual([sorted(times) for times in moments], moments)
+        for command in trusted:
+            self.assertAlmostEqual(command["end_ms"] - command["start_ms"], command["event_ms"], delta=1e-4)
+        if len(trusted) == len(launches + reads):
+            self.assertEqual(min(times[0] for times in moments), 0)
 
     def test_check(self):
         write("warned.yaml", WARNED)
@@ -122,6 +139,10 @@ class Json(TestCase):
     def test_bench(self):
         bench = self.glint(f"bench plain.yaml strong.yaml {SMALL} {QUICK} --bvh auto,on --launches --json")
         baseline = json.loads(bench.stdout)
+        for run in baseline["runs"]:
+            if "status" not in run:
+                self.assertIn("-cl-std=CL1.2", run["build_options"])
+                self.assertTrue(all(launch["local"] for launch in run["launches"]))
         for run in baseline["runs"]:
             run["frame_samples_ms"] = run.get("frame_samples_ms", [])[:5]  # too few
         write("bench.json", json.dumps(baseline))

@@ -134,8 +134,9 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         .device = device,
         .peak = &bench->peak,
         .rows = set->rows,
-        .reports = options->launches ? reports : NULL,
+        .reports = reports,
         .count = set->count,
+        .lists_launches = options->launches,
         .calibration = &set->calibration,
         .comparisons = comparisons,
     };

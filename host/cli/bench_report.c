@@ -123,7 +123,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
             row->kernel_hash);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);
-    if (report->reports && report->reports[i]) launches_print(stream, report->reports[i]);
+    if (report->lists_launches && report->reports[i]) launches_print(stream, report->reports[i]);
 }
 
 // Reasons for missing figures, each once.
@@ -199,6 +199,7 @@ static void launches_json(Json *json, const RenderReport *report)
         json_text(json, "name", report->launches.items[i].name);
         figure_json(json, "event_ms", 1e3, (Figure){time->event_seconds, launch_time_doubt(time)});
         json_number(json, "host_ms", 1e3 * time->host_seconds);
+        command_json(json, report, time);
         json_end(json);
     }
     json_end(json);
@@ -276,6 +277,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
 {
     const BenchRow *row = &report->rows[i];
     hash_json(json, "kernel_hash", row->kernel_hash);
+    json_text(json, "build_options", report->reports[i]->build_options);
     times_json(json, row);
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);
@@ -311,7 +313,7 @@ void bench_print_json(const BenchReport *report)
             unavailable_json(json, row->failure);
         else
             results_json(json, report, i);
-        if (report->reports && report->reports[i]) launches_json(json, report->reports[i]);
+        if (report->lists_launches && report->reports[i]) launches_json(json, report->reports[i]);
         json_end(json);
     }
     json_print(json, stdout);

@@ -21,8 +21,9 @@ typedef struct {
     const Device *device;
     const Peak *peak;
     const BenchRow *rows;
-    const RenderReport *const *reports; // of each row's last run, for --launches; or NULL
+    const RenderReport *const *reports; // of each row's last run; NULL where it was not measured
     size_t count;
+    bool lists_launches;
     const Calibration *calibration;
     const RowComparison *comparisons; // of each row with the baseline; or NULL
 } BenchReport;

@@ -2,6 +2,7 @@
 
 #include "host/cli/passport_report.h"
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 
 void summary_json(Json *json, const char *key, Summary seconds)
@@ -35,6 +36,53 @@ void figure_json(Json *json, const char *key, double scale, Figure figure)
 static const char *null_if_empty(const char *text)
 {
     return text[0] != '\0' ? text : NULL;
+}
+
+// Returns when the device's first command of a list was queued, by its clock; 0: unknown. Lists are in the
+// order of queueing.
+static double first_queued(const NamedLaunch *commands, size_t count, const Device *device)
+{
+    size_t i = 0;
+    while (i < count && commands[i].time.device != device)
+        i++;
+    return i < count ? commands[i].time.queued_seconds : 0;
+}
+
+// The origin of a device's times in a report.
+static double report_origin(const RenderReport *report, const Device *device)
+{
+    const double launch = first_queued(report->launches.items, report->launches.count, device),
+                 read = first_queued(report->reads.items, report->reads.count, device);
+    return launch > 0 && read > 0 ? fmin(launch, read) : fmax(launch, read);
+}
+
+static void counts_json(Json *json, const char *key, const size_t *counts, cl_uint dimensions)
+{
+    json_begin_array(json, key);
+    for (cl_uint i = 0; i < dimensions; i++)
+        json_int64(json, NULL, (int64_t)counts[i]);
+    json_end(json);
+}
+
+void command_json(Json *json, const RenderReport *report, const LaunchTime *time)
+{
+    const struct {
+        const char *key;
+        double seconds;
+    } moments[] = {{"queued_ms", time->queued_seconds},
+                   {"submitted_ms", time->submitted_seconds},
+                   {"start_ms", time->start_seconds},
+                   {"end_ms", time->end_seconds}};
+    const double origin = report_origin(report, time->device);
+    for (size_t i = 0; i < sizeof moments / sizeof *moments; i++) {
+        if (time->trusted && origin > 0 && moments[i].seconds > 0)
+            json_number(json, moments[i].key, 1e3 * (moments[i].seconds - origin));
+        else
+            json_none(json, moments[i].key);
+    }
+    if (time->dimensions == 0) return;
+    counts_json(json, "global", time->global, time->dimensions);
+    counts_json(json, "local", time->local, time->dimensions);
 }
 
 void device_identity_json(Json *json, const Device *device)

@@ -154,7 +154,8 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
     line_print("encode", host->encode_seconds, "");
 }
 
-static void launches_json(Json *json, const char *key, const NamedLaunch *launches, size_t count)
+static void launches_json(Json *json, const char *key, const RenderReport *report,
+                          const NamedLaunch *launches, size_t count)
 {
     json_begin_array(json, key);
     for (size_t i = 0; i < count; i++) {
@@ -167,6 +168,7 @@ static void launches_json(Json *json, const char *key, const NamedLaunch *launch
         else
             json_none(json, "event_ms");
         json_number(json, "host_ms", 1e3 * time->host_seconds);
+        command_json(json, report, time);
         if (!time->trusted) json_text(json, "doubt", launch_time_doubt(time));
         json_end(json);
     }
@@ -207,6 +209,7 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_text(json, "double_by", report->reference_device ? report->reference_device->name : NULL);
     json_int64(json, "lanes", report->lanes);
     hash_json(json, "kernel_hash", report->kernel_hash);
+    json_text(json, "build_options", report->build_options);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
     if (report->features & FEATURE_BVH)
         json_number(json, "bvh_ms", 1e3 * report->bvh_seconds);
@@ -217,8 +220,8 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_bool(json, "build_out_of_line", report->is_out_of_line);
     json_number(json, "upload_ms", 1e3 * report->upload_seconds);
     share_json(json, &report->share, settings);
-    launches_json(json, "launches", report->launches.items, report->launches.count);
-    launches_json(json, "read_backs", report->reads.items, report->reads.count);
+    launches_json(json, "launches", report, report->launches.items, report->launches.count);
+    launches_json(json, "read_backs", report, report->reads.items, report->reads.count);
     json_end(json);
 }
 

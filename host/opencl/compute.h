@@ -120,12 +120,15 @@ cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
 
 // One command's time by its event and by the host's clock.
 typedef struct {
-    double start_seconds, end_seconds; // device clock, from an arbitrary moment
-    double event_seconds;              // end - start; 0 where the runtime reports zeros
-    double host_seconds;               // from enqueue until the host sees it complete
-    double host_start_seconds;         // clock_seconds() before the enqueue
-    bool trusted;      // false: zeros, a mere counter, end before start, or event longer than host_seconds
-    const char *fault; // of the device's timer, as its passport has it; NULL: none. Not trusted with one
+    const Device *device; // whose clock the next four are by, from an arbitrary moment
+    double queued_seconds, submitted_seconds, start_seconds, end_seconds; // 0: the runtime has none
+    double event_seconds;      // end - start; 0 where the runtime reports zeros
+    double host_seconds;       // from enqueue until the host sees it complete
+    double host_start_seconds; // clock_seconds() before the enqueue
+    bool trusted;       // false: zeros, a mere counter, end before start, or event longer than host_seconds
+    const char *fault;  // of the device's timer, as its passport has it; NULL: none. Not trusted with one
+    cl_uint dimensions; // 0: not a kernel
+    size_t global[3], local[3]; // work-items, and those of a group; local 0: the runtime's choice
 } LaunchTime;
 
 // Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. An event may

@@ -1,6 +1,7 @@
 // Launches and the times of their events.
 #include "host/base/clock.h"
 #include "host/opencl/passport.h"
+#include <string.h>
 
 LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds)
 {
@@ -49,6 +50,9 @@ LaunchTime event_time(Compute *compute, cl_event event, const char *command, dou
         time = launch_time_judge(event_timestamp(event, CL_PROFILING_COMMAND_START),
                                  event_timestamp(event, CL_PROFILING_COMMAND_END), host_seconds,
                                  compute->device->timer_resolution_seconds);
+        time.device = compute->device;
+        time.queued_seconds = 1e-9 * (double)event_timestamp(event, CL_PROFILING_COMMAND_QUEUED);
+        time.submitted_seconds = 1e-9 * (double)event_timestamp(event, CL_PROFILING_COMMAND_SUBMIT);
         time.host_start_seconds = host_start;
         time.fault = passport_timer_fault(compute->device);
         time.trusted = time.trusted && !time.fault;
@@ -113,5 +117,9 @@ LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimens
     if (!compute_try(compute, clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, first, global,
                                                      group ? local : NULL, 0, NULL, &event)))
         return (LaunchTime){0};
-    return event_time(compute, event, "clEnqueueNDRangeKernel", host_start);
+    LaunchTime time = event_time(compute, event, "clEnqueueNDRangeKernel", host_start);
+    time.dimensions = dimensions;
+    memcpy(time.global, global, dimensions * sizeof *global);
+    if (group) memcpy(time.local, local, dimensions * sizeof *local);
+    return time;
 }

@@ -135,6 +135,7 @@ void renderer_kernels_choose(Renderer *renderer)
         if (renderer->report.lanes == 1) prelude_write(&renderer->variant.easy_prelude, renderer, true);
         memset(renderer->paces, 0, sizeof renderer->paces);
     }
+    renderer->report.build_options = renderer->variant.options;
     for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
         if (renderer->variant.kernels[kind].kernel)
             scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
