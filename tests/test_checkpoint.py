@@ -122,7 +122,8 @@ class Checkpoints(TestCase):
         for command, reason in ((RENDER.replace("sphere", "other"), "scene"), (RENDER.replace("256", "128"), "size"),
                                 (RENDER.replace("strict", "single"), "precision"), (RENDER.replace("100", "99"), "samples"),
                                 (f"{RENDER} --region 0,0,64,64", "region"), (f"{RENDER} --bounces 3", "bounces"),
-                                (f"{RENDER} --aov t", "AOVs"), (f"{RENDER} --perturb 1", "perturb")):
+                                (f"{RENDER} --aov t", "AOVs"), (f"{RENDER} --perturb 1", "perturb"),
+                                (f"{RENDER} --build-options=-DUNUSED", "build options")):
             self.refuses(f"{command} -o other.npy --checkpoint saved", rf"'saved' is of another image \({reason}: ", env=POCL)
         self.refuses(f"{RENDER} -o other.npy --checkpoint sphere.yaml", "'sphere.yaml' is not a checkpoint", env=POCL)
         self.assertEqual(Path("saved").read_bytes(), saved)

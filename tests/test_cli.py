@@ -56,6 +56,13 @@ WRONG_COMMAND_LINES = [
     (r"nowhere/image\.png", f"render sphere.yaml {SMALL} -o nowhere/image.png"),
 ]
 
+PRECISIONS = "fast", "single", "strict", "double", "certified"
+# Arguments with which a command refuses its precision before anything else.
+PRECISION_COMMANDS = {
+    "render": "missing.yaml", "trace": "missing.yaml --rays rays", "bench": "missing.yaml", "accuracy": "missing.yaml",
+    "certify": "missing.yaml", "verify": "no-such-case",
+}
+
 # Key words of the message, and the lines of rays that get it.
 WRONG_RAYS = [
     ("^rays:2:10: error: expected", "0 0 -4 0 0 1\n0 0 -4 0 x 1"),
@@ -96,6 +103,14 @@ class Commands(CliTestCase):
             for command in alternatives(commands):
                 with self.subTest(command):
                     self.refuses(command, pattern)
+
+    def test_help_lists_the_precisions_that_are_accepted(self):
+        for command, arguments in PRECISION_COMMANDS.items():
+            line = re.search("(?m)^ *--precision .*$", self.glint(f"{command} --help").stdout)[0]
+            listed = [name for name in PRECISIONS if re.search(rf"\b{name}\b", line.split("(default")[0])]
+            accepted = [name for name in PRECISIONS
+                        if "precision" not in self.refuses(f"{command} {arguments} --precision {name}", "").stderr]
+            self.assertEqual(listed, accepted, command)
 
     def test_no_device(self):
         self.refuses("render sphere.yaml", 'device.*"toaster"', env={"GLINT_DEVICE": "toaster"})

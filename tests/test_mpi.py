@@ -182,6 +182,11 @@ class Mpi(TestCase):
             self.mpirun(f"-n 1 {RANKS} {command} -o frames : -n 2 {other}", 1)
             self.check_frames(all)
 
+    def test_options_for_one_process(self):
+        for option in "--work-group 2x2", "--build-options=-DUNUSED":
+            process = self.mpirun(f"-n 2 {RANKS} {RENDER} {option}", status=1)
+            self.assertIn("--work-group and --build-options are for one process", process.stderr)
+
     def test_a_refused_checkpoint(self):
         """It ends all ranks."""
         Path("saved").write_text("no checkpoint")

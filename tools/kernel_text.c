@@ -32,7 +32,7 @@ int main(int argument_count, char **arguments)
         return EXIT_FAILURE;
     options.precision = precision;
     int status = EXIT_FAILURE;
-    if (device_open(&open, NULL)) {
+    if (device_open(&open, &(CommonOptions){0})) {
         char *text = kernel_text(&open, &scene, &options);
         if (text) fputs(text, stdout);
         status = device_close(&open, text ? EXIT_SUCCESS : EXIT_FAILURE);

@@ -32,6 +32,7 @@ static const struct option long_options[] = {
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     VARIANT_LONG_OPTIONS,
+    DRIVER_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -48,7 +49,7 @@ static const char help_text[] =
     "      --launches        list the kernel launches of each row's last run\n"
     "      --precision LIST  of fast, single, strict, double, certified (default: single)\n"
     "      --samples LIST    per pixel, one row each (default: 1)\n" //
-    HELP_BOUNCES HELP_VARIANTS HELP_JSON HELP_HELP;
+    HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_JSON HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
@@ -208,14 +209,15 @@ static int against_run(Bench *bench, int argument_count, char **arguments)
 static int scenes_bench(Bench *bench, int argument_count, char **arguments)
 {
     const BenchOptions *options = &bench->options;
+    const CommonOptions common = options->variants.common;
     if (options->against && !options->is_worker) return against_run(bench, argument_count, arguments);
     MessageList messages = {0};
     Baseline *baseline = options->baseline ? baseline_open(options->baseline, &messages) : NULL;
     messages_print(&messages, NULL);
     int status = EXIT_USER;
-    if ((!options->baseline || baseline) && device_open(&bench->open, options->variants.common.device)) {
+    if ((!options->baseline || baseline) && device_open(&bench->open, &common)) {
         const bool is_certified = options->variants.precisions >> PRECISION_CERTIFIED & 1;
-        const char *selector = options->variants.common.reference_device;
+        const char *selector = common.reference_device;
         if (!is_certified || reference_open(&bench->open.compute, &bench->open.devices, selector) ||
             !selector)
             status = bench_run(bench, baseline);

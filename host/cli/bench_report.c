@@ -277,7 +277,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
 {
     const BenchRow *row = &report->rows[i];
     hash_json(json, "kernel_hash", row->kernel_hash);
-    json_text(json, "build_options", report->reports[i]->build_options);
+    build_options_json(json, report->reports[i]);
     times_json(json, row);
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);

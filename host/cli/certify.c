@@ -292,7 +292,7 @@ int command_certify(int argument_count, char **arguments)
     Scene scene = {0};
     OpenDevice open;
     status = EXIT_USER;
-    if (scene_open(&scene, options.scene, &options.common) && device_open(&open, options.common.device)) {
+    if (scene_open(&scene, options.scene, &options.common) && device_open(&open, &options.common)) {
         Progress progress;
         progress_open(&progress, true); // for the interrupts
         status = device_close(&open, scene_certify(&options, &scene, &open));

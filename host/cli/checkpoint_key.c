@@ -54,6 +54,8 @@ void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Re
         if (aovs >> layer & 1) text_appendf(key, " %s", layer_names[layer]);
     text_appendf(key, "\nperturb: %u:%u\n", settings->perturb_seed, settings->perturb_scale);
     text_appendf(key, "BVH: %s\n", bvh_choice_names[settings->bvh]);
+    const char *build_options = renderer_report(renderers[0])->device->build_options;
+    text_appendf(key, "build options: %s\n", build_options ? build_options : "");
     if (settings->precision != PRECISION_STRICT) devices_append(key, renderers, count, ranks);
     text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_scene_hash(renderers[0]));
 }

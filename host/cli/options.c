@@ -41,21 +41,27 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
     return true;
 }
 
-bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
+// WxH; `example` is shown on a mistake.
+static bool sides_read(const char *option, const char *example, const char *value, uint32_t *width,
+                       uint32_t *height)
 {
     const uint64_t largest = IMAGE_SIDE_MAX;
     const char *at;
     uint64_t w, h;
     if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||
         *at != '\0' || w < 1 || h < 1 || w > largest || h > largest) {
-        fprintf(stderr,
-                "glint: --%s: expected WIDTHxHEIGHT, such as 1280x720, each from 1 to %u, not \"%s\"\n",
-                option, (unsigned)largest, value);
+        fprintf(stderr, "glint: --%s: expected WIDTHxHEIGHT, such as %s, each from 1 to %u, not \"%s\"\n",
+                option, example, (unsigned)largest, value);
         return false;
     }
     *width = (uint32_t)w;
     *height = (uint32_t)h;
     return true;
+}
+
+bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
+{
+    return sides_read(option, "1280x720", value, width, height);
 }
 
 bool option_error_budget(const char *option, const char *value, ErrorBudget *budget)
@@ -200,6 +206,12 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     case OPTION_REFERENCE_DEVICE:
         common->reference_device = value;
         return true;
+    case OPTION_WORK_GROUP:
+        *valid = sides_read("work-group", "16x4", value, &common->work_group[0], &common->work_group[1]);
+        return true;
+    case OPTION_BUILD_OPTIONS:
+        common->build_options = value;
+        return true;
     case OPTION_PERTURB:
         *valid = perturb_read(value, common);
         return true;
@@ -285,11 +297,37 @@ const Device *device_find(DeviceList *devices, const char *selector)
     return device;
 }
 
-bool device_open(OpenDevice *open, const char *selector)
+static void list_fix(DeviceList *list, const CommonOptions *common)
+{
+    for (size_t i = 0; i < list->count; i++) {
+        list->items[i].build_options = common->build_options;
+        list->items[i].work_group[0] = common->work_group[0];
+        list->items[i].work_group[1] = common->work_group[1];
+    }
+}
+
+// Prints why not. Pixels of a list, and rays, have groups of one dimension.
+static bool work_group_is_allowed(const Device *device)
+{
+    const size_t *group = device->work_group, *longest = device->longest_group_sides;
+    const size_t items = group[0] * group[1], allowed = device->largest_work_group;
+    const bool is_allowed = (allowed == 0 || items <= allowed) && (longest[0] == 0 || items <= longest[0]) &&
+                            (longest[1] == 0 || group[1] <= longest[1]);
+    if (!is_allowed)
+        fprintf(
+            stderr,
+            "glint: --work-group: %zux%zu has %zu work-items; \"%s\" allows %zu in a group, at most %zu by "
+            "%zu\n",
+            group[0], group[1], items, device->name, allowed, longest[0], longest[1]);
+    return is_allowed;
+}
+
+bool device_open(OpenDevice *open, const CommonOptions *common)
 {
     *open = (OpenDevice){0};
-    const Device *device = device_find(&open->devices, selector);
-    if (!device) {
+    const Device *device = device_find(&open->devices, common->device);
+    list_fix(&open->devices, common);
+    if (!device || !work_group_is_allowed(device)) {
         device_list_close(&open->devices);
         return false;
     }
@@ -375,6 +413,14 @@ bool devices_open(OpenDevices *open, const char *selector)
     free(devices);
     if (count == 0) devices_abandon(open);
     return count > 0;
+}
+
+bool devices_fix(OpenDevices *open, const CommonOptions *common)
+{
+    list_fix(&open->devices, common);
+    for (size_t i = 0; i < open->count; i++)
+        if (!work_group_is_allowed(open->items[i].compute->device)) return false;
+    return true;
 }
 
 bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages)

@@ -18,6 +18,8 @@ typedef struct {
     BvhChoice bvh;
     bool no_cache, lenient;
     uint32_t perturb_seed, perturb_scale; // 0: not given
+    const char *build_options;            // NULL: not given
+    uint32_t work_group[2];               // 0: not given
 } CommonOptions;
 
 // getopt_long values of long options; a command's own start at OPTION_OWN.
@@ -31,6 +33,8 @@ enum {
     OPTION_MAX_PIXELS,
     OPTION_PERTURB,
     OPTION_REFERENCE_DEVICE,
+    OPTION_WORK_GROUP,
+    OPTION_BUILD_OPTIONS,
     OPTION_OWN
 };
 
@@ -48,6 +52,13 @@ enum {
 #define PERTURB_LONG_OPTION                                                                                  \
     {                                                                                                        \
         "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
+    }
+
+// For commands with which drivers are measured.
+#define DRIVER_LONG_OPTIONS                                                                                  \
+    {"work-group", required_argument, NULL, OPTION_WORK_GROUP},                                              \
+    {                                                                                                        \
+        "build-options", required_argument, NULL, OPTION_BUILD_OPTIONS                                       \
     }
 
 // For commands that render at `certified`.
@@ -73,6 +84,11 @@ enum {
 #define HELP_PERTURB                                                                                         \
     "      --perturb SEED[:SCALE]\n"                                                                         \
     "                        inject the rounding error that OpenCL permits, times SCALE (default: 1)\n"
+#define HELP_DRIVER                                                                                          \
+    "      --work-group WxH  work-items of a group (default: 8x8, 1x1 with several lanes on a CPU, or "      \
+    "fewer)\n"                                                                                               \
+    "      --build-options OPTIONS\n"                                                                        \
+    "                        passed to the driver's compiler after glint's, such as \"-cl-opt-disable\"\n"
 #define HELP_REFERENCE                                                                                       \
     "      --reference-device D\n"                                                                           \
     "                        renders in double: references, and the pixels that certified re-renders\n"      \
@@ -80,9 +96,10 @@ enum {
 #define HELP_JSON "      --json            print JSON\n"
 #define HELP_HELP "  -h, --help            print this help\n"
 
-// For COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES.
+// For COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES and a --precision.
+#define HELP_PRECISION "      --precision P     fast, single, strict, double or certified (default: single)\n"
 #define HELP_COMMON                                                                                          \
-    "      --precision P     fast, single, strict, double or certified (default: single)\n" HELP_LANES       \
+    HELP_LANES                                                                                               \
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT HELP_MAX_PIXELS
 
@@ -145,9 +162,10 @@ typedef struct {
 
 // Chooses a device. NULL, with a message, if there is none. The list must be closed either way.
 const Device *device_find(DeviceList *devices, const char *selector);
-// The same, and opens it. False, with a message, if there is none; nothing to close then. A device that
-// fails, now or later, is reported by device_close.
-bool device_open(OpenDevice *open, const char *selector);
+// The same, and opens it with the options that the user fixed for its kernels. False, with a message, if
+// there is none or it does not allow the work-group; nothing to close then. A device that fails, now or
+// later, is reported by device_close.
+bool device_open(OpenDevice *open, const CommonOptions *common);
 // Opens the device that works in double for the Compute, if the user chose one or its own device has no
 // 64-bit floating point, and prints which it is. False if there is none, with a message if the user chose
 // one.
@@ -168,8 +186,11 @@ typedef struct {
     bool are_all; // chosen by "all": those that do not suit a render can be left out
 } OpenDevices;
 
-// As device_open, for all devices of a list or of "all".
+// For all devices of a list or of "all". False, with a message, if there is none; nothing to close then.
 bool devices_open(OpenDevices *open, const char *selector);
+// Fixes what the user chose for the kernels of opened devices. False, with a message, if one does not allow
+// the work-group.
+bool devices_fix(OpenDevices *open, const CommonOptions *common);
 // One of the devices that `selector` lists, or without one of those of the default's type: the number modulo
 // their count, for the processes of one machine. False with a message; nothing to close then.
 bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages);

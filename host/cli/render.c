@@ -199,11 +199,13 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     options.output.path = path;
     double start = clock_seconds();
     int status = EXIT_USER;
+    if (ranks && (options.common.work_group[0] > 0 || options.common.build_options))
+        return option_usage_fault("render", "--work-group and --build-options are for one process");
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
         open->reference_selector = options.common.reference_device;
-        if (render_devices_open(open, options.common.device))
+        if (render_devices_open(open, &options.common))
             status = scene_render(&options, &scene, open, ranks, &times);
     }
     scene_free(&scene);
@@ -313,7 +315,7 @@ const char *render_command_path(const RenderCommand *command, size_t index)
 bool render_command_open_devices(RenderCommand *command)
 {
     command->open.reference_selector = command->options.common.reference_device;
-    return render_devices_open(&command->open, command->options.common.device);
+    return render_devices_open(&command->open, &command->options.common);
 }
 
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)

@@ -4,13 +4,19 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-bool render_devices_open(RenderDevices *open, const char *selector)
+bool render_devices_open(RenderDevices *open, const CommonOptions *common)
 {
+    const char *selector = common->device;
     if (open->is_open) return true;
     MessageList messages = {0};
     open->is_open = open->is_single ? devices_open_one(&open->devices, selector, open->number, &messages)
                                     : devices_open(&open->devices, selector);
     messages_print(&messages, NULL);
+    if (open->is_open && !devices_fix(&open->devices, common)) {
+        devices_abandon(&open->devices);
+        open->devices = (OpenDevices){0};
+        open->is_open = false;
+    }
     if (open->is_open) open->renderers = memory_allocate_zeroed(open->devices.count, sizeof(Renderer *));
     return open->is_open;
 }

@@ -14,8 +14,9 @@ typedef struct {
     bool is_unfit;                  // the last image's settings or scene do not fit a device
 } RenderDevices;
 
-// Those that the selector lists. True where they are open already. False, with a message, if there is none.
-bool render_devices_open(RenderDevices *open, const char *selector);
+// Those that the options list, with what these fix. True where they are open already. False, with a message,
+// if there is none or one does not allow the work-group.
+bool render_devices_open(RenderDevices *open, const CommonOptions *common);
 // Gives their renderers, and the ranks, another scene. If others are left, those that fail are removed, and
 // of all devices those that the scene or settings do not fit. False: with messages, these do not fit a
 // device, else the device failed.

@@ -35,6 +35,7 @@ static const struct option long_options[] = {
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
+    DRIVER_LONG_OPTIONS,
     REFERENCE_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
@@ -63,7 +64,7 @@ static const char help_text[] =
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command goes on where an earlier one ended\n"
                     "      --quiet           no progress\n" //
-    HELP_BOUNCES HELP_DEVICES HELP_REFERENCE HELP_COMMON HELP_PERTURB HELP_HELP;
+    HELP_BOUNCES HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
 static bool region_read(const char *value, uint32_t region[4])
 {

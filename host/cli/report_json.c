@@ -85,6 +85,14 @@ void command_json(Json *json, const RenderReport *report, const LaunchTime *time
     counts_json(json, "local", time->local, time->dimensions);
 }
 
+void build_options_json(Json *json, const RenderReport *report)
+{
+    Text options = {0};
+    program_options_append(&options, report->device, report->build_options);
+    json_text(json, "build_options", text_c(&options));
+    text_free(&options);
+}
+
 void device_identity_json(Json *json, const Device *device)
 {
     json_text(json, "board", null_if_empty(device->board));

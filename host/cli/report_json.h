@@ -16,6 +16,8 @@ void device_json(Json *json, const Device *device); // the device's members, in 
 void size_json(Json *json, uint32_t width, uint32_t height);
 void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0
+// All options that the kernels of a report were compiled with.
+void build_options_json(Json *json, const RenderReport *report);
 // When a command of the report was queued, submitted, started and ended, and a kernel's sizes.
 void command_json(Json *json, const RenderReport *report, const LaunchTime *time);
 void times_json(Json *json, const BenchRow *row); // frame_ms, kernel_ms and the clock of the latter

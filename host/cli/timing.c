@@ -209,7 +209,7 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_text(json, "double_by", report->reference_device ? report->reference_device->name : NULL);
     json_int64(json, "lanes", report->lanes);
     hash_json(json, "kernel_hash", report->kernel_hash);
-    json_text(json, "build_options", report->build_options);
+    build_options_json(json, report);
     json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
     if (report->features & FEATURE_BVH)
         json_number(json, "bvh_ms", 1e3 * report->bvh_seconds);

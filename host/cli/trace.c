@@ -22,6 +22,7 @@ static const struct option long_options[] = {
     {"output", required_argument, NULL, 'o'},
     COMMON_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
+    DRIVER_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -34,7 +35,8 @@ static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\
                                 "decimal or C hexadecimal; - is\n"
                                 "                        standard input; # starts a comment\n"
                                 "  -o, --output FILE     CSV file (default: standard output)\n" //
-    HELP_DEVICE HELP_COMMON HELP_PERTURB HELP_HELP;
+    HELP_DEVICE "      --precision P     fast, single, strict or double (default: single)\n"    //
+    HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -242,7 +244,7 @@ int command_trace(int argument_count, char **arguments)
     status = EXIT_USER;
     if (scene_open(&scene, options.scene, &options.common) &&
         !output_overwrites_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
-        device_open(&open, options.common.device)) {
+        device_open(&open, &options.common)) {
         status = rays_trace(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);
     }

@@ -25,6 +25,7 @@ static const struct option long_options[] = {
     {"lean", no_argument, NULL, OPTION_LEAN},
     {"json", no_argument, NULL, OPTION_JSON},
     PERTURB_LONG_OPTION,
+    DRIVER_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -36,7 +37,7 @@ static const char help_text[] =
     "      --precision P     fast, single, strict or double (default: all that the device has)\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
-    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_PERTURB HELP_JSON HELP_HELP;
+    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -262,6 +263,6 @@ int command_verify(int argument_count, char **arguments)
     int status = options_read(&options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     OpenDevice open;
-    if (!device_open(&open, options.common.device)) return EXIT_USER;
+    if (!device_open(&open, &options.common)) return EXIT_USER;
     return device_close(&open, device_verify(&open.compute, &options));
 }

@@ -30,7 +30,7 @@ static const char help_text[] =
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel, once the camera rests (default: 16)\n"                      //
     HELP_BOUNCES "      --write-camera    C writes the camera into the scene file, which is YAML\n" //
-    HELP_DEVICE HELP_COMMON HELP_HELP;
+    HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
 
 typedef struct {
     CommonOptions common;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "host/base/fault.h"
+#include "host/base/text.h"
 #include "host/opencl/device.h"
 
 typedef struct {
@@ -81,8 +82,12 @@ typedef struct {
     bool from_cache;
 } Program;
 
+// Appends the options of a request, then those that the user fixed for the device.
+void program_options_append(Text *text, const Device *device, const char *options);
+
 // Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
-// (host/opencl/cache.h) or builds it. The key: text, options, launch, device name, driver, platform version
+// (host/opencl/cache.h) or builds it. The key: text, options, launch, work-group that the user fixed, device
+// name, driver, platform version
 // and the cache's own format version. `no_cache` bypasses PoCL's own cache, too. False: failed; where the
 // text does not compile, the detail has the build log and the file in which the composed text was saved.
 // Where both builds fail, the first one's failure is kept.

@@ -18,11 +18,21 @@ static const char *or_empty(const char *text)
     return text ? text : "";
 }
 
+void program_options_append(Text *text, const Device *device, const char *options)
+{
+    text_appendf(text, "%s", or_empty(options));
+    if (device->build_options) text_appendf(text, " %s", device->build_options);
+}
+
 // All that the compiled program depends on. The native width distinguishes processors of the same name.
 static char *request_key(const Device *device, const ProgramRequest *request, const char *text)
 {
     Text key = {0};
-    text_appendf(&key, "options %s\nlaunch %s\n", or_empty(request->options), or_empty(request->launch));
+    text_appendf(&key, "options ");
+    program_options_append(&key, device, request->options);
+    text_appendf(&key, "\nlaunch %s\n", or_empty(request->launch));
+    if (device->work_group[0] > 0)
+        text_appendf(&key, "work-group %zux%zu\n", device->work_group[0], device->work_group[1]);
     text_appendf(&key, "device %s %s, %s, native width %u\n", device->name, device->board, device->version,
                  device->native_float_width);
     text_appendf(&key, "driver %s, %s\n", device->vendor, device->driver);
@@ -106,10 +116,12 @@ static void build_report(Compute *compute, Build *build, const char *text, const
     if (build->program && strcmp(build->failed_call, "clBuildProgram") == 0) {
         char *log = build_log(compute, build->program), *path = save_text(text);
         Text reason = {0};
-        text_appendf(&reason, "%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
+        text_appendf(&reason, "options \"");
+        program_options_append(&reason, compute->device, options);
+        text_appendf(&reason, "\"\n%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
         describe_cache_disk(&reason);
-        compute_fail(compute, build->failed_call, build->status, "options \"%s\"\n%s\nthe composed text: %s",
-                     options, text_c(&reason), path);
+        compute_fail(compute, build->failed_call, build->status, "%s\nthe composed text: %s", text_c(&reason),
+                     path);
         text_free(&reason);
         free(path);
         free(log);
@@ -145,7 +157,7 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     build.program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
     if (!build_check(&build, "clCreateProgramWithSource", status, build.program)) return build;
     Text options = {0};
-    text_appendf(&options, "%s", or_empty(request->options));
+    program_options_append(&options, compute->device, request->options);
     if (afresh) append_unused_option(&options);
     fault_note_call("clBuildProgram");
     status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
@@ -177,9 +189,11 @@ static Build build_from_binary(const Compute *compute, const Text *binary, const
     build.program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
                                               &bytes, &binary_status, &status);
     if (build_check(&build, "clCreateProgramWithBinary", status, build.program)) {
+        Text options = {0};
+        program_options_append(&options, compute->device, request->options);
         fault_note_call("clBuildProgram");
-        status =
-            clBuildProgram(build.program, 1, &compute->device->id, or_empty(request->options), NULL, NULL);
+        status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
+        text_free(&options);
         if (build_check(&build, "clBuildProgram", status, true)) kernel_create(&build, request->kernel);
     }
     if (build.failed_call) build_release(&build);

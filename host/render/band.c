@@ -9,21 +9,25 @@ static TileShape item_shape(uint32_t lanes)
     return (TileShape){width * MACRO_TILE_COLUMNS_OF(lanes), height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
-// Work-items along each side of a group, before the device's limits. Square groups are coherent: neighboring
-// pixels hit the same objects. But a work-item with whole tiles is a group of its own: PoCL places the
-// private variables of a group's items side by side, and 64 sets of them, each with the rays waiting behind
-// glass, exceed the cache.
-static size_t group_side(const Renderer *renderer)
+// Work-items of a group, as the user fixed them or before the device's limits. Square groups are coherent:
+// neighboring pixels hit the same objects. But a work-item with whole tiles is alone in its group: PoCL
+// places the private variables of a group's items side by side, and 64 sets of them, each with the rays
+// waiting behind glass, exceed the cache.
+static TileShape group_items(const Renderer *renderer)
 {
-    bool on_cpu = renderer->compute->device->type & CL_DEVICE_TYPE_CPU;
-    return renderer->report.lanes > 1 && on_cpu ? 1 : 8;
+    const Device *device = renderer->compute->device;
+    const size_t *fixed = device->work_group;
+    if (fixed[0] > 0) return (TileShape){(uint32_t)fixed[0], (uint32_t)fixed[1]};
+    const bool on_cpu = device->type & CL_DEVICE_TYPE_CPU;
+    const uint32_t side = renderer->report.lanes > 1 && on_cpu ? 1 : 8;
+    return (TileShape){side, side};
 }
 
 TileShape group_shape(const Renderer *renderer)
 {
     const TileShape item = item_shape(renderer->report.lanes);
-    const uint32_t side = (uint32_t)group_side(renderer);
-    return (TileShape){item.width * side, item.height * side};
+    const TileShape group = group_items(renderer);
+    return (TileShape){item.width * group.width, item.height * group.height};
 }
 
 Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count)
@@ -97,23 +101,23 @@ Place band_place(const Renderer *renderer, BandRows rows)
 {
     const RenderSettings *settings = &renderer->settings;
     const TileShape item = item_shape(renderer->report.lanes);
-    const size_t side = group_side(renderer);
+    const TileShape group = group_items(renderer);
     return (Place){
         .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
                   settings->region_width, rows.row_count}},
         .item = item,
         .items = {divide_up(settings->region_width, item.width), divide_up(rows.row_count, item.height)},
-        .group = {side, side}};
+        .group = {group.width, group.height}};
 }
 
 Place list_place(const Renderer *renderer, uint32_t count)
 {
     const uint32_t of_item = renderer->report.lanes * renderer->report.lanes;
-    size_t side = group_side(renderer);
+    const TileShape group = group_items(renderer);
     return (Place){.band = {{0, 0, count, 1}},
                    .item = {of_item, 1},
                    .items = {divide_up(count, of_item), 1},
-                   .group = {side * side, 1}};
+                   .group = {(size_t)group.width * group.height, 1}};
 }
 
 static size_t least(size_t a, size_t b)

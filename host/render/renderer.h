@@ -185,7 +185,7 @@ typedef struct {
     uint64_t scene_hash; // of this pass, see renderer_scene_hash
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache;     // every program was
-    const char *build_options; // of its kernels
+    const char *build_options; // of its kernels, before those of the device
     bool is_out_of_line;       // a driver could not build a kernel with its functions inlined
     uint64_t rays[RAYS_COUNT]; // of each RAYS_… (kernels/types.h); where settings.counting
     struct {

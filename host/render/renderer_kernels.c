@@ -188,6 +188,12 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
 {
     KernelSlot *slot = &renderer->variant.kernels[kind];
     LaunchTime time = kernel_launch_from(renderer->compute, slot->kernel, dimensions, first, items, group);
+    const bool is_fixed = renderer->compute->device->work_group[0] > 0;
+    if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)
+        compute_fail(renderer->compute, "clEnqueueNDRangeKernel", CL_INVALID_WORK_GROUP_SIZE,
+                     "kernel %s: work-groups of %zu work-items were asked for, but at most %zu fit",
+                     kernel_sources[kind].name, group[0] * (dimensions > 1 ? group[1] : 1),
+                     time.local[0] * (dimensions > 1 ? time.local[1] : 1));
     array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
     return time.trusted ? time.event_seconds : time.host_seconds;
 }

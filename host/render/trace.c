@@ -74,7 +74,9 @@ static double trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_m
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof count, &count);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof results, &results);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof objects, &objects);
-    size_t items = (count + renderer->report.lanes - 1) / renderer->report.lanes, group = TRACE_GROUP;
+    const size_t *fixed = compute->device->work_group,
+                 items = (count + renderer->report.lanes - 1) / renderer->report.lanes,
+                 group = fixed[0] > 0 ? fixed[0] * fixed[1] : TRACE_GROUP;
     return renderer_launch(renderer, KERNEL_TRACE, 1, NULL, &items, &group);
 }
 
