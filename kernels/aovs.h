@@ -13,7 +13,7 @@
 // aov.cl
 #define HIT_AOV_LIST(LAYER)                                                                                    \
     LAYER(T,        t,        LENGTH,  1, "distance from the eye; infinite where nothing is hit")               \
-    LAYER(NORMAL,   normal,   REAL,    3, "unit shading normal, facing the eye; 0 where nothing is hit")        \
+    LAYER(NORMAL,   normal,   REAL,    3, "unit shading normal, on the side that is seen; 0 where nothing is hit") \
     LAYER(POSITION, position, LENGTH,  3, "hit point, in the scene's coordinates")                              \
     LAYER(OBJECT,   object,   INTEGER, 1, "number of the object, from 0; 4294967295 where nothing is hit")      \
     LAYER(SHADOW,   shadow,   INTEGER, PER_LIGHT, "1 where that light is occluded, 0 elsewhere")                \

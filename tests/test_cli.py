@@ -317,6 +317,11 @@ class Images(CliTestCase):
         self.assertEqual(sorted(os.listdir("frames")), ["other.png", "sphere.png"])
         self.assertEqual(png_read("frames/sphere.png")[:2], png_read("one.png")[:2])
         self.assertEqual(png_read("frames/other.png")[2]["Scene"], "other.yaml")
+        os.remove("frames/other.png")
+        os.remove("frames/sphere.png")
+        os.mkdir("frames/sphere.png")
+        self.refuses(f"render sphere.yaml other.yaml {SMALL} -o frames", "frames/sphere.png")
+        self.assertTrue(os.path.isfile("frames/other.png"))
 
     def test_png(self):
         self.glint(f"render sphere.yaml {SMALL}")
@@ -407,6 +412,21 @@ class Aovs(CliTestCase):
             self.assertLess(normal[2], 0)
             cosine = sum(n * (light - p) for n, light, p in zip(normal, (3, 4, -5), position))
             self.assertTrue(abs(cosine) < 1e-3 or shadow[0] == (cosine < 0), cosine)
+
+    def test_interpolated_normal_is_turned_with_its_triangle(self):
+        """Near silhouettes it may point away from the eye, whichever way the file turns it."""
+        corners = (-0.05, -1, -1), (0.05, -1, 1), (0, 1, 0)
+        for x, z in (1, 0.3), (-1, -0.3), (1, -0.3):
+            lines = [f"v {' '.join(map(str, corner))}" for corner in corners]
+            write("mesh.obj", "\n".join([*lines, f"vn {x} 0 {z}", "f 1//1 2//1 3//1\n"]))
+            write("mesh.yaml", "camera: {position: [0.4, -0.5, -40], look_at: [0, -0.5, 0], fov: 0.05}\n"
+                               "objects: [{mesh: {file: mesh.obj}}]\n")
+            self.glint("render mesh.yaml --size 1x1 --aov normal,ray -o mesh.png")
+            (*_, (normal,)), (*_, (ray,)) = npy_read("mesh.normal.npy"), npy_read("mesh.ray.npy")
+            sign = 1 if x > 0 else -1
+            expected = [sign * value / math.hypot(x, z) for value in (x, 0, z)]
+            self.assertLess(math.dist(normal, expected), 1e-6)
+            self.assertEqual(sum(n * r for n, r in zip(normal, ray)) > 0, sign * z > 0)
 
     def test_no_shadows_without_lights(self):
         write("unlit.yaml", re.sub("lights:.*(?=objects)", "ambient: [1, 1, 1]\n", SPHERE, flags=re.DOTALL))
