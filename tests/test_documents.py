@@ -1,0 +1,322 @@
+#!/usr/bin/env -S python3 -B
+"""Sentences of the documents that repeat a measured number agree with docs/measurements, at the digits that they give.
+
+The tables between <!-- measured --> are tested by tests/report.sh.
+"""
+import contextlib
+import importlib.util
+import io
+import json
+import re
+import statistics
+import unittest
+from functools import cache
+from importlib.machinery import SourceFileLoader
+
+from glint import ROOT, main, read
+
+MESHES_AND_SPHERES = "bench-peers", "bench-peers-more"
+
+
+@cache
+def measured(name):
+    return json.loads(read(ROOT / f"docs/measurements/{name}.json"))
+
+
+@cache
+def text(document):
+    """On one line, so that a sentence is found wherever it wraps."""
+    return " ".join(read(ROOT / document).split())
+
+
+def agrees(words, value):
+    """Whether a number as a document gives it is the value rounded to its digits; texts must be equal."""
+    if isinstance(value, str):
+        return words == value
+    mantissa, _, exponent = words.replace(",", "").partition("e")
+    unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    return abs(float(f"{mantissa}e{exponent or 0}") - value) <= 0.5 * unit * (1 + 1e-9)
+
+
+# Other programs
+
+def times_glint(program, kind):
+    """A program's times over glint's at single, of the scenes of a kind."""
+    return [rung["programs"][program]["to_glint"] for name in MESHES_AND_SPHERES for rung in measured(name)["rungs"]
+            if program in rung["programs"] and rung["scene"].startswith("spheres-") == (kind == "spheres")]
+
+
+def frame(scene):
+    return next(rung["programs"]["glint single"]["frame_ms"]["median"] for rung in measured("bench-peers")["rungs"]
+                if rung["scene"] == scene)
+
+
+def peer_cases(program):
+    """Passed, all, and the names of those that failed."""
+    asked = {case["case"]: case["programs"][program]["passed"] for case in measured("hard-cases-peers")["cases"]
+             if case["programs"].get(program, {}).get("asked")}
+    return sum(asked.values()), len(asked), sorted(name for name, passed in asked.items() if not passed)
+
+
+def leaks(program, name):
+    why = next(case["programs"][program]["why"] for case in measured("hard-cases-peers")["cases"] if case["case"] == name)
+    return tuple(map(int, re.fullmatch(r"leaks (\d+) of (\d+)", why).groups()))
+
+
+def glint_peer_cases():
+    counts = {peer_cases(f"glint {precision}")[:2] for precision in ("fast", "single", "strict", "double")}
+    (both,) = counts
+    return both
+
+
+def spd(scene, program, key):
+    rung = next(rung for rung in measured("peers-spd")["rungs"] if rung["scene"] == scene)
+    return rung["programs"][program]["difference"][key]
+
+
+def spd_rest():
+    """The largest share of pixels off where no other sentence says why."""
+    named = ("balls", "glint single"), ("balls", "Tachyon"), ("teapot", "POV-Ray"), ("teapot", "Tachyon"), ("gears", "POV-Ray")
+    return max(program["difference"]["pixels_off"] for rung in measured("peers-spd")["rungs"]
+               for name, program in rung["programs"].items() if "difference" in program and (rung["scene"], name) not in named)
+
+
+def tachyon_means():
+    return [rung["programs"]["Tachyon"]["difference"]["mean"] for rung in measured("peers-spd")["rungs"]
+            if "Tachyon" in rung["programs"] and rung["scene"] != "balls"]
+
+
+# The ladder of ulps
+
+def rungs(*forms, shapes=None, distances=lambda distance: True):
+    return [rung for rung in measured("ulp-ladder")["rungs"]
+            if rung["form"] in forms and (not shapes or rung["shape"] in shapes) and distances(rung["distance"])]
+
+
+OWN = "fast", "single", "strict", "double"
+ROUND = "sphere", "cylinder", "cone"
+
+
+def ladder_wrong():
+    wrong = [rung for rung in rungs(*OWN) if rung["wrong"] > 0]
+    (rung,) = wrong
+    return (sum(rung["rays"] for rung in rungs(*OWN)) / 1e6, rung["wrong"], rung["precision"], rung["shape"], rung["distance"])
+
+
+def ladder_open(distances):
+    return max(100 * rung["undecided"] / rung["rays"] for rung in rungs(*OWN, distances=distances))
+
+
+def textbook_wrong(shapes, *distances):
+    """Percentages, the least and the most."""
+    wrong = [100 * rung["wrong"] / rung["rays"] for rung in rungs("textbook", shapes=shapes, distances=lambda d: d in distances)]
+    return min(wrong), max(wrong)
+
+
+def textbook():
+    return (min(rung["steep"]["max"] for rung in rungs("textbook", shapes=ROUND, distances=lambda d: d >= 100)),
+            textbook_wrong(ROUND, 100)[1], *textbook_wrong(ROUND, 1000), *textbook_wrong(ROUND, 1e4, 1e5),
+            *textbook_wrong(("torus",), 100, 1000, 1e4, 1e5))
+
+
+def torus_beyond_its_bound():
+    beyond = [rung for rung in rungs(*OWN) if rung["bound_fraction"] > 1]
+    assert {(rung["shape"], rung["precision"]) for rung in beyond} == {("torus", "strict"), ("torus", "double")}
+    assert {rung["distance"] for rung in beyond} == {1.0001, 1.01}, "the two nearest distances"
+    return (max(rung["bound_fraction"] for rung in beyond),)
+
+
+# Budgets
+
+def budgets():
+    """Of each row: its precision, the time over that of double, and the row."""
+    return [(row["precision"], (row["pilot"]["total_ms"] + row["render_ms"]) / row["double_ms"], row) for row in measured("budgets")["rows"]]
+
+
+def budget_example():
+    row = next(row for _, _, row in budgets() if row["scene"].endswith("cylinders-cones.yaml") and row["precision"] == "single")
+    pilot = next(candidate for candidate in row["pilot"]["candidates"] if candidate["precision"] == "single")
+    return pilot["error"], row["error"]
+
+
+def budget_costs():
+    pilots = [row["pilot"]["total_ms"] for *_, row in budgets()]
+    doubles = [ratio for precision, ratio, _ in budgets() if precision == "double"]
+    others = [ratio for precision, ratio, _ in budgets() if precision != "double"]
+    slower = [ratio for ratio in doubles if ratio > 1]
+    return (len(pilots), min(pilots), max(pilots), len(slower) + sum(ratio > 1 for ratio in others), len(slower), len(doubles),
+            100 * (statistics.median(slower) - 1), sum(ratio > 1 for ratio in others), len(others), statistics.median(others))
+
+
+def budget_long(seconds):
+    rows = [(precision, ratio) for precision, ratio, row in budgets() if row["double_ms"] > 1000 * seconds]
+    doubles = [ratio for precision, ratio in rows if precision == "double"]
+    others = [ratio for precision, ratio in rows if precision != "double"]
+    return len(rows), len(others), min(others), max(others), len(doubles), min(doubles), max(doubles)
+
+
+# Certified images
+
+def certified_compared(precision):
+    rows = measured("certified")["rows"]
+    compared = sum(row["pixels"] - row["reference_undecided"] for row in rows)
+    return compared - sum(sum(row["wrong"][precision].values()) for row in rows), compared
+
+
+# Hard cases
+
+def verify_counts():
+    """The cases of the suite, which all precisions pass."""
+    (count,) = {len(run["cases"]) for run in measured("verify")["precisions"]}
+    assert all(run["failed"] == 0 for run in measured("verify")["precisions"])
+    return count
+
+
+def passed_elsewhere(report, implementation):
+    """Cases that all precisions pass, the number of precisions, and whether the bits at strict are PoCL's."""
+    by_name = {entry["implementation"]: entry for entry in measured(report)["implementations"]}
+    runs = by_name[implementation]["precisions"]
+    (passed,) = {run["passed"] for run in runs}
+    assert all(run["failed"] == 0 for run in runs)
+    hashes = [{case["name"]: case["hash"] for case in run["cases"]} for name in ("pocl", implementation)
+              for run in by_name[name]["precisions"] if run["precision"] == "strict"]
+    assert hashes[0] == hashes[1], "other bits than PoCL's"
+    return passed, len(runs)
+
+
+def rusticl_m6_minutes():
+    runs = next(entry for entry in measured("verify-rusticl")["implementations"] if entry["implementation"] == "rusticl")["precisions"]
+    return [case["seconds"] / 60 for run in runs for case in run["cases"] if case["name"] == "M6"]
+
+
+def perturbed(precision, case):
+    return [failure for run in measured("perturb")["runs"] if run["precision"] == precision
+            for failure in run["failures"] if failure["name"] == case]
+
+
+def perturbed_others():
+    """What fails other than R6 at fast, and R7 at fast and single."""
+    return [(run["precision"], run["seed"], failure["name"]) for run in measured("perturb")["runs"] for failure in run["failures"]
+            if (run["precision"], failure["name"]) not in (("fast", "R6"), ("fast", "R7"), ("single", "R7"))]
+
+
+def perturbed_seeds(precision):
+    seeds = sorted({run["seed"] for run in measured("perturb")["runs"] if run["precision"] == precision})
+    return f"1-{len(seeds)}" if seeds == list(range(1, len(seeds) + 1)) and len(seeds) > 2 else ",".join(map(str, seeds))
+
+
+def scaling_cell(image, ranks, column):
+    """Of the document's own table, which tools/scaling --check tests."""
+    row = next(line for line in read(ROOT / "docs/scaling.md").splitlines() if line.startswith(f"| {image} | {ranks} |"))
+    return float(row.split("|")[2 + column])
+
+
+NUMBER = r"([\d.,]*\d(?:e[-+]?\d+)?)"
+# Document, a pattern with a group for each number or name, and what these are by the measurements.
+CLAIMS = [  # N stands for a number
+    ("README.md", "spheres render up to N times as fast as with Embree's packets and Embree's own spheres, N to N times as fast",
+     lambda: (max(times_glint("Embree packets", "spheres")), min(times_glint("Embree packets, our spheres", "spheres")),
+              max(times_glint("Embree packets, our spheres", "spheres")))),
+    ("README.md", "meshes N to N times as fast",
+     lambda: (min(times_glint("Embree packets", "meshes")), max(times_glint("Embree packets", "meshes")))),
+    ("README.md", "`glint verify` runs N against exact answers", lambda: (verify_counts(),)),
+    ("README.md", "glint passes N of N, POV-Ray N of N, Tachyon N of N, Embree N of N",
+     lambda: (*glint_peer_cases(), *peer_cases("POV-Ray")[:2], *peer_cases("Tachyon")[:2], *peer_cases("Embree")[:2])),
+    ("CHANGELOG.md", "a million spheres take N ms at 1920x1080 on two CPU cores, a million triangles N ms",
+     lambda: (frame("spheres-1000000"), frame("bunny-1000000"))),
+    ("docs/numerics.md", r"Of the N million rays of all precisions N has a wrong hit or miss outside the band below: at `(\w+)`, at a (\w+) "
+                         "N radii away", ladder_wrong),
+    ("docs/numerics.md", "At most N % of a shape's rays from one distance lie in the band up to 100,000 radii, N % at a million",
+     lambda: (ladder_open(lambda d: d <= 1e5), ladder_open(lambda d: d == 1e6))),
+    ("docs/numerics.md", "The torus at its two nearest distances needs up to N times it", torus_beyond_its_bound),
+    ("docs/numerics.md", "are off by N ulp or more from a hundred radii on. Their hits and misses are wrong for up to N % of the rays at "
+                         "100 radii, N to N % at 1,000, N to N % at 10,000 and 100,000; those of tori for N to N % from 100 to 100,000",
+     textbook),
+    ("docs/accuracy.md", "In `cylinders-cones.yaml` at `single` the pilot's own RMSE is N, the image's N: hence", budget_example),
+    ("docs/accuracy.md", "The N pilots took N to N ms; N rows took longer than `double` alone: N of the N that end at `double`, by N % in "
+                         "the median, and N of the N others, which take N of its time in the median", budget_costs),
+    ("docs/accuracy.md", "`double` takes more than 0.35 s: of the N such rows the N with a faster precision took N to N of the time of "
+                         "`double`, the N that end at `double` N to N.", lambda: budget_long(0.35)),
+    ("docs/accuracy.md", "`double` decides N of N compared pixels of the scenes below rightly", lambda: certified_compared("double")),
+    ("docs/verify.md", r"are of the kernels and the N cases of 2026-11-22. All N passed on Intel's CPU runtime \(N precisions\) and on "
+                       r"rusticl \(Mesa 22.3, no double\), N of few rays on Oclgrind, at `strict` each with PoCL's bits",
+     lambda: (passed_elsewhere("verify-rusticl", "rusticl")[0], *passed_elsewhere("verify-intel", "intel"),
+              passed_elsewhere("verify-everywhere", "oclgrind")[0])),
+    ("docs/verify.md", "today's N cases", lambda: (verify_counts(),)),
+    ("docs/verify.md", "M6 takes it N to N minutes", lambda: (min(rusticl_m6_minutes()), max(rusticl_m6_minutes()))),
+    ("docs/verify.md", "R6 at `fast` loses N to N of N pixels",
+     lambda: (min(case["differing"] for case in perturbed("fast", "R6")), max(case["differing"] for case in perturbed("fast", "R6")),
+              perturbed("fast", "R6")[0]["rays"])),
+    ("docs/verify.md", "R7 exceeds its 1e-5: N at `fast`, N at `single`",
+     lambda: (max(case["worst"] for case in perturbed("fast", "R7")), max(case["worst"] for case in perturbed("single", "R7")))),
+    ("docs/verify.md", r"perturb\.json single:(\S+) fast:(\S+) strict:(\S+) double:(\S+)",
+     lambda: tuple(map(perturbed_seeds, ("single", "fast", "strict", "double")))),
+    ("docs/verify.md", r"\| glint, each precision \| N of N \|", glint_peer_cases),
+    ("docs/verify.md", r"\| Embree \| N of N \| C3, C4, C7: .*?; M1: N of N rays leak .*?; C6, P3, S6: one ray each",
+     lambda: (*peer_cases("Embree")[:2], *leaks("Embree", "M1"))),
+    ("docs/verify.md", r"\| Embree, not robust \| N of N \|", lambda: peer_cases("Embree without its robust flag")[:2]),
+    ("docs/verify.md", r"\| POV-Ray \| N of N \|", lambda: peer_cases("POV-Ray")[:2]),
+    ("docs/verify.md", r"\| Tachyon \| N of N \|", lambda: peer_cases("Tachyon")[:2]),
+    ("docs/performance.md", r"Tachyon truncates to 8 bits: a mean difference of N to N of 255 \(N in balls",
+     lambda: (min(tachyon_means()), max(tachyon_means()), spd("balls", "Tachyon", "mean"))),
+    ("docs/performance.md", "Tachyon sees the background, glint and POV-Ray nothing: N% of the pixels",
+     lambda: (100 * spd("balls", "Tachyon", "pixels_off"),)),
+    ("docs/performance.md", "glint's `single` is off in N%", lambda: (100 * spd("balls", "glint single", "pixels_off"),)),
+    ("docs/performance.md", "where the interpolated one would reflect into the surface: N% of the pixels",
+     lambda: (100 * spd("teapot", "POV-Ray", "pixels_off"),)),
+    ("docs/performance.md", r"glint the fraction T \(0.8 here\): N%", lambda: (100 * spd("gears", "POV-Ray", "pixels_off"),)),
+    ("docs/scaling.md", r"\(N ns per sample of `scenes/demo.yaml` on two cores\), of PNG \(N ns per pixel\)",
+     lambda: (1e9 * measured("scaling")["sample_seconds"], 1e9 * measured("scaling")["encode_seconds_per_pixel"])),
+    ("docs/scaling.md", "Tiles would raise 1080p at 100 ranks from N to N, 8K from N to N, 32K only from N to N",
+     lambda: tuple(scaling_cell(image, 100, column) for image in ("1080p", "8K", "32K") for column in (1, 3))),
+]
+# Document, a sentence, and whether the measurements hold it up.
+FACTS = [
+    ("docs/accuracy.md", "Every image keeps its budget.", lambda: all(row["error"] <= float(row["budget"]) for *_, row in budgets())),
+    ("docs/verify.md", "Seeds 1 to 20 hold at `fast` and `single`, but R6 at `fast`", lambda: perturbed_others() == []),
+    ("docs/verify.md", "| C3, C4, C7: cones", lambda: peer_cases("Embree")[2] == ["C3", "C4", "C6", "C7", "M1", "P3", "S6"]),
+    ("docs/verify.md", "| these and P5 |",
+     lambda: set(peer_cases("Embree without its robust flag")[2]) == {*peer_cases("Embree")[2], "P5"}),
+    ("docs/verify.md", "| P1, S6, R6: absolute tolerances; P5: triangles leak at edges |",
+     lambda: peer_cases("POV-Ray")[2] == ["P1", "P5", "R6", "S6"]),
+    ("docs/verify.md", "| P2: a plane shadows itself; R6 |", lambda: peer_cases("Tachyon")[2] == ["P2", "R6"]),
+    ("docs/performance.md", "Elsewhere at most one pixel in a thousand is off, at edges.", lambda: spd_rest() <= 1e-3),
+]
+
+
+class Documents(unittest.TestCase):
+    def test_agreement_is_at_the_digits_given(self):
+        for words, value in ("1.5", 1.5499), ("1.50", 1.4951), ("3e-4", 3.4e-4), ("3.5e-4", 3.53e-4), ("47,176", 47176), ("29", 28.51):
+            self.assertTrue(agrees(words, value), words)
+        for words, value in ("1.5", 1.57), ("1.50", 1.51), ("3e-4", 3.6e-4), ("47,176", 47177), ("0.3", 2.56), ("strict", "single"):
+            self.assertFalse(agrees(words, value), words)
+
+    def test_numbers(self):
+        for document, pattern, values in CLAIMS:
+            pattern = re.sub(r"\bN\b", lambda _: NUMBER, pattern)
+            with self.subTest(f"{document}: {pattern}"):
+                found = re.search(pattern, text(document))
+                self.assertIsNotNone(found, "the sentence has changed")
+                expected = values()
+                self.assertEqual(len(found.groups()), len(expected))
+                for words, value in zip(found.groups(), expected):
+                    self.assertTrue(agrees(words, value), f"{words}, measured {value}")
+
+    def test_facts(self):
+        for document, sentence, holds in FACTS:
+            with self.subTest(f"{document}: {sentence}"):
+                self.assertIn(sentence, text(document))
+                self.assertTrue(holds())
+
+    def test_the_ladder(self):
+        """The table of numerics.md is what tools/numerics/ulp-ladder prints of its report."""
+        loader = SourceFileLoader("ulp_ladder", str(ROOT / "tools/numerics/ulp-ladder"))
+        tool = importlib.util.module_from_spec(importlib.util.spec_from_loader("ulp_ladder", loader))
+        loader.exec_module(tool)
+        with contextlib.redirect_stdout(io.StringIO()) as table:
+            tool.print_table(measured("ulp-ladder")["rungs"], measured("ulp-ladder")["tests"])
+        self.assertIn(table.getvalue().strip(), read(ROOT / "docs/numerics.md"))
+
+
+if __name__ == "__main__":
+    main()
