@@ -43,6 +43,32 @@ function sortTables(section) {
   });
 }
 
+// Elements that reach beyond the page's width, other than within what scrolls; of drawings themselves and their texts.
+function readWide() {
+  const scrolls = (element) => element && element !== document.body &&
+    (/auto|scroll/.test(getComputedStyle(element).overflowX) || scrolls(element.parentElement));
+  return [...document.body.querySelectorAll(":not(script, template, noscript, svg *), .panels text")].filter((element) => {
+    const { left, right, width } = element.getBoundingClientRect();
+    return width > 0 && (left < -0.5 || right > innerWidth + 0.5) && !scrolls(element.parentElement);
+  }).map((element) => `${element.tagName} ${element.getAttribute("class")} ${element.textContent.slice(0, 40)}`);
+}
+
+// Of a panel: its names, those that cover another text, and marks through which one below does not show.
+function readLabels(panel) {
+  const texts = [...panel.querySelectorAll("text")].map((text) => ({ text, box: text.getBoundingClientRect() }));
+  const covers = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 2 && b.top < a.bottom - 2;
+  return {
+    labels: texts.filter(({ text }) => text.matches(".label")).map(({ text }) => text.textContent),
+    covering: texts.filter(({ text, box }) => text.matches(".label") &&
+      texts.some((other) => other.text !== text && covers(box, other.box))).map(({ text }) => text.textContent),
+    opaque: [...panel.querySelectorAll(".point use")].filter((use) => {
+      const { fill, fillOpacity } = getComputedStyle(use);
+      return fill !== "none" && Number(fillOpacity) === 1;
+    }).length,
+    points: panel.querySelectorAll(".point").length, scale: panel.getCTM().a,
+  };
+}
+
 function readPixel(source, x, y) {
   const image = [...document.images].find(({ src }) => src === source);
   const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight), context = canvas.getContext("2d");
@@ -66,8 +92,9 @@ function readSplit(section, percent) {
 
 function readScene(section, scene) {
   const find = (selector) => section.querySelector(selector), panels = readPanels(section);
+  const readAllLabels = () => [...section.querySelectorAll(".panels svg")].map(readLabels), labels = readAllLabels();
   choose(find(".plot select"), "image");
-  const chosen = readPanels(section), split = [50, 25].map((percent) => readSplit(section, percent));
+  const chosen = readPanels(section), chosenLabels = readAllLabels(), chosenWide = readWide(), split = [50, 25].map((percent) => readSplit(section, percent));
   const images = find("select.right").options;
   choose(find("select.right"), images.length - 1);
   const chosenIsShown = find(".stage img.right").src === scene.images.at(-1).difference;
@@ -78,7 +105,7 @@ function readScene(section, scene) {
   const scrollError = (position, scroll, visible, whole) =>
     Math.abs(scroll - Math.min(Math.max(8 * (position + 0.5) - visible / 2, 0), Math.max(whole - visible, 0)));
   return {
-    heading: find("h2").textContent, panels, chosen, split, chosenIsShown, zoom: stage.offsetWidth / scene.size[0],
+    heading: find("h2").textContent, panels, labels, chosen, chosenLabels, chosenWide, split, chosenIsShown, zoom: stage.offsetWidth / scene.size[0],
     offCenter: [scrollError(x, pane.scrollLeft, pane.clientWidth, stage.offsetWidth),
                 scrollError(y, pane.scrollTop, pane.clientHeight, stage.offsetHeight)],
     tables: sortTables(section), pixels: readWorst(scene),
@@ -87,9 +114,10 @@ function readScene(section, scene) {
 }
 
 addEventListener("load", () => {
-  const overflow = Math.max(0, document.documentElement.scrollWidth - innerWidth);
+  const overflow = Math.max(0, document.documentElement.scrollWidth - innerWidth), wide = readWide();
+  const hiddenBudgets = [...document.querySelectorAll(".overview .table")].map((table) => table.scrollWidth - table.clientWidth);
   const drawn = [...document.querySelectorAll("section.scene")].map((section, index) => readScene(section, scenes[index]));
   const loaded = performance.getEntriesByType("resource").map(({ name }) => name).filter((name) => !name.startsWith("data:"));
-  const found = JSON.stringify({ errors, loaded, overflow, scenes: drawn }).replaceAll("<", "\\u003c");
+  const found = JSON.stringify({ errors, loaded, width: innerWidth, overflow, wide, hiddenBudgets, scenes: drawn }).replaceAll("<", "\\u003c");
   document.documentElement.replaceChildren(html("script", { id: "found", type: "application/json" }, found));
 });

@@ -115,6 +115,14 @@ class Html(TestCase):
         self.check_axis(panel["x"], times)
         self.check_axis(panel["y"], errors)
 
+    def check_labels(self, panels, chosen):
+        """Each point has its name, but in small panels with long names none has; no name covers a text, and a mark under
+        another one shows through."""
+        for panel in [*panels, *chosen]:
+            self.assertEqual((panel["covering"], panel["opaque"]), ([], 0))
+            self.assertIn(len(panel["labels"]), {panel["points"]} if panel in chosen else {0, panel["points"]})
+            self.assertGreater(10.5 * panel["scale"], 9, "pixels of text")
+
     def check_tables(self, tables, scene):
         """Every value, and its order after one and after two clicks on the heading."""
         colors_only = scene["reference"]["kind"] == "file"
@@ -148,15 +156,22 @@ class Html(TestCase):
         start = "<script>\"use strict\"; const errors = []; for (const type of ['error', 'securitypolicyviolation'])" \
                 "addEventListener(type, (event) => errors.push(event.message ?? event.blockedURI));</script>"
         probed = page.replace("<head>", f"<head>{start}", 1).replace("</body>", f"<script>{probe}</script></body>")
-        for width in (1280, 500):
-            drawn = dump(write("probed.html", probed), f"--window-size={width},900")
+        # chromium's windows are no narrower than 500 pixels, a frame is
+        framed = f'<body style="margin: 0"><iframe width="390" height="900" style="border: 0" srcdoc="{html.escape(probed)}">' \
+                 "</iframe><script>onload = () => document.body.replaceChildren(" \
+                 "document.querySelector('iframe').contentDocument.getElementById('found'))</script>"
+        for width, shown in (1280, probed), (390, framed):
+            drawn = dump(write("probed.html", shown), "--window-size=1280,900")
             found = json.loads(re.search(r'<script id="found"[^>]*>(.*?)</script>', drawn, re.DOTALL)[1])
             self.assertEqual((found["errors"], found["loaded"]), ([], []))
-            self.assertEqual(found["overflow"], 0, f"wider than {width} pixels")
+            self.assertEqual((found["width"], found["overflow"]), (width, 0))
+            self.assertEqual((found["wide"], found["hiddenBudgets"]), ([], [0]), f"{width} pixels")
             self.assertEqual([drawn["heading"] for drawn in found["scenes"]], [scene["scene"] for scene in report["scenes"]])
             for drawn, scene in zip(found["scenes"], report["scenes"], strict=True):
                 kinds = {kind for variant in scene["variants"] for kind in variant.get("pareto", {})}
                 self.assertEqual({panel["kind"] for panel in drawn["panels"]}, kinds)
+                self.assertEqual(drawn["chosenWide"], [], f"{width} pixels")
+                self.check_labels(drawn["labels"], drawn["chosenLabels"])
                 for panel in [*drawn["panels"], *drawn["chosen"]]:
                     self.check_panel(panel, scene)
                 self.assertEqual([panel["kind"] for panel in drawn["chosen"]], ["image"])
@@ -172,8 +187,10 @@ class Html(TestCase):
         self.assertIn("JavaScript draws this report", dump(write("sandbox.html", sandbox)))
 
     def test_two_scenes(self):
-        shutil.copy("spheres16.yaml", "<!--<script>&\"é.yaml")
-        page, report = self.page("spheres16.yaml '<!--<script>&\"é.yaml' --precision fast,certified,double")
+        name = f"<!--<script>&\"é{'-long' * 40}.yaml"
+        shutil.copy("spheres16.yaml", name)
+        page, report = self.page(f"spheres16.yaml '{name}' --precision fast,strict,certified,double")
+        self.assertEqual(len(report["scenes"][0]["picks"]), 3)
         self.check_drawn(page, report)
 
     def test_crossed_out(self):

@@ -25,7 +25,7 @@ function drawOverview() {
   const row = (scene, index) => html("tr", {},
     html("th", { scope: "row" }, html("a", { href: `#scene-${index}` }, scene.scene)),
     ...scene.picks.map(({ variant, frame_ms: time }) =>
-      (variant === null ? html("td", {}, "none") : html("td", {}, variantName(scene, variant), `, ${formatMs(time)}`))));
+      (variant === null ? html("td", {}, "none") : html("td", {}, html("span", {}, variantName(scene, variant), ","), ` ${formatMs(time)}`))));
   const headings = scenes[0].picks.map(({ budget }) => html("th", { scope: "col" }, `at most ${budgetText(budget)}`));
   return html("div", { class: "table", role: "region", "aria-label": "The fastest", tabindex: 0 },
               html("table", {}, html("thead", {}, html("tr", {}, html("th", { scope: "col" }, "Scene"), ...headings)),

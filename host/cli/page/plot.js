@@ -104,21 +104,34 @@ function drawPoint({ index, variant, error, time }, name, kind, { x, y }) {
 const overlap = (a, b) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
-// Names beside the marks, each where it covers nothing; one that fits nowhere is left out.
-function drawLabels(points, names, { x, y, left, right, bottom }) {
+const KEY_WIDTH = 11; // of the mark before a name
+
+// Where a name may stand, seen from its mark: next to it, else above or below, where a mark before it says whose it is.
+function labelPlaces(width) {
+  const near = [[6, -19], [6, 7], [-6 - width, 7], [-6 - width, -19], [9, -6], [-9 - width, -6]];
+  const far = Array.from({ length: 12 }, (_, i) => [-32 - 13 * i, 20 + 13 * i]).flat();
+  return [...near.map(([dx, dy]) => ({ dx, dy, width, key: 0 })),
+          ...far.flatMap((dy) => [6, -6 - width - KEY_WIDTH].map((dx) => ({ dx, dy, width: width + KEY_WIDTH, key: KEY_WIDTH })))];
+}
+
+// Names, each where it covers nothing.
+function drawLabels(points, scene, { x, y, left, right, top, bottom, hasAxis }) {
   const taken = points.flatMap(({ time, error }) => [
     { x: x(time.median) - 7, y: y(error) - 7, width: 14, height: 14 },
     { x: x(time.min), y: y(error) - 3, width: x(time.max) - x(time.min), height: 6 },
   ]);
-  return points.flatMap(({ index, time, error }) => {
-    const width = 5.7 * names[index].length, height = 12;
-    const boxes = [[6, -19], [6, 7], [-6 - width, 7], [-6 - width, -19], [9, -6], [-9 - width, -6]]
-      .map(([dx, dy]) => ({ x: x(time.median) + dx, y: y(error) + dy, width, height }));
-    const free = boxes.find((box) => box.x > left - 2 && box.x + width < right + 12 && box.y + height <= bottom &&
-                                     !taken.some((other) => overlap(box, other)));
+  if (!hasAxis) taken.push({ x: left, y: (top + bottom) / 2 - 12, width: 110, height: 16 }); // the note
+  return points.flatMap(({ index, variant, time, error }) => {
+    const name = scene.names[index];
+    const boxes = labelPlaces(5.7 * name.length).map(({ dx, dy, width, key }) =>
+      ({ x: x(time.median) + dx, y: y(error) + dy, width, height: 12, key }));
+    const free = boxes.find((box) => box.x > left - 2 && box.x + box.width < right + 12 && box.y > top - 10 &&
+                                     box.y + box.height <= bottom && !taken.some((other) => overlap(box, other)));
     if (!free) return [];
     taken.push(free);
-    return svg("text", { class: "label", x: free.x, y: free.y + 10 }, names[index]);
+    const mark = svg("use", { href: `#mark-${variant.precision}`, class: `mark ${variant.precision}`,
+                              transform: `translate(${free.x + 4} ${free.y + 6.5}) scale(0.75)` });
+    return [...(free.key ? [mark] : []), svg("text", { class: "label", x: free.x + free.key, y: free.y + 10 }, name)];
   });
 }
 
@@ -128,7 +141,7 @@ function drawPanel(scene, kind, width, height) {
   const budgets = scene.picks.filter(({ measure, budget }) =>
     hasAxis && measure === kind.name && budget >= 10 ** lowest && budget <= 10 ** highest);
   const references = scene.variants.filter(({ status }) => status === "reference");
-  const isLabeled = width > 500 ||
+  const isLabeled = width > 300 ||
     (points.length <= 4 && points.every(({ index }) => scene.names[index].length <= 10));
   return svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "data-kind": kind.name,
                       "aria-label": `${kind.title}, ${kind.unit}, against time; the tables below have the numbers` },
@@ -141,7 +154,7 @@ function drawPanel(scene, kind, width, height) {
       svg("path", { class: "reference", d: `M${x(time.median)} ${top}V${bottom}` })),
     hasAxis ? drawFront(points, kind, layout) : "",
     ...points.map((point) => drawPoint(point, scene.names[point.index], kind, layout)),
-    ...(isLabeled ? drawLabels(points, scene.names, layout) : []));
+    ...(isLabeled ? drawLabels(points, scene, layout) : []));
 }
 
 function drawLegend(scene) {
@@ -174,7 +187,8 @@ function drawPlots(section, scene) {
   const draw = () => {
     const chosen = shown.filter((kind) => kind.name === choice.value);
     panels.classList.toggle("one", chosen.length === 1);
-    panels.replaceChildren(...(chosen.length ? chosen.map((kind) => drawPanel(scene, kind, 760, 420))
+    const [width, height] = panels.clientWidth >= 600 ? [760, 420] : [380, 320]; // so that text stays readable
+    panels.replaceChildren(...(chosen.length ? chosen.map((kind) => drawPanel(scene, kind, width, height))
                                              : shown.map((kind) => drawPanel(scene, kind, 250, 210))));
   };
   choice.addEventListener("change", draw);
