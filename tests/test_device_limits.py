@@ -1,6 +1,8 @@
 #!/usr/bin/env -S python3 -B
 """Limits of devices, which tests/shims/limits.c reports and enforces: glint works within each, with the same bits, or
-refuses the device with the reason."""
+refuses the device with the reason.
+
+run_tests: first"""
 import json
 import os
 import re

@@ -2,7 +2,8 @@
 """docs/json.md is what tests/json_reference.py makes of each command's JSON, whose members are of the types it says.
 
 --write writes the page.
-"""
+
+run_tests: sanitize-long-only"""
 import json
 import re
 import sys
