@@ -43,7 +43,7 @@ function sortTables(section) {
   });
 }
 
-// Elements that reach beyond the page's width, other than within what scrolls; of drawings themselves and their texts.
+// Returns the elements wider than the page that are in no scrolling container; in drawings only the svg and its texts.
 function readWide() {
   const scrolls = (element) => element && element !== document.body &&
     (/auto|scroll/.test(getComputedStyle(element).overflowX) || scrolls(element.parentElement));
@@ -53,7 +53,7 @@ function readWide() {
   }).map((element) => `${element.tagName} ${element.getAttribute("class")} ${element.textContent.slice(0, 40)}`);
 }
 
-// Of a panel: its names, those that cover another text, and marks through which one below does not show.
+// Returns a panel's labels, the labels that cover another text, and the marks that are opaque.
 function readLabels(panel) {
   const texts = [...panel.querySelectorAll("text")].map((text) => ({ text, box: text.getBoundingClientRect() }));
   const covers = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 2 && b.top < a.bottom - 2;

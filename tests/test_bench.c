@@ -1,9 +1,8 @@
 // What glint bench makes of times, worked out by hand: quantiles, which clock is believed, when runs suffice,
-// when a peak is stable, and the rows of an earlier report.
+// and the rows of an earlier report.
 #include "host/base/fault.h"
 #include "host/measure/baseline.h"
 #include "host/measure/bench.h"
-#include "host/measure/work.h"
 #include "tests/child.h"
 #include "tests/scene_reading.h"
 
@@ -120,8 +119,6 @@ static BenchRow row_make(void)
         .key = {"scenes/a.yaml", "single", "auto", 16, 40, 30, 4, 5, 0xabcdef0123456789},
         .times = times_make(30, 1),
         .rays = {1200, 900, 100, 200, 1500},
-        .flops_per_ray = 50,
-        .image_bytes = 1200 * 12,
     };
     return row;
 }
@@ -130,28 +127,8 @@ static void test_figures(void **state)
 {
     (void)state;
     BenchRow row = row_make();
-    Peak peak = {.flops_per_second = {1e8, 0}, .bytes_per_second = 4.8e6};
     assert_near(bench_rays_per_second(&row), (1200 + 100 + 200 + 1500) / 0.030, 1e-3);
-    assert_null(bench_peak_fraction(&row, &peak).why_not);
-    assert_near(bench_peak_fraction(&row, &peak).value, 1500 * 50 / 0.030 / 1e8, 1e-9);
-    assert_near(bench_bandwidth_fraction(&row, &peak), 0.1, 1e-9);
-    row.traverses_bvh = true;
-    assert_non_null(bench_peak_fraction(&row, &peak).why_not);
     bench_row_free(&row);
-}
-
-static void test_work_of_a_scene(void **state)
-{
-    (void)state;
-    Object objects[] = {{.kind = SHAPE_SPHERE}, {.kind = SHAPE_SPHERE}, {.kind = SHAPE_MESH}};
-    Mesh mesh = {.triangle_count = 10};
-    Scene scene = {.objects = {objects, 3, 3}, .meshes = {&mesh, 1, 1}};
-    Scene spheres = {.objects = {objects, 2, 2}};
-    double sphere = work_flops_per_ray(&spheres) / 2;
-    objects[0].kind = SHAPE_TRIANGLE;
-    double triangle = work_flops_per_ray(&spheres) - sphere;
-    assert_true(sphere > 0 && triangle > 0);
-    assert_near(work_flops_per_ray(&scene), triangle + sphere + 10 * triangle, 0);
 }
 
 static long allocations_left = -1; // before one fails
@@ -319,29 +296,18 @@ static void test_baseline_without_memory(void **state)
     assert_true(failed >= 25); // values and keys of the report
 }
 
-static void test_peak_that_repeats(void **state)
-{
-    (void)state;
-    PeakWindows windows = {0};
-    const double rates[] = {100, 219, 440, 430}; // 430 is less than 3 % off, and 219 is not
-    for (size_t i = 0; i < 4; i++) {
-        peak_windows_add(&windows, rates[i]);
-        assert_false(peak_windows_stable(&windows));
-    }
-    peak_windows_add(&windows, 435);
-    assert_true(peak_windows_stable(&windows));
-    assert_true(windows.best[0] == 440 && windows.best[1] == 435 && windows.best[2] == 430);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quantiles),         cmocka_unit_test(test_events_that_agree),
-        cmocka_unit_test(test_clock_that_drifts), cmocka_unit_test(test_event_without_times),
-        cmocka_unit_test(test_runs_that_scatter), cmocka_unit_test(test_figures),
-        cmocka_unit_test(test_work_of_a_scene),   cmocka_unit_test(test_baseline),
-        cmocka_unit_test(test_broken_baselines),  cmocka_unit_test(test_baseline_without_memory),
-        cmocka_unit_test(test_peak_that_repeats),
+        cmocka_unit_test(test_quantiles),
+        cmocka_unit_test(test_events_that_agree),
+        cmocka_unit_test(test_clock_that_drifts),
+        cmocka_unit_test(test_event_without_times),
+        cmocka_unit_test(test_runs_that_scatter),
+        cmocka_unit_test(test_figures),
+        cmocka_unit_test(test_baseline),
+        cmocka_unit_test(test_broken_baselines),
+        cmocka_unit_test(test_baseline_without_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,10 +32,9 @@ class Bench(TestCase):
             self.assertEqual((len(samples), min(samples), max(samples)), (times["runs"], times["min"], times["max"]))
         self.assertTrue(run["clock"] == "event" or (run["clock"] == "host" and run["clock_doubt"]), run)
         self.assertRegex(run["kernel_hash"], "^[0-9a-f]{16}$")
-        for figure in *run["build_ms"].values(), run["peak_fraction"], run["bandwidth_fraction"]:
+        for figure in run["build_ms"].values():
             self.assertFigure(figure)
         self.assertEqual(set(run["build_ms"]), {"cold", "cached"})
-        self.assertEqual(isinstance(run["peak_fraction"], dict), run["traverses_bvh"])
         rays = run["rays"]
         self.assertEqual(set(rays), {"camera", "camera_hits", "reflected", "refracted", "shadow"})
         self.assertEqual(rays["camera"], 32 * 24)
@@ -57,8 +56,6 @@ class Bench(TestCase):
         self.assertRegex(report["build"]["commit"], "^([0-9a-f]{40}(-dirty)?|unknown)$")
         device = report["device"]
         self.assertTrue(device["name"] and device["driver"] and device["type"] and device["units"] > 0, device)
-        for key in "gflops_float", "gflops_double", "gigabytes_per_s":
-            self.assertFigure(device["peak"][key])
         self.assertEqual([(run["scene"], run["precision"]) for run in report["runs"]], [
             (scene, precision) for scene in ("sphere.yaml", TRIANGLES) for precision in ("single", "double")])
         runs = [run for run in report["runs"] if "status" not in run]
@@ -88,7 +85,7 @@ class Bench(TestCase):
         times = run["frame_samples_ms"]
         run["frame_samples_ms"] = [1e-6 * time for time in times]
         write("faster", json.dumps(report))
-        run["frame_samples_ms"], run["processor_samples_ms"] = times, [1e-6 * time for time in run["processor_samples_ms"]]
+        run["frame_samples_ms"], run["processor_samples_ms"] = times, [1e-9 * time for time in run["processor_samples_ms"]]
         write("less-work", json.dumps(report))
         calibration["rounds"] //= 2
         write("other-calibration", json.dumps(report))
@@ -103,7 +100,7 @@ class Bench(TestCase):
             process = self.glint(f"{command} less-work {long} --tolerance 1e6", status=3)
             self.assertRegex(process.stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
             self.assertRegex(process.stdout, r"(?m)processor time: [0-9.]+ \(.*\): slower by")
-        self.refuses(f"{command} other-calibration", "'other-calibration' was not calibrated by the work of this glint")
+        self.refuses(f"{command} other-calibration", "'other-calibration' is calibrated by 524288 rounds instead of 1048576")
         write("sphere.yaml", SPHERE + "# another file\n")
         self.glint(f"{command} report", status=1)  # without a row in common
         self.glint(f"{command} sphere.yaml", status=1)

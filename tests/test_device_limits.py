@@ -27,6 +27,7 @@ WORKS = (
     ("constant=16384", f"{RENDER} --precision strict --lanes 1"),
     (f"address=32,memory={8192 * MEBI}", f"{RENDER} --precision strict --lanes 1"),
     (f"memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision strict --lanes 1 --size 3840x2160 --aov {ALL_AOVS}"),
+    (f"memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision strict --lanes 1 --size 3840x512 --work-group 1x256 --aov {ALL_AOVS}"),
     ("buffers=8", f"{RENDER} --precision strict --lanes 1 --aov {ALL_AOVS}"),
     ("buffers=8", f"{RENDER} --precision certified --lanes 1 --samples 2 --aov t,path,doubt"),
     ("buffers=8", "trace sphere.yaml --rays rays.txt --lanes 1"),

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-enum { BUFFERS_MAX = 8, BYTES_MAX = 256, POINTER_BYTES = 8, KERNELS_MIN = 6 };
+enum { BUFFERS_MAX = 8, BYTES_MAX = 256, POINTER_BYTES = 8, KERNELS_MIN = 5 };
 
 typedef struct {
     size_t buffer_count, byte_count;
@@ -108,6 +108,7 @@ static size_t file_check(const char *file)
     cl_kernel kernels[8];
     cl_uint count = 0;
     compute_try(&probe_compute, clCreateKernelsInProgram(program, 8, kernels, &count));
+    assert_true(count > 0);
     for (cl_uint i = 0; i < count; i++) {
         char name[64] = "";
         clGetKernelInfo(kernels[i], CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
@@ -129,7 +130,7 @@ static void every_kernel_has_few(void **state)
     size_t count = 0;
     for (const EmbeddedFile *file = kernel_files; file->name; file++)
         if (strcmp(file->name + strlen(file->name) - 3, ".cl") == 0) count += file_check(file->name);
-    assert_in_range(count, KERNELS_MIN, 64);
+    assert_true(count >= KERNELS_MIN);
 }
 
 int main(void)

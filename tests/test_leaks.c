@@ -88,10 +88,13 @@ static void test_forgotten(void **state)
     }
     Forgotten forgotten = *(Forgotten *)*state;
     char *folder = scratch_open();
+    const int expected = forgotten == NOTHING ? 0 : LEAKED;
     ChildEnd end = child_run(launch_and_check, &forgotten, sizeof forgotten);
+    // a pointer that a worker thread's stack still holds hides a leak
+    for (int i = 0; i < 4 && end.status == 0 && expected != 0; i++)
+        end = child_run(launch_and_check, &forgotten, sizeof forgotten);
     scratch_close(folder);
     if (end.status == NO_DEVICE) skip();
-    int expected = forgotten == NOTHING ? 0 : LEAKED;
     if (end.status != expected) print_error("%s\n", end.errors);
     assert_int_equal(end.status, expected);
 }

@@ -185,7 +185,7 @@ class Mpi(TestCase):
     def test_options_for_one_process(self):
         for option in "--work-group 2x2", "--build-options=-DUNUSED":
             process = self.mpirun(f"-n 2 {RANKS} {RENDER} {option}", status=1)
-            self.assertIn("--work-group and --build-options are for one process", process.stderr)
+            self.assertIn("--work-group and --build-options need glint render, a single process", process.stderr)
 
     def test_a_refused_checkpoint(self):
         """It ends all ranks."""

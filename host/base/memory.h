@@ -16,7 +16,8 @@ size_t memory_product(size_t count, size_t size);
 // From this size on memory_allocate_large uses large pages.
 enum { MEMORY_LARGE_MIN = 1 << 22 };
 
-// Memory that an OpenCL device may use as it is, for free(): aligned for its largest type, and where it is
-// large on large pages if the system has them, which spares a CPU that reads it at random most address
-// translations. A page takes memory once it is written.
+// Allocates memory that an OpenCL device can use in place: it is aligned for OpenCL's largest type. From
+// MEMORY_LARGE_MIN bytes on it has large pages if the system offers them, which spares a CPU that reads it at
+// random most address translations. A page takes memory once it is written. Released by free(); a fault ends
+// the program if there is no memory or the product overflows.
 void *memory_allocate_large(size_t count, size_t size);

@@ -7,7 +7,6 @@
 #include "host/cli/variants.h"
 #include "host/measure/baseline.h"
 #include <getopt.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,7 +60,6 @@ typedef struct {
 typedef struct {
     BenchOptions options;
     OpenDevice open;
-    Peak peak;
     VariantSet set;
 } Bench;
 
@@ -117,7 +115,7 @@ static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
         comparison->frame = comparison_of_reports(wall, old_wall, count, tolerance);
         if (comparison->has_processor)
             comparison->processor = comparison_of_reports(processor, old_processor, count, tolerance);
-        comparison->verdict = verdict_of_both(comparison->frame.verdict, comparison->processor.verdict);
+        comparison->verdict = verdict_of_row(comparison->frame.verdict, comparison->processor.verdict);
     }
     return comparisons;
 }
@@ -133,7 +131,6 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
     const Device *device = bench->open.compute.device;
     BenchReport report = {
         .device = device,
-        .peak = &bench->peak,
         .rows = set->rows,
         .reports = reports,
         .count = set->count,
@@ -173,10 +170,8 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     Compute *compute = &bench->open.compute;
     if (bench->options.is_worker) return bench_work(&bench->set, compute);
     const VariantOptions *options = &bench->options.variants;
-    bool with_double = (options->precisions >> PRECISION_DOUBLE & 1) && compute->device->fp64;
     Progress progress;
     progress_open(&progress, bench->options.as_json);
-    peak_measure(&bench->peak, compute, with_double, options->seconds > 0 ? options->seconds : INFINITY);
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
     if (!whole) {

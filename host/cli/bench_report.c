@@ -68,16 +68,11 @@ int comparisons_status(const RowComparison *comparisons, size_t count, const cha
     return EXIT_DONE;
 }
 
-static void peak_print(const BenchReport *report, FILE *stream)
+static void device_print(const BenchReport *report, FILE *stream)
 {
-    const Peak *peak = report->peak;
     fprintf(stream, "%s, %s %s\n", report->device->name, report->device->platform_name,
             report->device->driver);
     passports_remark(report->device, stream);
-    fprintf(stream, "measured peak: %.1f GFLOP/s in float", peak->flops_per_second[0] / 1e9);
-    if (peak->flops_per_second[1] > 0) fprintf(stream, ", %.1f in double", peak->flops_per_second[1] / 1e9);
-    fprintf(stream, ", %.1f GB/s; by the %s clock%s\n", peak->bytes_per_second / 1e9,
-            peak->by_events ? "device's" : "host's", peak->is_stable ? "" : "; not stable");
 }
 
 static void summary_print(FILE *stream, Summary seconds)
@@ -85,12 +80,12 @@ static void summary_print(FILE *stream, Summary seconds)
     fprintf(stream, " %8.2f %8.2f %8.2f", 1e3 * seconds.min, 1e3 * seconds.median, 1e3 * seconds.max);
 }
 
-static void figure_print(FILE *stream, int width, int decimals, double scale, Figure figure)
+static void milliseconds_print(FILE *stream, int width, Figure seconds)
 {
-    if (figure.why_not)
+    if (seconds.why_not)
         fprintf(stream, " %*s", width, "-");
     else
-        fprintf(stream, " %*.*f", width, decimals, scale * figure.value);
+        fprintf(stream, " %*.0f", width, 1e3 * seconds.value);
 }
 
 static void launches_print(FILE *stream, const RenderReport *report)
@@ -115,12 +110,9 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     summary_print(stream, series_summarize(&row->times.frame));
     summary_print(stream, bench_kernel(&row->times));
     fprintf(stream, "  %-5s %4zu", doubt ? "host" : "event", row->times.frame.count);
-    figure_print(stream, 6, 0, 1e3, row->build_cold);
-    figure_print(stream, 5, 0, 1e3, row->build_cached);
-    fprintf(stream, " %7.1f", bench_rays_per_second(row) / 1e6);
-    figure_print(stream, 6, 1, 100, bench_peak_fraction(row, report->peak));
-    fprintf(stream, " %6.1f  %016" PRIx64 "\n", 100 * bench_bandwidth_fraction(row, report->peak),
-            row->kernel_hash);
+    milliseconds_print(stream, 6, row->build_cold);
+    milliseconds_print(stream, 5, row->build_cached);
+    fprintf(stream, " %7.1f  %016" PRIx64 "\n", bench_rays_per_second(row) / 1e6, row->kernel_hash);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);
     if (report->lists_launches && report->reports[i]) launches_print(stream, report->reports[i]);
@@ -129,13 +121,12 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
 // Reasons for missing figures, each once.
 static void reasons_print(const BenchReport *report, FILE *stream)
 {
-    const char *printed[3] = {NULL};
+    const char *printed[2] = {NULL};
     for (size_t i = 0; i < report->count; i++) {
         const BenchRow *row = &report->rows[i];
         if (row->failure) continue;
-        const char *reasons[3] = {row->build_cold.why_not, row->build_cached.why_not,
-                                  bench_peak_fraction(row, report->peak).why_not};
-        for (size_t k = 0; k < 3; k++) {
+        const char *reasons[2] = {row->build_cold.why_not, row->build_cached.why_not};
+        for (size_t k = 0; k < 2; k++) {
             if (reasons[k] && !printed[k]) fprintf(stream, "-: %s\n", reasons[k]);
             if (reasons[k]) printed[k] = reasons[k];
         }
@@ -154,11 +145,11 @@ static void rays_print(const BenchRow *row, FILE *stream)
 static const char table_head[] =
     "                      frame ms                   kernel ms                           build ms\n"
     "                       min   median      max      min   median      max  clock runs   cold  kept"
-    " Mrays/s flops% bytes%  kernel\n";
+    " Mrays/s  kernel\n";
 
 void bench_print_text(const BenchReport *report, FILE *stream)
 {
-    peak_print(report, stream);
+    device_print(report, stream);
     const char *scene = "";
     for (size_t i = 0; i < report->count; i++) {
         const BenchKey *key = &report->rows[i].key;
@@ -171,23 +162,6 @@ void bench_print_text(const BenchReport *report, FILE *stream)
         row_print(report, i, stream);
     }
     reasons_print(report, stream);
-}
-
-static void report_device_json(Json *json, const BenchReport *report)
-{
-    const Peak *peak = report->peak;
-    json_begin_object(json, "device");
-    device_json(json, report->device);
-    json_begin_object(json, "peak");
-    json_number(json, "gflops_float", peak->flops_per_second[0] / 1e9);
-    figure_json(json, "gflops_double", 1e-9,
-                (Figure){peak->flops_per_second[1],
-                         peak->flops_per_second[1] > 0 ? NULL : "no row computes in double"});
-    json_number(json, "gigabytes_per_s", peak->bytes_per_second / 1e9);
-    json_text(json, "clock", peak->by_events ? "event" : "host");
-    json_bool(json, "stable", peak->is_stable);
-    json_end(json);
-    json_end(json);
 }
 
 static void launches_json(Json *json, const RenderReport *report)
@@ -205,8 +179,9 @@ static void launches_json(Json *json, const RenderReport *report)
     json_end(json);
 }
 
-static void ratio_json(Json *json, const Comparison *result)
+static void ratio_json(Json *json, const Comparison *result, Verdict verdict)
 {
+    json_text(json, "verdict", verdict_names[verdict]);
     json_number(json, "ratio", result->ratio);
     json_number(json, "low", result->low);
     json_number(json, "high", result->high);
@@ -218,11 +193,10 @@ void comparison_json(Json *json, const RowComparison *comparison)
     if (comparison->why_not) {
         unavailable_json(json, comparison->why_not);
     } else {
-        json_text(json, "verdict", verdict_names[comparison->verdict]);
-        ratio_json(json, &comparison->frame);
+        ratio_json(json, &comparison->frame, comparison->verdict);
         if (comparison->has_processor) {
             json_begin_object(json, "processor");
-            ratio_json(json, &comparison->processor);
+            ratio_json(json, &comparison->processor, comparison->processor.verdict);
             json_end(json);
         }
     }
@@ -289,8 +263,6 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     json_end(json);
     rays_json(json, row);
     json_bool(json, "traverses_bvh", row->traverses_bvh);
-    figure_json(json, "peak_fraction", 1, bench_peak_fraction(row, report->peak));
-    json_number(json, "bandwidth_fraction", bench_bandwidth_fraction(row, report->peak));
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 
@@ -298,7 +270,9 @@ void bench_print_json(const BenchReport *report)
 {
     Json *json = json_open();
     report_start_json(json);
-    report_device_json(json, report);
+    json_begin_object(json, "device");
+    device_json(json, report->device);
+    json_end(json);
     json_begin_object(json, "calibration");
     json_int64(json, "rounds", CALIBRATION_ROUNDS);
     samples_json(json, "samples_ms", &report->calibration->wall);

@@ -19,7 +19,6 @@ typedef struct {
 
 typedef struct {
     const Device *device;
-    const Peak *peak;
     const BenchRow *rows;
     const RenderReport *const *reports; // of each row's last run; NULL where it was not measured
     size_t count;

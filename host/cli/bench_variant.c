@@ -2,7 +2,6 @@
 
 #include "host/base/clock.h"
 #include "host/base/memory.h"
-#include "host/measure/work.h"
 #include <string.h>
 
 enum { BUILD_TEST_SIDE = 64 };
@@ -77,12 +76,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);
     if (variant->renderer) {
         const RenderReport *report = renderer_report(variant->renderer);
-        row->is_double = report->is_double;
         row->traverses_bvh = (report->features & FEATURE_BVH) != 0;
-        row->flops_per_ray = work_flops_per_ray(variant->scene);
-        size_t bytes = (size_t)settings->width * settings->height * 3 *
-                       (row->is_double ? sizeof(double) : sizeof(float));
-        row->image_bytes = (double)bytes;
     } else {
         row->failure = memory_copy_text(messages.count > 0 ? messages.items[0].text : "unknown");
     }

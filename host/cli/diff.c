@@ -43,7 +43,7 @@ static const char help_text[] =
     "within\nall limits that are given; 3: different, or beyond a limit.\n\n"
     "      --max-rmse E      allow this RMSE, in linear light or in the units of other arrays\n"
     "      --max-flip E      allow this mean FLIP\n"
-    "      --max-off N       allow N differing 8-bit sRGB values, of 3 in each pixel of a color image\n"
+    "      --max-off N       allow N differing 8-bit sRGB values; a color pixel has three\n"
     "      --max-ulp N       allow N units in the last place of any value of EXR or NPY, such as distances\n"
     "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_MAX_PIXELS
         HELP_JSON HELP_HELP;
@@ -270,8 +270,9 @@ static bool images_compare(const DiffOptions *options, Comparison *comparison, M
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
     for (unsigned i = 0; i < LIMIT_COUNT; i++)
         if (options->has_limit[i] && !limit_applies(&comparison->metrics, i))
-            return message_error(messages, "--%s: \"%s\" has no %s to compare", limit_types[i].option,
-                                 options->reference_path, limit_types[i].without);
+            return message_error(messages, "--%s: \"%s\" and \"%s\" do not both have %s",
+                                 limit_types[i].option, options->reference_path, options->test_path,
+                                 limit_types[i].without);
     return !options->heatmap_path || heatmap_make(options, comparison, messages);
 }
 

@@ -41,7 +41,7 @@ bool option_count(const char *option, const char *value, uint32_t smallest, uint
     return true;
 }
 
-// WxH; `example` is shown on a mistake.
+// Reads WIDTHxHEIGHT. Prints an error that shows `example` if the value is malformed.
 static bool sides_read(const char *option, const char *example, const char *value, uint32_t *width,
                        uint32_t *height)
 {
@@ -306,7 +306,8 @@ static void list_fix(DeviceList *list, const CommonOptions *common)
     }
 }
 
-// Prints why not. Pixels of a list, and rays, have groups of one dimension.
+// Returns whether the device allows its work-group, and prints an error if not. Pixels of a list and rays are
+// launched in one dimension, so the first side must allow all of a group's work-items.
 static bool work_group_is_allowed(const Device *device)
 {
     const size_t *group = device->work_group, *longest = device->longest_group_sides;

@@ -160,11 +160,11 @@ typedef struct {
     Compute compute;
 } OpenDevice;
 
-// Chooses a device. NULL, with a message, if there is none. The list must be closed either way.
+// Chooses a device. Returns NULL with a message if there is none. The list must be closed either way.
 const Device *device_find(DeviceList *devices, const char *selector);
-// The same, and opens it with the options that the user fixed for its kernels. False, with a message, if
-// there is none or it does not allow the work-group; nothing to close then. A device that fails, now or
-// later, is reported by device_close.
+// Chooses a device, opens it and applies --work-group and --build-options. Returns false with a message if no
+// device matches or it does not allow the work-group; there is nothing to close then. device_close reports a
+// device that fails, now or later.
 bool device_open(OpenDevice *open, const CommonOptions *common);
 // Opens the device that works in double for the Compute, if the user chose one or its own device has no
 // 64-bit floating point, and prints which it is. False if there is none, with a message if the user chose
@@ -186,7 +186,8 @@ typedef struct {
     bool are_all; // chosen by "all": those that do not suit a render can be left out
 } OpenDevices;
 
-// For all devices of a list or of "all". False, with a message, if there is none; nothing to close then.
+// Opens every device that the selector lists, or all devices for "all". Returns false with a message if there
+// is none; there is nothing to close then.
 bool devices_open(OpenDevices *open, const char *selector);
 // Fixes what the user chose for the kernels of opened devices. False, with a message, if one does not allow
 // the work-group.

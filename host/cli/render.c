@@ -200,7 +200,8 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     double start = clock_seconds();
     int status = EXIT_USER;
     if (ranks && (options.common.work_group[0] > 0 || options.common.build_options))
-        return option_usage_fault("render", "--work-group and --build-options are for one process");
+        return option_usage_fault("render",
+                                  "--work-group and --build-options need glint render, a single process");
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};

@@ -14,8 +14,8 @@ typedef struct {
     bool is_unfit;                  // the last image's settings or scene do not fit a device
 } RenderDevices;
 
-// Those that the options list, with what these fix. True where they are open already. False, with a message,
-// if there is none or one does not allow the work-group.
+// Opens the devices that the options select and applies --work-group and --build-options. Returns true if
+// they are already open; false with a message if there is none or one does not allow the work-group.
 bool render_devices_open(RenderDevices *open, const CommonOptions *common);
 // Gives their renderers, and the ranks, another scene. If others are left, those that fail are removed, and
 // of all devices those that the scene or settings do not fit. False: with messages, these do not fit a

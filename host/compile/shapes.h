@@ -39,12 +39,6 @@ typedef struct {
     void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
     // The largest magnitude of an unbounded primitive's numbers, as distances from the origin.
     double (*largest_coordinate)(const void *primitive);
-
-    // Floating-point operations of a ray's test, counted by hand up to where a miss is certain, in the usual
-    // forms: the discriminant of a quadratic around the shape's center or axis, slabs for the box, the first
-    // barycentric coordinate of Möller and Trumbore's test for the triangle (Journal of Graphics Tools 2(1),
-    // 1997), and the coefficients of the torus' quartic.
-    double test_flops;
 } ShapeOps;
 
 // By ShapeKind, whose values but SHAPE_MESH are those of KIND_….

@@ -104,9 +104,10 @@ Baseline *baseline_open(const char *path, MessageList *messages)
         return NULL;
     }
     const json_t *calibration = json_object_get(report, "calibration");
-    if (json_number_value(json_object_get(calibration, "rounds")) != CALIBRATION_ROUNDS) {
-        message_error(messages, "'%s' was not calibrated by the work of this glint, %d rounds", path,
-                      CALIBRATION_ROUNDS);
+    const double rounds = json_number_value(json_object_get(calibration, "rounds"));
+    if (rounds != CALIBRATION_ROUNDS) {
+        message_error(messages, "'%s' is calibrated by %.0f rounds instead of %d: measure it again", path,
+                      rounds, CALIBRATION_ROUNDS);
         json_decref(report);
         return NULL;
     }

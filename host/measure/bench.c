@@ -74,16 +74,3 @@ double bench_rays_per_second(const BenchRow *row)
         if (kind != RAYS_CAMERA_HITS) sum += row->rays[kind]; // these are camera rays
     return (double)sum / bench_kernel(&row->times).median;
 }
-
-Figure bench_peak_fraction(const BenchRow *row, const Peak *peak)
-{
-    if (row->traverses_bvh) return (Figure){.why_not = "unknown with a BVH"};
-    uint64_t rays = row->rays[RAYS_CAMERA] + row->rays[RAYS_REFLECTED] + row->rays[RAYS_REFRACTED];
-    double rate = row->flops_per_ray * (double)rays / bench_kernel(&row->times).median;
-    return (Figure){.value = rate / peak->flops_per_second[row->is_double]};
-}
-
-double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak)
-{
-    return row->image_bytes / bench_kernel(&row->times).median / peak->bytes_per_second;
-}

@@ -1,7 +1,6 @@
 // How fast one variant renders one scene: times of repeated runs, and what follows from them.
 #pragma once
 
-#include "host/measure/peak.h"
 #include "host/measure/series.h"
 #include "host/render/renderer.h"
 #include <stdbool.h>
@@ -54,17 +53,10 @@ typedef struct {
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
     uint64_t rays[RAYS_COUNT];
-    bool is_double, traverses_bvh; // computes in double; rays traversed a BVH
-    double flops_per_ray;          // as work.h counts
-    double image_bytes;
+    bool traverses_bvh;
 } BenchRow;
 
 void bench_row_free(BenchRow *row);
 
 // Rays of every kind for each second of the launches.
 double bench_rays_per_second(const BenchRow *row);
-// Lower bound on the flops of the launches over the device's peak: only those of rays that look for their
-// closest hit count (work.h), not shadow rays, which may stop at the first object, and not colors.
-Figure bench_peak_fraction(const BenchRow *row, const Peak *peak);
-// Of the device's bandwidth: writing the image, the least that must go through memory.
-double bench_bandwidth_fraction(const BenchRow *row, const Peak *peak);

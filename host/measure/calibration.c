@@ -5,7 +5,8 @@
 
 enum { CHAINS = 8, PARTS = 64 };
 
-// Converges to 1, so that no chain overflows or becomes subnormal.
+// Runs the chains of the parts begin to end - 1. Each converges to 1, so it neither overflows nor becomes
+// subnormal.
 static void part_run(void *context, size_t begin, size_t end)
 {
     volatile double *sums = context;

@@ -1,12 +1,11 @@
-// A fixed amount of the host's own work, whose time follows the speed of the machine: no device or driver
-// takes part, so nothing that is measured can change it.
+// A fixed workload on the host, whose time follows the speed of the host's processors. No device or driver
+// takes part in it. Builds by other compilers or with other CFLAGS may take another time.
 #pragma once
 
 #include "host/measure/series.h"
 
-enum {
-    CALIBRATION_ROUNDS = 1 << 20
-}; // of eight chains of a product and a sum in double, over all processors
+// Of eight chains of a product and a sum in double, over all processors.
+enum { CALIBRATION_ROUNDS = 1 << 20 };
 
 // Seconds of each calibration; zeroed: none yet.
 typedef struct {
@@ -14,5 +13,6 @@ typedef struct {
     Series processor; // of all processors together
 } Calibration;
 
-void calibration_run(Calibration *calibration);  // some 3 ms of processor time; adds to each series
+// Takes some 3 ms of processor time, and adds to each series.
+void calibration_run(Calibration *calibration);
 void calibration_free(Calibration *calibration); // and zeroes

@@ -133,10 +133,9 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
     return comparison_judge(log_ratio, covering, tolerance);
 }
 
-Verdict verdict_of_both(Verdict one, Verdict other)
+Verdict verdict_of_row(Verdict frame, Verdict processor)
 {
-    static const Verdict strongest_first[] = {VERDICT_SLOWER, VERDICT_FASTER, VERDICT_SAME};
-    for (size_t i = 0; i < sizeof strongest_first / sizeof *strongest_first; i++)
-        if (one == strongest_first[i] || other == strongest_first[i]) return strongest_first[i];
-    return VERDICT_UNDECIDED;
+    if (frame == VERDICT_SLOWER || processor == VERDICT_SLOWER) return VERDICT_SLOWER;
+    if (processor == VERDICT_FASTER) return VERDICT_FASTER;
+    return frame;
 }

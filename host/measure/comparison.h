@@ -53,6 +53,6 @@ typedef struct {
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance);
 
-// A row's, of two comparisons by different clocks: slower or faster as soon as one of them is, the same as
-// soon as one of them is.
-Verdict verdict_of_both(Verdict one, Verdict other);
+// Returns a row's verdict from comparisons of frame times and of processor times: slower if either is, else
+// faster if either is, else that of the frame times, since waiting does not show in processor times.
+Verdict verdict_of_row(Verdict frame, Verdict processor);

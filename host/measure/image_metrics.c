@@ -173,7 +173,7 @@ double ulp_distance(double expected, double found, bool is_double)
     const int digits = is_double ? DBL_MANT_DIG : FLT_MANT_DIG, least = is_double ? DBL_MIN_EXP : FLT_MIN_EXP;
     int exponent;
     if (frexp(expected, &exponent) == 0 || exponent < least) exponent = least;
-    return ldexp(fabs(found - expected), digits - exponent);
+    return fmin(ldexp(fabs(found - expected), digits - exponent), DBL_MAX);
 }
 
 static void values_compare(ImageMetrics *metrics, const Image *reference, const Image *test)

@@ -34,7 +34,8 @@ typedef struct {
 } ImageMetrics;
 
 // Returns the distance in units in the last place of `expected`, as a double or as a float: 0.5 at most where
-// the nearest value of the type was found. 0 if both are NaN or the same infinity; infinite if only one is.
+// the nearest value of the type was found. 0 if both are NaN or the same infinity; infinite if only one is,
+// and else at most DBL_MAX.
 double ulp_distance(double expected, double found, bool is_double);
 
 const char *image_kind(const Image *image); // what the values are: "display values", "linear light", "data"

@@ -56,7 +56,7 @@ const char *passport_build_options(const Device *device, PassportMode mode)
 }
 
 // Raised when a Passport or what is measured changes, other than the kernel's text.
-enum { PASSPORT_FORMAT = 1 };
+enum { PASSPORT_FORMAT = 2 };
 
 static char *passport_key(const Device *device, PassportMode mode, uint32_t lanes)
 {

@@ -99,14 +99,16 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     size_t row_bytes = film_layer_size(&row, LAYER_COLOR);
     if (aovs & AOV_SHADOW) row_bytes += film_layer_size(&row, LAYER_SHADOW);
     size_t rows = BAND_BYTES_MAX / row_bytes;
+    const size_t step = group_shape(renderer).height;
+    rows = rows < step ? step : rows - rows % step;
     // the film fits one buffer, even where all of its pixels are re-rendered in double precision
     for (const Renderer *pass = renderer; pass; pass = pass->repeat) {
         const uint64_t largest = pass->compute->device->largest_buffer_bytes,
                        fitting = largest / (2 * band_film_size(&row, aovs, NULL));
-        if (largest > 0 && rows > fitting) rows = (size_t)fitting;
+        if (largest > 0 && rows > fitting)
+            rows = (size_t)(fitting > step ? fitting - fitting % step : fitting);
     }
-    size_t step = group_shape(renderer).height;
-    rows = rows < step ? step : rows - rows % step;
+    if (rows == 0) rows = 1;
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
 

@@ -48,7 +48,7 @@ struct Renderer {
     SceneLayout layout;
     cl_mem sample_offsets; // in the pixel
     size_t light_count;
-    // The one in use, and the one before: near a shape a moving eye goes to and fro between two.
+    // The one in use, and the one before: near a shape a moving camera alternates between two.
     KernelVariant variant, other_variant;
     Pace paces[KERNEL_COUNT]; // of the variant in use
     // For the next pass; NULL: this is the last.

@@ -48,5 +48,4 @@ const ShapeOps box_ops = {
     .forms = {"box"},
     .randomize = box_randomize,
     .primitive_bounds = box_primitive_bounds,
-    .test_flops = 22,
 };

@@ -81,5 +81,4 @@ const ShapeOps disc_ops = {
     .primitive_bounds = disc_primitive_bounds,
     .bounding_sphere = disc_bounding_sphere,
     .plane = disc_plane,
-    .test_flops = 14,
 };

@@ -152,5 +152,4 @@ const ShapeOps paraboloid_ops = {
     .randomize = paraboloid_randomize,
     .primitive_bounds = paraboloid_primitive_bounds,
     .largest_coordinate = paraboloid_largest_coordinate,
-    .test_flops = 50,
 };

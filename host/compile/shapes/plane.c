@@ -46,5 +46,4 @@ const ShapeOps plane_ops = {
     .randomize = plane_randomize,
     .plane = plane_plane,
     .largest_coordinate = plane_largest_coordinate,
-    .test_flops = 14,
 };

@@ -259,7 +259,6 @@ const ShapeOps cylinder_ops = {
     .randomize = cylinder_randomize,
     .primitive_bounds = revolution_bounds,
     .largest_coordinate = revolution_largest_coordinate,
-    .test_flops = 40,
 };
 
 enum { CONE_CAPPED, CONE_OPEN, CONE_POINTED, CONE_INFINITE };
@@ -292,5 +291,4 @@ const ShapeOps cone_ops = {
     .randomize = cone_randomize,
     .primitive_bounds = revolution_bounds,
     .largest_coordinate = revolution_largest_coordinate,
-    .test_flops = 50,
 };

@@ -84,5 +84,4 @@ const ShapeOps sphere_ops = {
     .randomize = sphere_randomize,
     .primitive_bounds = sphere_primitive_bounds,
     .bounding_sphere = sphere_bounding_sphere,
-    .test_flops = 17,
 };

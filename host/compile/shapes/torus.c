@@ -111,5 +111,4 @@ const ShapeOps torus_ops = {
     .randomize = torus_randomize,
     .primitive_bounds = torus_primitive_bounds,
     .bounding_sphere = torus_bounding_sphere,
-    .test_flops = 60,
 };

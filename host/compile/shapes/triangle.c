@@ -223,12 +223,10 @@ const ShapeOps triangle_ops = {
     .forms = {"triangle", "smooth triangle"},
     .randomize = triangle_randomize,
     .primitive_bounds = triangle_primitive_bounds,
-    .test_flops = 23,
 };
 
 const ShapeOps mesh_ops = {
     .kind = KIND_TRIANGLES,
     .bounds = mesh_bounds,
     .flatten = mesh_flatten,
-    .test_flops = 23,
 };
