@@ -3,6 +3,7 @@
 # is reported; so do Tachyon and POV-Ray of an NFF file, where they are installed. Needs libembree-dev, and PyYAML.
 . "$(dirname "$0")/support.bash"
 
+is_long || skip_all "only with GLINT_LONG_TESTS=1"
 is_sanitized && skip_all "Embree is not built with sanitizers"
 [ -f /usr/include/embree3/rtcore.h ] || skip_all "there is no Embree (libembree-dev)"
 python_with yaml=PyYAML==6.0.3

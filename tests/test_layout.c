@@ -302,7 +302,7 @@ static void list_is_complete(void **state)
 static void threads_write_what_one_does(void **state)
 {
     const bool is_double = *(const bool *)*state;
-    enum { COUNT = 5 * FLAT_RANGE_MIN + 1 };
+    enum { COUNT = 2 * FLAT_RANGE_MIN + 1 };
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
