@@ -42,7 +42,7 @@ other_work_is_reported() {
 
 # A kernel for each further rung, where the tests are long.
 rungs=(spheres-16 bunny-2000)
-is_long && rungs+=(sun-2000x4 soup-500)
+rungs+=(sun-2000x4 soup-500)
 check "spheres and meshes, a directional light and samples by Embree and glint are timed" bench "$build/peers/embree" "${rungs[@]}"
 check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 check "an image of other work makes the run fail" other_work_is_reported
@@ -54,7 +54,7 @@ growth_has_rows_and_lines() {
         [ "$(grep -c '"frame_ms"' "$scratch/growth.json")" = 6 ] && grep -q '"count": 1000,' "$scratch/growth.json" &&
         [ "$(grep -c '<polyline points="[0-9]' "$scratch/growth.svg")" = 8 ]
 }
-is_long && check "growth is measured and plotted" growth_has_rows_and_lines
+check "growth is measured and plotted" growth_has_rows_and_lines
 
 # Mirrors, a cylinder, a concave polygon and a smooth one.
 cat >"$scratch/mirrors.nff" <<'NFF'
@@ -90,7 +90,7 @@ bench_nff() {
 }
 
 nff=("$scratch/dull.nff")
-is_long && nff+=("$scratch/mirrors.nff")
+nff+=("$scratch/mirrors.nff")
 check "NFF files are drawn by the programs that are installed" bench_nff "${nff[@]}"
 check "Embree's images of polygons are glint's" agree_within 0.05 "Embree packets" "Embree single rays"
 [ -z "$(command -v tachyon)" ] || check "Tachyon's images of mirrors are glint's" agree_within 0.6 Tachyon
