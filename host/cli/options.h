@@ -54,7 +54,7 @@ enum {
         "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
     }
 
-// For commands with which drivers are measured.
+// Options of the commands that measure drivers.
 #define DRIVER_LONG_OPTIONS                                                                                  \
     {"work-group", required_argument, NULL, OPTION_WORK_GROUP},                                              \
     {                                                                                                        \
@@ -96,7 +96,7 @@ enum {
 #define HELP_JSON "      --json            print JSON\n"
 #define HELP_HELP "  -h, --help            print this help\n"
 
-// For COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES and a --precision.
+// Help on COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES and a --precision.
 #define HELP_PRECISION "      --precision P     fast, single, strict, double or certified (default: single)\n"
 #define HELP_COMMON                                                                                          \
     HELP_LANES                                                                                               \

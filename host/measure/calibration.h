@@ -4,7 +4,7 @@
 
 #include "host/measure/series.h"
 
-// Of eight chains of a product and a sum in double, over all processors.
+// Rounds of eight chains of a product and a sum in double, shared by all processors.
 enum { CALIBRATION_ROUNDS = 1 << 20 };
 
 // Seconds of each calibration; zeroed: none yet.
