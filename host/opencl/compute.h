@@ -86,11 +86,10 @@ typedef struct {
 void program_options_append(Text *text, const Device *device, const char *options);
 
 // Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
-// (host/opencl/cache.h) or builds it. The key: text, options, launch, work-group that the user fixed, device
-// name, driver, platform version
-// and the cache's own format version. `no_cache` bypasses PoCL's own cache, too. False: failed; where the
-// text does not compile, the detail has the build log and the file in which the composed text was saved.
-// Where both builds fail, the first one's failure is kept.
+// (host/opencl/cache.h) or builds it. The key: text, options, launch (NULL: the work-group of --work-group),
+// device name, driver, platform version and the cache's own format version. `no_cache` bypasses PoCL's own
+// cache, too. False: failed; where the text does not compile, the detail has the build log and the file in
+// which the composed text was saved. Where both builds fail, the first one's failure is kept.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
 // Writes the program to the cache, unless it came from there. Call after its first launch has ended: PoCL
 // compiles a kernel at its first launch, a binary holds what was launched by then, and a program loaded from

@@ -59,6 +59,7 @@ ProgramRequest passport_request(const Device *device, PassportMode mode, uint32_
                  "#define PERTURB_SEED 0u\n#define PERTURB_SCALE 1\n",
                  lanes, mode == PASSPORT_STRICT, mode == PASSPORT_DOUBLE, mode == PASSPORT_STRICT, has_fma);
     return (ProgramRequest){.root = "passport.cl",
+                            .launch = "passport",
                             .prelude = text_c(prelude),
                             .options = passport_build_options(device, mode),
                             .no_cache = no_cache};

@@ -31,7 +31,7 @@ static char *request_key(const Device *device, const ProgramRequest *request, co
     text_appendf(&key, "options ");
     program_options_append(&key, device, request->options);
     text_appendf(&key, "\nlaunch %s\n", or_empty(request->launch));
-    if (device->work_group[0] > 0)
+    if (!request->launch && device->work_group[0] > 0)
         text_appendf(&key, "work-group %zux%zu\n", device->work_group[0], device->work_group[1]);
     text_appendf(&key, "device %s %s, %s, native width %u\n", device->name, device->board, device->version,
                  device->native_float_width);
