@@ -6,6 +6,11 @@ make=${MAKE:-make}
 build=${BUILD:-build}
 version=$(sed -n 's/^VERSION := //p' Makefile)
 
+# AppStream 1.0 asks for a homepage, which glint does not have; 0.16 does not know the name of that question.
+metadata_validate() {
+    appstreamcli validate --no-net --override=url-homepage-missing=info "$1" || appstreamcli validate --no-net "$1"
+}
+
 check "CHANGELOG.md starts with $version" test "$(grep -om 1 '^## \[.*]' CHANGELOG.md)" = "## [$version]"
 check "metainfo has $version" grep -q "<release version=\"$version\" " tools/desktop/glint-view.metainfo.xml
 
@@ -38,7 +43,7 @@ if [ -e "$build/glint-view" ]; then
     check "from a menu the window shows the demo" test "$(desktop_starts '')" = 'view /p/share/glint/scenes/demo.yaml'
     check "a file is shown" test "$(desktop_starts 'a $b.yaml')" = 'view a $b.yaml'
     ! command -v desktop-file-validate >/dev/null || check "desktop-file-validate" desktop-file-validate "$desktop"
-    ! command -v appstreamcli >/dev/null || check "appstreamcli" appstreamcli validate --no-net "$stage"/p/share/metainfo/*
+    ! command -v appstreamcli >/dev/null || check "appstreamcli" metadata_validate "$stage"/p/share/metainfo/*
 fi
 
 touch "$stage/d/mine"
