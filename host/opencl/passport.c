@@ -5,6 +5,7 @@
 #include "host/base/memory.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/passport_measure.h"
+#include "host/opencl/passport_probe.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

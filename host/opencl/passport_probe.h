@@ -1,0 +1,90 @@
+// Launches the probes of kernels/passport.cl, whose results the host judges: nothing that the device computes
+// is taken as exact.
+#pragma once
+
+#include "host/opencl/exact.h"
+#include "host/opencl/passport.h"
+#include "kernels/probes.h"
+
+enum {
+    OPERANDS_MAX = 256,   // of a probe; a multiple of any LANES
+    RESULTS_MAX = 1 << 19 // of a launch
+};
+
+// Bits of reals or integers of the kernel's size.
+typedef struct {
+    uint64_t a, b, c;
+} Operands;
+
+typedef struct {
+    uint64_t first, second;
+} Results;
+
+typedef struct {
+    Passport *passport;
+    Compute *compute;
+    bool is_double, no_cache;
+    ProgramRequest request;
+    Text prelude;
+    Program program;
+    cl_kernel kernel;
+    cl_mem operands, results;
+    struct {
+        LaunchTime *items;
+        size_t count, capacity;
+    } launches;
+    cl_uint timed_rounds; // of chains that are long enough to be timed
+    double start;         // of the measurement, after the builds
+    uint64_t random;
+} Measurement;
+
+typedef struct {
+    double a, b, c;
+} Reals;
+
+// Returns the program of passport.cl for a mode and a width. The caller frees the prelude.
+ProgramRequest passport_request(const Device *device, PassportMode mode, uint32_t lanes, bool has_fma,
+                                bool no_cache, Text *prelude);
+
+// Builds the kernel, and launches it once, since a driver may finish the build only then.
+void probe_kernel_open(Measurement *measurement, bool has_fma);
+void probe_kernel_close(Measurement *measurement);
+// The buffers of operands and results; closing also frees the list of launches.
+void probe_buffers_open(Measurement *measurement);
+void probe_buffers_close(Measurement *measurement);
+
+void operands_write(Measurement *measurement, const Operands *operands, size_t count);
+// Launches a probe over `count` lanes, at most RESULTS_MAX.
+LaunchTime probe_launch(Measurement *measurement, cl_uint probe, cl_uint first, cl_uint round_count,
+                        cl_uint operand_count, cl_uint count);
+// Runs a probe of at most OPERANDS_MAX operands. Returns false if the device failed; all results are 0 then.
+bool probe_run(Measurement *measurement, cl_uint probe, const Operands *operands, size_t count,
+               Results *results);
+
+uint64_t probe_random_bits(Measurement *measurement); // 64 random bits
+// Returns a random real of either sign, with an exponent of -span to span: a random mantissa, a short one,
+// whose product with another may lie halfway between two reals, or one near 1 or 2.
+double probe_random_real(Measurement *measurement, int span);
+// Makes OPERANDS_MAX pairs of random reals, for sums also such that cancel and such that end in half an ulp.
+void reals_make(Measurement *measurement, Reals *reals, Operands *operands);
+
+static inline size_t scalar_size(const Measurement *measurement)
+{
+    return measurement->is_double ? sizeof(double) : sizeof(float);
+}
+
+static inline uint64_t bits_of(const Measurement *measurement, double value)
+{
+    return real_bits(measurement->is_double, value);
+}
+
+static inline double value_of(const Measurement *measurement, uint64_t bits)
+{
+    return real_value(measurement->is_double, bits);
+}
+
+static inline Operands operands_of(const Measurement *measurement, Reals reals)
+{
+    return (Operands){bits_of(measurement, reals.a), bits_of(measurement, reals.b),
+                      bits_of(measurement, reals.c)};
+}
