@@ -87,8 +87,8 @@ def need_device():
 
 
 def need_clang(tool):
-    """Builds what one of tools/ needs to compile kernels by clang; returns the version of clang. Skips the whole test
-    where there is no clang, and for a sanitized build, whose kernels are those of the plain one."""
+    """Builds what one of tools/ needs to compile kernels by clang; returns the version of clang. Skips the whole test if
+    clang is missing, and for a sanitized build, which has the same kernels as the plain one."""
     if IS_SANITIZED:
         skip_all("the plain build's kernels are the same")
     process = subprocess.run([ROOT / "tools" / tool, "--clang"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -40,9 +40,7 @@ other_work_is_reported() {
     [ $? = 3 ]
 }
 
-# A kernel for each further rung, where the tests are long.
-rungs=(spheres-16 bunny-2000)
-rungs+=(sun-2000x4 soup-500)
+rungs=(spheres-16 bunny-2000 sun-2000x4 soup-500)
 check "spheres and meshes, a directional light and samples by Embree and glint are timed" bench "$build/peers/embree" "${rungs[@]}"
 check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 check "an image of other work makes the run fail" other_work_is_reported
@@ -89,8 +87,7 @@ bench_nff() {
         --seconds 0.02 --size 240x136 --precisions single,double --json "$scratch/bench.json" "$@"
 }
 
-nff=("$scratch/dull.nff")
-nff+=("$scratch/mirrors.nff")
+nff=("$scratch/dull.nff" "$scratch/mirrors.nff")
 check "NFF files are drawn by the programs that are installed" bench_nff "${nff[@]}"
 check "Embree's images of polygons are glint's" agree_within 0.05 "Embree packets" "Embree single rays"
 [ -z "$(command -v tachyon)" ] || check "Tachyon's images of mirrors are glint's" agree_within 0.6 Tachyon

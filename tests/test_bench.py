@@ -100,7 +100,7 @@ class Bench(TestCase):
             process = self.glint(f"{command} less-work {long} --tolerance 1e6", status=3)
             self.assertRegex(process.stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
             self.assertRegex(process.stdout, r"(?m)processor time: [0-9.]+ \(.*\): slower by")
-        self.refuses(f"{command} other-calibration", "'other-calibration' is calibrated by 524288 rounds instead of 1048576")
+        self.refuses(f"{command} other-calibration", "'other-calibration' was calibrated by 524288 rounds instead of 1048576")
         write("sphere.yaml", SPHERE + "# another file\n")
         self.glint(f"{command} report", status=1)  # without a row in common
         self.glint(f"{command} sphere.yaml", status=1)

@@ -156,7 +156,7 @@ class Html(TestCase):
         start = "<script>\"use strict\"; const errors = []; for (const type of ['error', 'securitypolicyviolation'])" \
                 "addEventListener(type, (event) => errors.push(event.message ?? event.blockedURI));</script>"
         probed = page.replace("<head>", f"<head>{start}", 1).replace("</body>", f"<script>{probe}</script></body>")
-        # chromium's windows are no narrower than 500 pixels, a frame is
+        # chromium's windows cannot be narrower than 500 pixels, but a frame can
         framed = f'<body style="margin: 0"><iframe width="390" height="900" style="border: 0" srcdoc="{html.escape(probed)}">' \
                  "</iframe><script>onload = () => document.body.replaceChildren(" \
                  "document.querySelector('iframe').contentDocument.getElementById('found'))</script>"

@@ -295,7 +295,10 @@ static inline real shim_fma(real a, real b, real c)
         self.assertEqual(self.findings(device, "fma")["strict"]["finding"], "unusual")
         self.assertEqual(device["refused"], [])
         for claim, used in ({}, MODES), ({"WITHOUT_FMA": "1", "DRIVER": "7.7"}, ["double"]):
-            passports = self.probe(**self.violated(**claim))["passports"]
+            device = self.probe(**self.violated(**claim))
+            passports = device["passports"]
+            found = self.findings(device, "fma")["strict"]["value"]
+            self.assertEqual("but not claimed in hardware" in found, bool(claim), found)
             self.assertEqual([passport["precision"] for passport in passports if passport["uses_fma"]],
                              used if HAS_DOUBLE else used[:2], claim)
 

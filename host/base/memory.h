@@ -18,6 +18,6 @@ enum { MEMORY_LARGE_MIN = 1 << 22 };
 
 // Allocates memory that an OpenCL device can use in place: it is aligned for OpenCL's largest type. From
 // MEMORY_LARGE_MIN bytes on it has large pages if the system offers them, which spares a CPU that reads it at
-// random most address translations. A page takes memory once it is written. Released by free(); a fault ends
-// the program if there is no memory or the product overflows.
+// random most address translations. A page takes memory once it is written. Released by free(). Ends the
+// program by a fault when memory runs out or the product overflows.
 void *memory_allocate_large(size_t count, size_t size);

@@ -366,12 +366,11 @@ int command_accuracy(int argument_count, char **arguments)
     int status = options_read(&accuracy.options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     const AccuracyOptions *options = &accuracy.options;
-    const CommonOptions common = options->variants.common;
     const size_t scene_count = (size_t)(argument_count - optind);
     status = EXIT_USER;
     bool opened = variant_set_open(&accuracy.set, &options->variants, arguments + optind, scene_count) &&
                   (!options->reference_path || reference_read(&accuracy)) &&
-                  device_open(&accuracy.open, &common);
+                  device_open(&accuracy.open, &options->variants.common);
     if (opened) status = accuracy_run(&accuracy);
     accuracy_close(&accuracy);
     return opened ? device_close(&accuracy.open, status) : status;

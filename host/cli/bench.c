@@ -204,15 +204,15 @@ static int against_run(Bench *bench, int argument_count, char **arguments)
 static int scenes_bench(Bench *bench, int argument_count, char **arguments)
 {
     const BenchOptions *options = &bench->options;
-    const CommonOptions common = options->variants.common;
+    const CommonOptions *common = &options->variants.common;
     if (options->against && !options->is_worker) return against_run(bench, argument_count, arguments);
     MessageList messages = {0};
     Baseline *baseline = options->baseline ? baseline_open(options->baseline, &messages) : NULL;
     messages_print(&messages, NULL);
     int status = EXIT_USER;
-    if ((!options->baseline || baseline) && device_open(&bench->open, &common)) {
+    if ((!options->baseline || baseline) && device_open(&bench->open, common)) {
         const bool is_certified = options->variants.precisions >> PRECISION_CERTIFIED & 1;
-        const char *selector = common.reference_device;
+        const char *selector = common->reference_device;
         if (!is_certified || reference_open(&bench->open.compute, &bench->open.devices, selector) ||
             !selector)
             status = bench_run(bench, baseline);

@@ -15,12 +15,12 @@
 typedef enum { LIMIT_RMSE, LIMIT_FLIP, LIMIT_OFF, LIMIT_ULP, LIMIT_COUNT } LimitType;
 
 static const struct {
-    const char *name, *option, *quantity, *without; // without: what an image that has no such figure lacks
+    const char *name, *quantity, *needed; // the option is --max-NAME; NULL: no kind of values is needed
 } limit_types[LIMIT_COUNT] = {
-    [LIMIT_RMSE] = {"rmse", "max-rmse", "RMSE", NULL},
-    [LIMIT_FLIP] = {"flip", "max-flip", "mean FLIP", "colors"},
-    [LIMIT_OFF] = {"off", "max-off", "differing 8-bit values", "colors"},
-    [LIMIT_ULP] = {"ulp", "max-ulp", "ulp", "floating-point values"},
+    [LIMIT_RMSE] = {"rmse", "RMSE", NULL},
+    [LIMIT_FLIP] = {"flip", "mean FLIP", "colors"},
+    [LIMIT_OFF] = {"off", "differing 8-bit values", "colors"},
+    [LIMIT_ULP] = {"ulp", "ulp", "floating-point values"},
 };
 
 enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON, OPTION_LIMIT };
@@ -129,8 +129,8 @@ static void limits_print(const DiffOptions *options, const ImageMetrics *metrics
 {
     for (unsigned i = 0; i < LIMIT_COUNT; i++)
         if (options->has_limit[i])
-            printf("  %-10s --%s %.6g: %s %.6g\n", limit_is_met(options, metrics, i) ? "met" : "exceeded",
-                   limit_types[i].option, options->limits[i], limit_types[i].quantity,
+            printf("  %-10s --max-%s %.6g: %s %.6g\n", limit_is_met(options, metrics, i) ? "met" : "exceeded",
+                   limit_types[i].name, options->limits[i], limit_types[i].quantity,
                    limited_value(metrics, i));
     if (options->has_limits && metrics->unmatched_count > 0)
         printf("  exceeded   every limit: %zu %s not finite and not the same in both\n",
@@ -270,9 +270,9 @@ static bool images_compare(const DiffOptions *options, Comparison *comparison, M
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
     for (unsigned i = 0; i < LIMIT_COUNT; i++)
         if (options->has_limit[i] && !limit_applies(&comparison->metrics, i))
-            return message_error(messages, "--%s: \"%s\" and \"%s\" do not both have %s",
-                                 limit_types[i].option, options->reference_path, options->test_path,
-                                 limit_types[i].without);
+            return message_error(messages, "--max-%s: \"%s\" and \"%s\" do not both have %s",
+                                 limit_types[i].name, options->reference_path, options->test_path,
+                                 limit_types[i].needed);
     return !options->heatmap_path || heatmap_make(options, comparison, messages);
 }
 
@@ -281,7 +281,7 @@ static bool limit_read(DiffOptions *options, LimitType type, const char *value)
     char *end;
     const double limit = strtod(value, &end);
     if (end == value || *end != '\0' || !(limit >= 0 && isfinite(limit))) {
-        fprintf(stderr, "glint: --%s: expected a number, 0 or more, not \"%s\"\n", limit_types[type].option,
+        fprintf(stderr, "glint: --max-%s: expected a number, 0 or more, not \"%s\"\n", limit_types[type].name,
                 value);
         return false;
     }

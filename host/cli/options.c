@@ -297,7 +297,7 @@ const Device *device_find(DeviceList *devices, const char *selector)
     return device;
 }
 
-static void list_fix(DeviceList *list, const CommonOptions *common)
+static void driver_options_apply(DeviceList *list, const CommonOptions *common)
 {
     for (size_t i = 0; i < list->count; i++) {
         list->items[i].build_options = common->build_options;
@@ -327,7 +327,7 @@ bool device_open(OpenDevice *open, const CommonOptions *common)
 {
     *open = (OpenDevice){0};
     const Device *device = device_find(&open->devices, common->device);
-    list_fix(&open->devices, common);
+    driver_options_apply(&open->devices, common);
     if (!device || !work_group_is_allowed(device)) {
         device_list_close(&open->devices);
         return false;
@@ -416,9 +416,9 @@ bool devices_open(OpenDevices *open, const char *selector)
     return count > 0;
 }
 
-bool devices_fix(OpenDevices *open, const CommonOptions *common)
+bool devices_apply_options(OpenDevices *open, const CommonOptions *common)
 {
-    list_fix(&open->devices, common);
+    driver_options_apply(&open->devices, common);
     for (size_t i = 0; i < open->count; i++)
         if (!work_group_is_allowed(open->items[i].compute->device)) return false;
     return true;

@@ -189,9 +189,9 @@ typedef struct {
 // Opens every device that the selector lists, or all devices for "all". Returns false with a message if there
 // is none; there is nothing to close then.
 bool devices_open(OpenDevices *open, const char *selector);
-// Fixes what the user chose for the kernels of opened devices. False, with a message, if one does not allow
+// Applies --work-group and --build-options to the devices. Returns false with a message if one does not allow
 // the work-group.
-bool devices_fix(OpenDevices *open, const CommonOptions *common);
+bool devices_apply_options(OpenDevices *open, const CommonOptions *common);
 // One of the devices that `selector` lists, or without one of those of the default's type: the number modulo
 // their count, for the processes of one machine. False with a message; nothing to close then.
 bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages);

@@ -12,7 +12,7 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
     open->is_open = open->is_single ? devices_open_one(&open->devices, selector, open->number, &messages)
                                     : devices_open(&open->devices, selector);
     messages_print(&messages, NULL);
-    if (open->is_open && !devices_fix(&open->devices, common)) {
+    if (open->is_open && !devices_apply_options(&open->devices, common)) {
         devices_abandon(&open->devices);
         open->devices = (OpenDevices){0};
         open->is_open = false;

@@ -38,22 +38,22 @@ static const char *null_if_empty(const char *text)
     return text[0] != '\0' ? text : NULL;
 }
 
-// Returns when the device's first command of a list was queued, by its clock; 0: unknown. Lists are in the
-// order of queueing.
-static double first_queued(const NamedLaunch *commands, size_t count, const Device *device)
+// Returns when the device's first command of a list was queued, by its clock, or `first` if that is earlier;
+// infinity: no time is known.
+static double first_queued(double first, const NamedLaunch *commands, size_t count, const Device *device)
 {
-    size_t i = 0;
-    while (i < count && commands[i].time.device != device)
-        i++;
-    return i < count ? commands[i].time.queued_seconds : 0;
+    for (size_t i = 0; i < count; i++) {
+        const LaunchTime *time = &commands[i].time;
+        if (time->device == device && time->queued_seconds > 0) first = fmin(first, time->queued_seconds);
+    }
+    return first;
 }
 
 // The origin of a device's times in a report.
 static double report_origin(const RenderReport *report, const Device *device)
 {
-    const double launch = first_queued(report->launches.items, report->launches.count, device),
-                 read = first_queued(report->reads.items, report->reads.count, device);
-    return launch > 0 && read > 0 ? fmin(launch, read) : fmax(launch, read);
+    return first_queued(first_queued(INFINITY, report->launches.items, report->launches.count, device),
+                        report->reads.items, report->reads.count, device);
 }
 
 static void counts_json(Json *json, const char *key, const size_t *counts, cl_uint dimensions)
@@ -75,7 +75,7 @@ void command_json(Json *json, const RenderReport *report, const LaunchTime *time
                    {"end_ms", time->end_seconds}};
     const double origin = report_origin(report, time->device);
     for (size_t i = 0; i < sizeof moments / sizeof *moments; i++) {
-        if (time->trusted && origin > 0 && moments[i].seconds > 0)
+        if (time->trusted && isfinite(origin) && moments[i].seconds > 0)
             json_number(json, moments[i].key, 1e3 * (moments[i].seconds - origin));
         else
             json_none(json, moments[i].key);

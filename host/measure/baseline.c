@@ -99,14 +99,15 @@ Baseline *baseline_open(const char *path, MessageList *messages)
     text_free(&text);
     const json_t *runs = json_object_get(report, "runs");
     if (!json_is_array(runs) || json_number_value(json_object_get(report, "schema")) != BENCH_SCHEMA) {
-        message_error(messages, "'%s' is no report of glint bench --json with schema %d", path, BENCH_SCHEMA);
+        message_error(messages, "'%s' is not a report of glint bench --json with schema %d", path,
+                      BENCH_SCHEMA);
         json_decref(report);
         return NULL;
     }
     const json_t *calibration = json_object_get(report, "calibration");
     const double rounds = json_number_value(json_object_get(calibration, "rounds"));
     if (rounds != CALIBRATION_ROUNDS) {
-        message_error(messages, "'%s' is calibrated by %.0f rounds instead of %d: measure it again", path,
+        message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d: measure it again", path,
                       rounds, CALIBRATION_ROUNDS);
         json_decref(report);
         return NULL;

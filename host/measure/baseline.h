@@ -9,8 +9,8 @@ typedef struct Baseline Baseline;
 
 enum { BENCH_SCHEMA = 6 }; // of the reports
 
-// Reads a file that glint bench --json wrote; NULL with a message where it is none, or was calibrated by
-// other work.
+// Reads a file that glint bench --json wrote. Returns NULL with a message if it is not such a report, or was
+// calibrated by another workload.
 Baseline *baseline_open(const char *path, MessageList *messages);
 void baseline_close(Baseline *baseline);
 // Names of the device, its board and the host, or "" where the report has none.
@@ -18,6 +18,6 @@ const char *baseline_device(const Baseline *baseline);
 const char *baseline_board(const Baseline *baseline);
 const char *baseline_host(const Baseline *baseline);
 
-// The wall and processor times of the row with this key, but for the scene's path; false: the baseline has
-// none.
+// Finds the wall and processor times of the row with this key; the scene's path does not count. Returns false
+// if the baseline has no such row.
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor);

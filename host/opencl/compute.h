@@ -82,7 +82,7 @@ typedef struct {
     bool from_cache;
 } Program;
 
-// Appends the options of a request, then those that the user fixed for the device.
+// Appends the options of a request, then those of --build-options.
 void program_options_append(Text *text, const Device *device, const char *options);
 
 // Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
@@ -124,7 +124,7 @@ cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
 
 // One command's time by its event and by the host's clock.
 typedef struct {
-    const Device *device; // whose clock the next four are by, from an arbitrary moment
+    const Device *device; // the next four are times of its clock, which starts at an arbitrary moment
     double queued_seconds, submitted_seconds, start_seconds, end_seconds; // 0: the runtime has none
     double event_seconds;      // end - start; 0 where the runtime reports zeros
     double host_seconds;       // from enqueue until the host sees it complete

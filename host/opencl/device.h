@@ -33,9 +33,9 @@ typedef struct {
     bool rounds_toward_zero, lacks_infinity;
     bool compiler, available, little_endian;
     struct DevicePassports *passports; // host/opencl/passport.h
-    // What the user fixed for this process; kernels of rays have the work-group.
-    const char *build_options; // follow those of every program; outlive the device; NULL: none
-    size_t work_group[2];      // 0: chosen by glint
+    const char
+        *build_options;   // of --build-options, after those of every program; outlive the device; or NULL
+    size_t work_group[2]; // of --work-group, for kernels that trace rays; 0: glint chooses
 } Device;
 
 typedef struct {

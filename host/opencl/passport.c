@@ -188,6 +188,7 @@ static Finding fma_finding(const Passport *passport, Text *text)
     if (passport->fma_is_fused) {
         text_appendf(text, "fused, %.2g times the time of a product and a sum", passport->fma_cost);
         if (passport->uses_fma) return FINDING_SOUND;
+        if (passport->fma_cost < PASSPORT_FMA_COST_MAX) text_appendf(text, ", but not claimed in hardware");
     } else {
         text_appendf(text, "rounds twice");
         if (passport->mode == PASSPORT_DOUBLE) return FINDING_BROKEN;

@@ -9,7 +9,7 @@ static TileShape item_shape(uint32_t lanes)
     return (TileShape){width * MACRO_TILE_COLUMNS_OF(lanes), height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
-// Work-items of a group, as the user fixed them or before the device's limits. Square groups are coherent:
+// Work-items of a group, by --work-group or before the device's limits. Square groups are coherent:
 // neighboring pixels hit the same objects. But a work-item with whole tiles is alone in its group: PoCL
 // places the private variables of a group's items side by side, and 64 sets of them, each with the rays
 // waiting behind glass, exceed the cache.

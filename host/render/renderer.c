@@ -87,6 +87,9 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
     }
     if (sum <= memory && largest <= most) return true;
     const double mebi = 1024.0 * 1024.0;
+    if (!is_known)
+        return message_error(messages, "the scene needs a buffer of %.1f MiB; at most %.1f MiB are addressed",
+                             (double)largest / mebi, (double)most / mebi);
     return message_error(
         messages,
         "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
