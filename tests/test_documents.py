@@ -237,7 +237,7 @@ CLAIMS = [  # N stands for a number
                          "the median, and N of the N others, which take N of its time in the median", budget_costs),
     ("docs/accuracy.md", "`double` takes more than 0.35 s: of the N such rows the N with a faster precision took N to N of the time of "
                          "`double`, the N that end at `double` N to N.", lambda: budget_long(0.35)),
-    ("docs/accuracy.md", "`double` decides N of N compared pixels of the scenes below rightly", lambda: certified_compared("double")),
+    ("docs/accuracy.md", "`double` decides N of N compared pixels of the scenes below correctly", lambda: certified_compared("double")),
     ("docs/verify.md", r"are of the kernels and the N cases of 2026-11-22. All N passed on Intel's CPU runtime \(N precisions\) and on "
                        r"rusticl \(Mesa 22.3, no double\), N of few rays on Oclgrind, at `strict` each with PoCL's bits",
      lambda: (passed_elsewhere("verify-rusticl", "rusticl")[0], *passed_elsewhere("verify-intel", "intel"),
