@@ -151,11 +151,12 @@ class DeviceLimits(TestCase):
         for path in Path("one").iterdir():
             self.assertSameBytes(path, Path("other") / path.name)
 
+        certify = f"certify {mirrors} --size 48x32 --pixels 200 --json --device basic"
+        self.refuses(f"{certify} --precision double", "precision double: the device .* has no 64-bit floating point", env=limited)
         listed = "" if IS_LONG else "--precision certified,single"
-        rows = self.json(f"certify {mirrors} --size 48x32 --pixels 200 --json --device basic {listed}", env=limited)["precisions"]
+        rows = self.json(f"{certify} {listed}", env=limited)["precisions"]
         self.assertIn("certified", [row["precision"] for row in rows if "status" not in row])
-        unavailable = [row["precision"] for row in rows if "status" in row]
-        self.assertEqual(unavailable, ["double"] if IS_LONG else [])
+        self.assertEqual([row["precision"] for row in rows if "status" in row], ["double"] if IS_LONG else [])
 
         self.refuses(f"{accuracy} basic --reference-device basic", "the reference device .* has no 64-bit", env=limited)
         self.refuses(f"render {mirrors} {certified} --device basic --reference-device none", "no usable device matches", env=limited)
