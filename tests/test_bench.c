@@ -153,7 +153,8 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     *error_count = message_count(&messages, MESSAGE_ERROR);
     if (*error_count) {
         char *expected;
-        assert_true(asprintf(&expected, "'%s' is not a report of glint bench --json with schema 6", path) > 0);
+        assert_true(asprintf(&expected, "'%s' is not a report of glint bench --json with schema 6", path) >
+                    0);
         assert_string_equal(messages.items[0].text, expected);
         free(expected);
     }
