@@ -74,13 +74,14 @@ static inline integer mantissa_in_turn(uint first)
 static OUT_OF_LINE Outcome probe_run(uint probe, uint first, uint round_count, integer a_bits, integer b_bits,
                                      integer c_bits)
 {
-    if (probe == PROBE_SWEEP_RECIPROCAL || probe == PROBE_SWEEP_QUOTIENT || probe == PROBE_SWEEP_SQRT) {
-        integer mantissa = mantissa_in_turn(first);
-        integer binade = probe == PROBE_SWEEP_SQRT ? a_bits : bits_from_real((real)(1));
-        b_bits = probe == PROBE_SWEEP_RECIPROCAL ? (binade | mantissa) : a_bits;
-        a_bits = probe == PROBE_SWEEP_RECIPROCAL ? a_bits : (binade + mantissa);
-        probe = probe == PROBE_SWEEP_SQRT ? PROBE_SQRT : PROBE_DIVIDE;
-    }
+    // Without branches: PoCL 6.0 requires InstCombine to reach a fixpoint in one iteration, and aborts the
+    // process where the optimizer threads a branch from here into the switch.
+    const bool sweeps_b = probe == PROBE_SWEEP_RECIPROCAL, sweeps_root = probe == PROBE_SWEEP_SQRT,
+               sweeps_a = probe == PROBE_SWEEP_QUOTIENT || sweeps_root;
+    const integer operand = a_bits, mantissa = mantissa_in_turn(first), one = bits_from_real((real)(1));
+    a_bits = sweeps_a ? (sweeps_root ? operand : one) + mantissa : operand;
+    b_bits = sweeps_b ? one | mantissa : sweeps_a ? operand : b_bits;
+    probe = sweeps_root ? PROBE_SQRT : sweeps_a || sweeps_b ? PROBE_DIVIDE : probe;
     real a = real_from_bits(a_bits), b = real_from_bits(b_bits), c = real_from_bits(c_bits);
     switch (probe) {
     case PROBE_SUM_PRODUCT:
