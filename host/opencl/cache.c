@@ -20,7 +20,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char cache_magic[8] = "glintprg";
+static const char cache_magic[] = "glintprg"; // stored without its null
 static const uint64_t cache_format = 2;
 
 enum { TAG_BYTES = crypto_generichash_BYTES, SECRET_BYTES = crypto_generichash_KEYBYTES };

@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char file_magic[16] = "glint checkpoint";
+static const char file_magic[] = "glint checkpoint"; // stored without its null
 static const uint64_t file_format = 2;
 static const double SYNC_SECONDS = 1; // at least, between two syncs, which are slow
 
