@@ -111,6 +111,27 @@ static void test_text(void **state)
     assert_null(text.items);
 }
 
+static void test_text_quantities(void **state)
+{
+    (void)state;
+    static const struct {
+        double value;
+        const char *size, *duration;
+    } cases[] = {
+        {0, "0 bytes", "0 seconds"},          {1, "1 byte", "1 second"},
+        {90, "90 bytes", "90 seconds"},       {120, "120 bytes", "2 minutes"},
+        {1048575, "1.0 MiB", "12 days"},      {3400, "3.3 KiB", "57 minutes"},
+        {7200, "7.0 KiB", "2 hours"},         {196e3, "191.4 KiB", "2 days"},
+        {0x1p42, "4.0 TiB", "50903316 days"}, {0x1p80, "1099511627776.0 TiB", "1000000000 days"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        assert_string_equal(text_size(cases[i].value).text, cases[i].size);
+        assert_string_equal(text_duration(cases[i].value).text, cases[i].duration);
+    }
+    assert_string_equal(text_plural(0), "s");
+    assert_string_equal(text_plural(1), "");
+}
+
 static void test_text_character_size(void **state)
 {
     (void)state;
@@ -542,6 +563,7 @@ int main(void)
         cmocka_unit_test(test_message_long_line),
         cmocka_unit_test(test_message_without_place),
         cmocka_unit_test(test_text),
+        cmocka_unit_test(test_text_quantities),
         cmocka_unit_test(test_text_character_size),
         cmocka_unit_test(test_text_nearest),
         cmocka_unit_test(test_array),

@@ -193,7 +193,7 @@ static void test_unknown_memory(void **state)
     assert_false(work(&compute, &answer));
     char *text = compute_failure_text(&compute);
     assert_non_null(strstr(text, "the device does not report its memory"));
-    assert_null(strstr(text, "0.0 MiB"));
+    assert_null(strstr(text, "the device has 0"));
     free(text);
     compute_close_checked(&compute);
     injected.call = NULL;

@@ -4,6 +4,7 @@
 #include "host/base/memory.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -50,6 +51,44 @@ void text_free(Text *text)
 {
     free(text->items);
     *text = (Text){0};
+}
+
+ShortText text_size(double bytes)
+{
+    static const char *const units[] = {"KiB", "MiB", "GiB", "TiB"};
+    enum { UNIT_COUNT = sizeof units / sizeof *units };
+    ShortText size;
+    if (bytes < 1024) {
+        snprintf(size.text, sizeof size.text, "%.0f byte%s", bytes, text_plural((uint64_t)bytes));
+        return size;
+    }
+    int unit = 0;
+    for (bytes /= 1024; bytes >= 1023.95 && unit + 1 < UNIT_COUNT; unit++)
+        bytes /= 1024;
+    snprintf(size.text, sizeof size.text, "%.1f %s", fmin(bytes, 1e15), units[unit]);
+    return size;
+}
+
+ShortText text_duration(double seconds)
+{
+    // one of a unit would hide up to half of it
+    static const struct {
+        const char *name;
+        double seconds;
+    } units[] = {{"day", 86400}, {"hour", 3600}, {"minute", 60}, {"second", 1}};
+    size_t unit = 0;
+    while (units[unit].seconds > 1 && seconds < 2 * units[unit].seconds)
+        unit++;
+    const double count = fmin(round(seconds / units[unit].seconds), 1e9);
+    ShortText duration;
+    snprintf(duration.text, sizeof duration.text, "%.0f %s%s", count, units[unit].name,
+             text_plural((uint64_t)count));
+    return duration;
+}
+
+const char *text_plural(uint64_t count)
+{
+    return count == 1 ? "" : "s";
 }
 
 // The Unicode Standard 15.0, table 3-7.

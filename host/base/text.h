@@ -4,6 +4,7 @@
 #include "host/base/message.h"
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 typedef struct {
@@ -16,6 +17,18 @@ void text_appendf(Text *text, const char *format, ...) __attribute__((format(pri
 char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2))); // never NULL; caller frees
 const char *text_c(const Text *text);                                             // never NULL
 void text_free(Text *text);                                                       // and zeroes
+
+// A short text by value.
+typedef struct {
+    char text[32];
+} ShortText;
+
+// Returns a size in the unit that suits it, such as "830 bytes" or "6.2 MiB".
+ShortText text_size(double bytes);
+// Returns a duration in the unit that suits it, such as "90 seconds" or "3 hours".
+ShortText text_duration(double seconds);
+// Returns what makes a noun of that many a plural: "" for 1, else "s".
+const char *text_plural(uint64_t count);
 
 // Bytes of the well-formed UTF-8 character that `text` starts with; 0 if it does not start with one.
 size_t text_character_size(const char *text, size_t length);

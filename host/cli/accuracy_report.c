@@ -150,9 +150,10 @@ static void reference_print(const AccuracyScene *scene, FILE *stream)
     if (scene->reference.file)
         fprintf(stream, "  reference: %s, colors only", scene->reference.file);
     else
-        fprintf(stream, "  reference: %s, %u lanes, %u %s; %zu pixels at silhouettes",
-                scene->reference.precision, scene->reference.lanes, scene->reference.samples,
-                scene->reference.samples == 1 ? "sample" : "samples", scene->edges.silhouette_pixels);
+        fprintf(stream, "  reference: %s, %u lane%s, %u sample%s; %zu pixel%s at silhouettes",
+                scene->reference.precision, scene->reference.lanes, text_plural(scene->reference.lanes),
+                scene->reference.samples, text_plural(scene->reference.samples),
+                scene->edges.silhouette_pixels, text_plural(scene->edges.silhouette_pixels));
     if (scene->reference.device) fprintf(stream, "; on %s", scene->reference.device);
     if (scene->reference.nonfinite + scene->reference.negative > 0)
         fprintf(stream, "; %zu of its pixels are not finite, %zu negative", scene->reference.nonfinite,

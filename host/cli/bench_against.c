@@ -3,6 +3,7 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/cli/bench_report.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
@@ -290,9 +291,10 @@ static void against_print_text(const Against *against, const Device *device)
     passports_remark(device, stdout);
     for (size_t i = 0; i < against->set->count; i++) {
         const BenchKey *key = &against->set->rows[i].key;
-        printf("%s, %ux%u, %s, %u lanes, BVH %s, %u samples, %u bounces: %zu %s\n", key->scene, key->width,
-               key->height, key->precision, key->lanes, key->bvh, key->samples, key->bounces,
-               against->ratios[i].count, against->ratios[i].count == 1 ? "pair" : "pairs");
+        printf("%s, %ux%u, %s, %u lane%s, BVH %s, %u sample%s, %u bounce%s: %zu pair%s\n", key->scene,
+               key->width, key->height, key->precision, key->lanes, text_plural(key->lanes), key->bvh,
+               key->samples, text_plural(key->samples), key->bounces, text_plural(key->bounces),
+               against->ratios[i].count, text_plural(against->ratios[i].count));
         comparison_print(&against->comparisons[i], stdout);
     }
 }

@@ -1,6 +1,7 @@
 // glint cache: the kernel cache, listed and checked, or emptied.
 #include "host/opencl/cache.h"
 #include "host/base/fault.h"
+#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include <getopt.h>
@@ -21,8 +22,6 @@ static const char help_text[] = "usage: glint cache [OPTIONS]\n\n"
                                 "      --clear           remove them all\n" //
     HELP_HELP;
 
-static const double mebi = 1024 * 1024;
-
 // Returns whether all entries can be trusted.
 static bool entries_print(const CacheEntries *entries)
 {
@@ -33,7 +32,7 @@ static bool entries_print(const CacheEntries *entries)
         struct tm local;
         if (localtime_r(&entry->used.tv_sec, &local)) strftime(used, sizeof used, "%Y-%m-%d %H:%M", &local);
         const char *device = entry->device ? entry->device : "of another version of glint";
-        printf("  %s  %7.2f MiB  %s  %s%s\n", entry->name, (double)entry->size / mebi, used,
+        printf("  %s  %10s  %s  %s%s\n", entry->name, text_size((double)entry->size).text, used,
                entry->fault ? "not used: " : "", entry->fault ? entry->fault : device);
         trusted = trusted && !entry->fault;
     }
@@ -46,8 +45,8 @@ static int cache_print(const char *folder)
     CacheEntries entries;
     int status = EXIT_USER;
     if (cache_list(&entries, &messages)) {
-        printf("%s: %zu programs, %.1f of at most %.0f MiB\n", folder, entries.count,
-               (double)entries.size / mebi, CACHE_BYTES_MAX / mebi);
+        printf("%s: %zu program%s, %s of at most %s\n", folder, entries.count, text_plural(entries.count),
+               text_size((double)entries.size).text, text_size(CACHE_BYTES_MAX).text);
         status = entries_print(&entries) ? EXIT_DONE : EXIT_CHECK;
         cache_entries_free(&entries);
     }

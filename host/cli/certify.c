@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
@@ -99,11 +100,11 @@ typedef struct {
 static void doubts_print(const CertifyDoubts *doubts)
 {
     if (doubts->count == 0) return;
-    printf(
-        "             %zu pixels undecided; of %zu examined %zu change with errors of 2^-50, %zu are within "
-        "2^-49, %zu neither\n",
-        doubts->count, doubts->examined, doubts->witnessed, doubts->close,
-        doubts->examined - doubts->witnessed - doubts->close);
+    printf("             %zu pixel%s undecided; examined: %zu, of which %zu change with errors of 2^-50, %zu "
+           "are "
+           "within 2^-49, %zu neither\n",
+           doubts->count, text_plural(doubts->count), doubts->examined, doubts->witnessed, doubts->close,
+           doubts->examined - doubts->witnessed - doubts->close);
 }
 
 static void text_print(const Certification *certification)
@@ -117,8 +118,9 @@ static void text_print(const Certification *certification)
     }
     printf("%s, %s %s\n", device->name, device->platform_name, device->driver);
     passports_remark(device, stdout);
-    printf("%s, %ux%u: %zu pixels, reference of %d bits in %.1f s", certification->options->scene,
-           sample->width, sample->height, sample->count, (int)QUAD_BITS, certification->reference_seconds);
+    printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
+           sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
+           certification->reference_seconds);
     if (undecided > 0) printf("; %zu undecided in it are left out", undecided);
     if (textured > 0) printf("; of %zu with a texture no color is compared", textured);
     puts("\n                     wrong             largest error of color        largest margin\n"
@@ -243,10 +245,10 @@ static int decided_check(const CertifyErrors *certified)
     if (certified->wrong_decided == 0) return EXIT_DONE;
     fprintf(
         stderr,
-        "glint certify: certified is wrong at %zu pixels that it does not list as undecided, most at %u,%u: "
+        "glint certify: certified is wrong at %zu pixel%s that it does not list as undecided, most at %u,%u: "
         "%.2g of the distance\n",
-        certified->wrong_decided, certified->wrong_decided_place[0], certified->wrong_decided_place[1],
-        certified->wrong_decided_margin);
+        certified->wrong_decided, text_plural(certified->wrong_decided), certified->wrong_decided_place[0],
+        certified->wrong_decided_place[1], certified->wrong_decided_margin);
     return EXIT_CHECK;
 }
 

@@ -2,6 +2,7 @@
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/json.h"
+#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/compile/compile.h"
@@ -68,7 +69,8 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf("%s%zu %s", separator, facts->shapes[kind], shape_names[kind]);
         separator = ", ";
     }
-    if (facts->mesh_triangle_count > 0) printf(" (of %zu triangles)", facts->mesh_triangle_count);
+    if (facts->mesh_triangle_count > 0)
+        printf(" (of %zu triangle%s)", facts->mesh_triangle_count, text_plural(facts->mesh_triangle_count));
     printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count,
            scene->materials.count);
     Vector3 low = facts->bounds.min, high = facts->bounds.max;

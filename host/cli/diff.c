@@ -1,6 +1,7 @@
 // glint diff: compares two images.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
@@ -216,8 +217,9 @@ static void differences_print(const DiffOptions *options, const Comparison *comp
            linear->percentile_999, linear->rel_mse, linear->psnr);
     if (reference->data && metrics->has_ulp) printf("  ulp        at most %.4g\n", metrics->largest_ulp);
     if (metrics->has_color) {
-        printf("  8-bit sRGB %zu values differ by 1, %zu by more, PSNR %.2f dB\n", metrics->off_by_1,
-               metrics->off_by_more, metrics->srgb_psnr);
+        printf("  8-bit sRGB %zu %s by 1, %zu by more, PSNR %.2f dB\n", metrics->off_by_1,
+               metrics->off_by_1 == 1 ? "value differs" : "values differ", metrics->off_by_more,
+               metrics->srgb_psnr);
         printf("  FLIP       mean %.6f, max %.6f at %d pixels per degree\n", metrics->flip_mean,
                metrics->flip_max, FLIP_PIXELS_PER_DEGREE);
     }

@@ -29,7 +29,7 @@ struct ImageOutput {
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted; // a band's values in another type
-    double bytes;      // estimated, of all files
+    double bytes;      // of all files, before compression
 
     // A band is written by a thread of its own while the next is rendered; until it has ended, all from here
     // on is that thread's, and so are the writers and messages.
@@ -118,8 +118,9 @@ static const char certified_key[] = "Certified";
 
 static void certified_describe(Text *text, const ImageOutput *output)
 {
-    text_appendf(text, "%llu samples repeated in double, %llu undecided",
-                 (unsigned long long)output->repeats.repeated, (unsigned long long)output->repeats.undecided);
+    text_appendf(text, "%llu sample%s repeated in double, %llu undecided",
+                 (unsigned long long)output->repeats.repeated, text_plural(output->repeats.repeated),
+                 (unsigned long long)output->repeats.undecided);
 }
 
 // At `certified` EXR's notes, which stand before its pixels, report all of them.
@@ -235,6 +236,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
     if (header.format != IMAGE_NPY) header.npy_type = 'f';
     output->image = image_writer_open(output->options->path, &header, messages);
     bool opened = output->image != NULL;
+    output->bytes = (double)image_bytes(&header);
 
     for (Layer layer = 0; layer < LAYER_COUNT && opened; layer++) {
         if (!(output->options->aovs >> layer & 1)) continue;
@@ -247,6 +249,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
         char *path = aov_path(output->options, layer_names[layer]);
         output->aovs[layer] = image_writer_open(path, &header, messages);
         opened = output->aovs[layer] != NULL;
+        output->bytes += (double)image_bytes(&header);
         free(path);
     }
     text_free(&notes.text);
@@ -326,14 +329,6 @@ static void band_keep(ImageOutput *output, const Film *band)
     }
 }
 
-static double bytes_estimate(const ImageOutput *output, uint32_t rows_written)
-{
-    uint64_t bytes = image_writer_bytes(output->image);
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (output->aovs[layer]) bytes += image_writer_bytes(output->aovs[layer]);
-    return (double)bytes * output->settings->region_height / rows_written;
-}
-
 double image_output_bytes(const ImageOutput *output)
 {
     return output->bytes;
@@ -344,7 +339,6 @@ static bool band_output(ImageOutput *output, const Film *band, MessageList *mess
     if (!output->opened && !files_open(output, band, messages)) return false;
     output->opened = true;
     if (!band_written(output)) return false;
-    if (band->first_row > 0) output->bytes = bytes_estimate(output, band->first_row);
     output->messages = messages;
     band_keep(output, band);
     output->writing =

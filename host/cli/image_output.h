@@ -33,7 +33,7 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 // Encodes a copy of the band while the caller goes on, unless options.synchronous; the messages belong to the
 // output until it is committed or abandoned. False: this band could not be written, or an earlier one.
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages);
-// Estimated bytes of all files; 0 before the second band.
+// Returns how many bytes all files have before compression; 0 until they are open.
 double image_output_bytes(const ImageOutput *output);
 // At `certified`, of all bands so far.
 RepeatCounts image_output_repeats(const ImageOutput *output);

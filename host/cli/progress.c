@@ -2,6 +2,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/fault.h"
+#include "host/base/text.h"
 #include <signal.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -75,7 +76,7 @@ void progress_show(Progress *progress, double fraction_done)
     if (!progress->visible || now - progress->shown_seconds < 0.25) return;
     progress->shown_seconds = now;
     fprintf(stderr, "\r%3.0f %% \033[K", 100 * fraction_done);
-    if (left >= 0) fprintf(stderr, " %.0f s left ", left);
+    if (left >= 0) fprintf(stderr, " %s left ", text_duration(left).text);
     fflush(stderr);
 }
 

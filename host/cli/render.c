@@ -3,6 +3,7 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/cli/checkpoint_key.h"
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
@@ -23,18 +24,18 @@ typedef struct {
     bool is_quiet, is_estimated;
 } BandContext;
 
-// Says once what a long render takes.
+// Prints one estimate of the time and the size of a long render.
 static void estimate_print(BandContext *take, double fraction_done)
 {
-    enum { SECONDS_MIN = 60, MINUTE = 60, HOUR = 3600 };
+    enum { SECONDS_MIN = 60 };
     if (take->is_quiet || take->is_estimated) return;
     double left = progress_seconds_left(take->progress, fraction_done);
     take->is_estimated = left >= 0;
     if (left < SECONDS_MIN) return;
-    bool in_hours = left >= 2 * HOUR;
-    fprintf(stderr, "glint: %u x %u pixels: about %.0f %s and %.3g MB\n", take->settings->region_width,
-            take->settings->region_height, left / (in_hours ? HOUR : MINUTE), in_hours ? "hours" : "minutes",
-            1e-6 * image_output_bytes(take->output));
+    const double bytes = image_output_bytes(take->output);
+    fprintf(stderr, "glint: %u x %u pixels: about %s%s%s\n", take->settings->region_width,
+            take->settings->region_height, text_duration(left).text, bytes > 0 ? " and at most " : "",
+            bytes > 0 ? text_size(bytes).text : "");
 }
 
 static bool band_take(void *context, const Film *band, double fraction_done)
@@ -118,8 +119,9 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     progress_close(&progress);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
     if (whole && times->repeats.undecided > 0)
-        message_warning(messages, "%llu samples are undecided, and are as at precision double",
-                        (unsigned long long)times->repeats.undecided);
+        message_warning(messages, "%llu sample%s undecided, as at precision double",
+                        (unsigned long long)times->repeats.undecided,
+                        times->repeats.undecided == 1 ? " is" : "s are");
     for (size_t i = 0; i < devices->count && whole; i++)
         if (renderer_report(renderers[i])->is_out_of_line)
             message_warning(

@@ -123,8 +123,9 @@ static void pilot_print(const Pilot *pilot)
 static void repeats_print(RepeatCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    fprintf(stderr, "certified: %llu samples repeated in double, %llu undecided\n",
-            (unsigned long long)counts.repeated, (unsigned long long)counts.undecided);
+    fprintf(stderr, "certified: %llu sample%s repeated in double, %llu undecided\n",
+            (unsigned long long)counts.repeated, text_plural(counts.repeated),
+            (unsigned long long)counts.undecided);
 }
 
 static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,

@@ -37,15 +37,20 @@ static const Encoder *encoder_of(ImageFormat format)
     fault("an image of unknown format");
 }
 
+uint64_t image_bytes(const ImageHeader *header)
+{
+    const uint64_t values = (uint64_t)header->width * header->height * header->channels;
+    if (header->format == IMAGE_PNG || header->format == IMAGE_PPM) return values * (header->bits / 8);
+    return values * (header->npy_type == 'd' ? sizeof(double) : sizeof(float));
+}
+
 // Deflate, in PNG and EXR, makes 1032 bytes of one at most (zlib's technical details).
 enum { DEFLATE_RATIO_MAX = 1032 };
 
 static uint64_t bytes_min(const ImageHeader *header)
 {
-    uint64_t values = (uint64_t)header->width * header->height * header->channels;
-    if (header->format == IMAGE_PPM) return values * (header->bits / 8);
-    if (header->format == IMAGE_NPY) return values * (header->npy_type == 'd' ? 8 : 4);
-    return values / DEFLATE_RATIO_MAX;
+    const bool is_compressed = header->format == IMAGE_PNG || header->format == IMAGE_EXR;
+    return image_bytes(header) / (is_compressed ? DEFLATE_RATIO_MAX : 1);
 }
 
 // False with a message where the disk has no room for the image, however well it is compressed.
@@ -56,14 +61,8 @@ static bool disk_has_room(const ImageWriter *writer, MessageList *messages)
     if (!writer->output.has_folder || fstatvfs(writer->output.folder, &disk) != 0) return true;
     double room = (double)disk.f_bavail * (double)disk.f_frsize;
     if (disk.f_blocks == 0 || (double)bytes <= room) return true;
-    return message_error(messages, "cannot write '%s': it has %.3g MB or more, and its disk has %.3g MB left",
-                         writer->output.target, 1e-6 * (double)bytes, 1e-6 * room);
-}
-
-uint64_t image_writer_bytes(const ImageWriter *writer)
-{
-    off_t position = writer->output.file ? ftello(writer->output.file) : 0;
-    return position > 0 ? (uint64_t)position : 0;
+    return message_error(messages, "cannot write '%s': it has %s or more, and its disk has %s left",
+                         writer->output.target, text_size((double)bytes).text, text_size(room).text);
 }
 
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages)

@@ -134,15 +134,14 @@ static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_m
     fault_note_call(NULL);
     if (status != CL_SUCCESS || !buffer) {
         const Device *device = compute->device;
-        const double mebi = 1024.0 * 1024.0;
         if (device->memory_bytes > 0 && device->largest_buffer_bytes > 0)
             compute_fail(compute, "clCreateBuffer", status,
-                         "%.1f MiB requested; the device has %.1f MiB, at most %.1f MiB in one buffer",
-                         (double)size / mebi, (double)device->memory_bytes / mebi,
-                         (double)device->largest_buffer_bytes / mebi);
+                         "%s requested; the device has %s, at most %s in one buffer",
+                         text_size((double)size).text, text_size((double)device->memory_bytes).text,
+                         text_size((double)device->largest_buffer_bytes).text);
         else
             compute_fail(compute, "clCreateBuffer", status,
-                         "%.1f MiB requested; the device does not report its memory", (double)size / mebi);
+                         "%s requested; the device does not report its memory", text_size((double)size).text);
         return NULL;
     }
     return buffer;

@@ -411,7 +411,8 @@ static void report_no_match(const DeviceList *list, const char *selector, Messag
         text_appendf(&text, "no usable device");
         if (selector) text_appendf(&text, " matches \"%s\"", selector);
     } else {
-        text_appendf(&text, "no OpenCL device on %u platforms", list->platform_count);
+        text_appendf(&text, "no OpenCL device on %u platform%s", list->platform_count,
+                     text_plural(list->platform_count));
     }
     if (failure) text_appendf(&text, " (%s)", failure);
     text_appendf(&text, "%s", fault_limits());

@@ -3,6 +3,7 @@
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/passport_measure.h"
 #include "host/opencl/passport_probe.h"
@@ -294,9 +295,9 @@ bool passports_abnormal(const Device *device, Text *text)
         for (Property property = 0; property < PROPERTY_COUNT; property++) {
             Text what = {0};
             if (passport_finding(passport, property, &what) != FINDING_SOUND)
-                text_appendf(text, "%s%s, %u lanes: %s: %s", text->count > before ? "\n" : "",
-                             passport_mode_names[passport->mode], passport->lanes, property_names[property],
-                             text_c(&what));
+                text_appendf(text, "%s%s, %u lane%s: %s: %s", text->count > before ? "\n" : "",
+                             passport_mode_names[passport->mode], passport->lanes,
+                             text_plural(passport->lanes), property_names[property], text_c(&what));
             text_free(&what);
         }
     }

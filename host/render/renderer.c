@@ -4,6 +4,7 @@
 #include "host/base/clock.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/compile/compile.h"
 #include "host/render/arithmetic.h"
 #include "host/render/renderer_state.h"
@@ -86,15 +87,17 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
         if (layout.buffer_sizes[i] > largest) largest = layout.buffer_sizes[i];
     }
     if (sum <= memory && largest <= most) return true;
-    const double mebi = 1024.0 * 1024.0;
+    const ShortText sum_text = text_size((double)sum), largest_text = text_size((double)largest),
+                    most_text = text_size((double)most);
     if (!is_known)
-        return message_error(messages, "the scene needs a buffer of %.1f MiB; at most %.1f MiB are addressed",
-                             (double)largest / mebi, (double)most / mebi);
-    return message_error(
-        messages,
-        "the scene needs %.1f MiB on the device, %.1f MiB of it in one buffer; the device \"%s\" has "
-        "%.1f MiB, and at most %.1f MiB in one buffer",
-        (double)sum / mebi, (double)largest / mebi, device->name, (double)memory / mebi, (double)most / mebi);
+        return message_error(messages, "the scene needs a buffer of %s; at most %s are addressed",
+                             largest_text.text, most_text.text);
+    return message_error(messages,
+                         "the scene needs %s on the device, %s of it in one buffer; the device \"%s\" has "
+                         "%s, and at most %s in "
+                         "one buffer",
+                         sum_text.text, largest_text.text, device->name, text_size((double)memory).text,
+                         most_text.text);
 }
 
 // Whether scene_move leaves an array as it is, and does not read it.

@@ -3,6 +3,7 @@
 
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
+#include "host/base/text.h"
 #include <stdlib.h>
 
 void frame_free(Frame *frame)
@@ -29,9 +30,10 @@ static char *summary_make(const FrameLoop *loop, uint32_t samples)
     double rays = (double)film_pixel_count(&loop->film) * samples;
     Text text = {0};
     text_appendf(&text, "%s\n", loop->options.device->name);
-    text_appendf(&text, "%s, %u lanes, %ux%u, %u of %u samples, %.1f million camera rays/s\n",
-                 precision_names[loop->settings.precision], report->lanes, loop->film.width,
-                 loop->film.height, samples, loop->settings.sample_count, rays / launches / 1e6);
+    text_appendf(&text, "%s, %u lane%s, %ux%u, %u of %u sample%s, %.1f million camera rays/s\n",
+                 precision_names[loop->settings.precision], report->lanes, text_plural(report->lanes),
+                 loop->film.width, loop->film.height, samples, loop->settings.sample_count,
+                 text_plural(loop->settings.sample_count), rays / launches / 1e6);
     text_appendf(&text, "ms: flatten %.2f, bvh %.2f, upload %.2f, build %.1f, launches %.1f, read-back %.2f",
                  1e3 * report->flatten_seconds, 1e3 * report->bvh_seconds, 1e3 * report->upload_seconds,
                  1e3 * report->build_seconds, 1e3 * launches, 1e3 * reads);

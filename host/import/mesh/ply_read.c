@@ -308,8 +308,9 @@ static bool face_add(PlyReader *reader)
     const size_t offset = place_of(reader), count = reader->corners.count;
     if (reader->corner_uvs.count > 2 * count)
         return draft_fails(reader->reading.draft, offset,
-                           "face %zu (from 0) has %zu corners, but %zu texture coordinates", reader->row,
-                           count, reader->corner_uvs.count / 2);
+                           "face %zu (from 0) has %zu corner%s, but %zu texture coordinate%s", reader->row,
+                           count, text_plural(count), reader->corner_uvs.count / 2,
+                           text_plural(reader->corner_uvs.count / 2));
     for (size_t i = 0; i < count; i++) {
         const double index = reader->corners.items[i];
         if (!(index >= 0 && index <= UINT32_MAX && floor(index) == index))

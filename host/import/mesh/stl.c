@@ -41,7 +41,8 @@ static bool facet_end(StlReader *reader, size_t offset)
 {
     const size_t count = reader->corner_count;
     reader->corner_count = 0;
-    if (count > 0 && count < 3) return draft_fails(reader->draft, offset, "a facet of %zu corners", count);
+    if (count > 0 && count < 3)
+        return draft_fails(reader->draft, offset, "a facet of %zu corner%s", count, text_plural(count));
     return draft_end_face(reader->draft, offset);
 }
 
@@ -98,7 +99,8 @@ static bool binary_read(MeshDraft *draft)
     const size_t held = (source->length - HEADER_SIZE) / FACET_SIZE;
     if (count >= DRAFT_NONE / 3) return draft_fails(draft, HEADER_SIZE - 4, "too many facets");
     if (count > held)
-        return draft_fails(draft, HEADER_SIZE - 4, "%zu facets are declared, the file has %zu", count, held);
+        return draft_fails(draft, HEADER_SIZE - 4, "%zu facet%s declared, the file has %zu", count,
+                           count == 1 ? " is" : "s are", held);
     bool has_attributes = false;
     for (size_t i = 0; i < count; i++) {
         const size_t offset = HEADER_SIZE + i * FACET_SIZE;
@@ -115,9 +117,10 @@ static bool binary_read(MeshDraft *draft)
         if (!draft_end_face(draft, offset)) return false;
     }
     if (has_attributes) draft_warn(draft, "attributes of facets, such as colors, are not used");
-    if (source->length > HEADER_SIZE + count * FACET_SIZE)
-        draft_warn(draft, "%zu bytes behind the last facet are not used",
-                   source->length - HEADER_SIZE - count * FACET_SIZE);
+    const size_t rest = source->length - HEADER_SIZE - count * FACET_SIZE;
+    if (rest > 0)
+        draft_warn(draft, "%zu byte%s behind the last facet %s not used", rest, text_plural(rest),
+                   rest == 1 ? "is" : "are");
     return true;
 }
 
