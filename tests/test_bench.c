@@ -82,9 +82,32 @@ static void test_clock_that_drifts(void **state)
     assert_non_null(bench_doubt(&times));
     assert_near(bench_kernel(&times).median, 0.030, 1e-12);
     bench_times_free(&times);
-    times = times_make(5, 1.02); // half a second is too short to say
+    times = times_make(30, 0.98);
+    assert_non_null(bench_doubt(&times));
+    bench_times_free(&times);
+    times = times_make(30, 0.991);
     assert_null(bench_doubt(&times));
     bench_times_free(&times);
+}
+
+// Whichever launch the host learns of late, the device's clock is not blamed; one that drifts still is.
+static void test_stalled_launches(void **state)
+{
+    (void)state;
+    enum { LAUNCHES = 20 };
+    static const double rates[] = {1, 1.009, 0.991, 1.02, 0.98};
+    for (unsigned stalled = 0; stalled < 1u << 4; stalled++)
+        for (size_t i = 0; i < sizeof rates / sizeof *rates; i++) {
+            BenchTimes times = {0};
+            for (unsigned k = 0; k < LAUNCHES; k++) {
+                LaunchTime launch = launch_at(5 + 0.1 * k, 0.010, rates[i]);
+                const unsigned which = k == 0 ? 1 : k == LAUNCHES - 1 ? 2 : k == 9 ? 4 : k % 2 ? 8 : 0;
+                if (stalled & which) launch.host_seconds += 0.08;
+                bench_add_launch(&times, &launch);
+            }
+            assert_true((bench_doubt(&times) != NULL) == (fabs(rates[i] - 1) > 0.01));
+            bench_times_free(&times);
+        }
 }
 
 // One event that cannot be believed, and the whole row goes by the host's clock.
@@ -303,6 +326,7 @@ int main(void)
         cmocka_unit_test(test_quantiles),
         cmocka_unit_test(test_events_that_agree),
         cmocka_unit_test(test_clock_that_drifts),
+        cmocka_unit_test(test_stalled_launches),
         cmocka_unit_test(test_event_without_times),
         cmocka_unit_test(test_runs_that_scatter),
         cmocka_unit_test(test_figures),

@@ -6,20 +6,41 @@
 const char *const bench_ray_names[RAYS_COUNT] = {"camera", "camera_hits", "reflected", "refracted", "shadow"};
 
 static const double converged_spread = 0.02, largest_drift = 0.01;
-// Over a shorter time the wait before a launch would pass for a drift.
-static const double drift_seconds = 1;
+// What a double loses of the nanoseconds since 1970 that a timestamp may count.
+static const double timestamp_error = 1e-6;
+
+// Returns whether the device's clock runs faster or slower than the host's by more than largest_drift. Both
+// ends of a command lie within the host's wait for it, however long the host is stalled. So from the start of
+// a command to the end of a later one at most the time from the start of the first wait to the end of the
+// second passes, and from the end of a command to the start of a later one at least the time between the
+// waits.
+static bool clock_drifts(BenchTimes *times, const LaunchTime *launch)
+{
+    const double fast = 1 + largest_drift, slow = 1 - largest_drift;
+    const double host_start = launch->host_start_seconds, host_end = host_start + launch->host_seconds;
+    const double resolution = launch->device ? launch->device->timer_resolution_seconds : 0;
+    const double slack = timestamp_error + 2 * resolution;
+    const bool is_first = times->run_host == 0 && times->host.count == 0;
+    const bool drifts =
+        !is_first && (launch->end_seconds - fast * host_end > times->least_fast_start + slack ||
+                      launch->start_seconds - slow * host_start < times->greatest_slow_end - slack);
+    const double fast_start = launch->start_seconds - fast * host_start;
+    const double slow_end = launch->end_seconds - slow * host_end;
+    times->least_fast_start = is_first ? fast_start : fmin(times->least_fast_start, fast_start);
+    times->greatest_slow_end = is_first ? slow_end : fmax(times->greatest_slow_end, slow_end);
+    return drifts;
+}
 
 void bench_add_launch(BenchTimes *times, const LaunchTime *launch)
 {
+    if (!times->doubt) {
+        if (!launch->trusted)
+            times->doubt = launch_time_doubt(launch);
+        else if (clock_drifts(times, launch))
+            times->doubt = "the device's clock drifts from the host's by more than 1 %";
+    }
     times->run_event += launch->event_seconds;
     times->run_host += launch->host_seconds;
-    if (!launch->trusted && !times->doubt) times->doubt = launch_time_doubt(launch);
-    if (times->host_last == 0) {
-        times->device_first = launch->start_seconds;
-        times->host_first = launch->host_start_seconds;
-    }
-    times->device_last = launch->end_seconds;
-    times->host_last = launch->host_start_seconds + launch->host_seconds;
 }
 
 void bench_end_run(BenchTimes *times, double frame_seconds, double processor_seconds)
@@ -41,11 +62,7 @@ void bench_times_free(BenchTimes *times)
 
 const char *bench_doubt(const BenchTimes *times)
 {
-    if (times->doubt) return times->doubt;
-    double device = times->device_last - times->device_first, host = times->host_last - times->host_first;
-    if (host >= drift_seconds && fabs(device / host - 1) > largest_drift)
-        return "the device's clock drifts from the host's by more than 1 %";
-    return NULL;
+    return times->doubt;
 }
 
 Summary bench_kernel(const BenchTimes *times)

@@ -19,8 +19,8 @@ typedef struct {
     Series event, host; // seconds of a run's launches, by their events and by the host's clock
     const char *doubt;  // why the events are not to be believed, as seen in some launch; NULL: they are
     double run_event, run_host; // sums of the run at work
-    // where the device's and the host's clock stood at the first launch's start and the last one's end
-    double device_first, device_last, host_first, host_last;
+    // over the launches so far, of the device's clock less the host's, were the device's 1 % faster or slower
+    double least_fast_start, greatest_slow_end;
 } BenchTimes;
 
 // For each launch of a run, then once for the run.
