@@ -1,4 +1,5 @@
 // Meshes: what a file's triangles become, where they stand, what is refused, and which ids they get.
+#include "host/base/base64.h"
 #include "host/compile/compile.h"
 #include "host/compile/scene_bounds.h"
 #include "host/import/mesh/mesh_import.h"
@@ -372,6 +373,97 @@ static void other_formats_are_read(void **state)
     }
 }
 
+// A triangle with three normals and texture coordinates, in each format that has both.
+static const char smooth_obj[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 1 0 0\nvn 0 1 0\n"
+                                 "vt 0 0\nvt 1 0.25\nvt 0 1\nf 1/1/1 2/2/2 3/3/3\n";
+#define DAE_SOURCE(name, values, count, parameters, size)                                                    \
+    "<source id='" name "'><float_array id='" name "f' count='9'>" values "</float_array><technique_common>" \
+    "<accessor source='#" name "f' count='" count "' stride='" size "'>" parameters                          \
+    "</accessor></technique_common></source>\n"
+#define DAE_PARAMETER(name) "<param name='" name "' type='float'/>"
+#define DAE_XYZ             DAE_PARAMETER("X") DAE_PARAMETER("Y") DAE_PARAMETER("Z")
+static const char smooth_dae[] =
+    "<?xml version='1.0'?><COLLADA version='1.4.1'><library_geometries><geometry id='g'><mesh>\n" //
+    DAE_SOURCE("p", "0 0 0 1 0 0 0 1 0", "3", DAE_XYZ, "3")                                       //
+    DAE_SOURCE("n", "0 0 1 1 0 0 0 1 0", "3", DAE_XYZ, "3")                                       //
+    DAE_SOURCE(
+        "t", "0 0 1 0.25 0 1 0 0 0", "3", DAE_PARAMETER("S") DAE_PARAMETER("T"),
+        "2") "<vertices id='v'><input semantic='POSITION' source='#p'/></vertices><triangles count='1'>"
+             "<input semantic='VERTEX' source='#v' offset='0'/><input semantic='NORMAL' source='#n' "
+             "offset='0'/>"
+             "<input semantic='TEXCOORD' source='#t' offset='0' set='0'/><p>0 1 "
+             "2</p></triangles></mesh></geometry>"
+             "</library_geometries><library_visual_scenes><visual_scene id='s'><node><instance_geometry "
+             "url='#g'/></node>"
+             "</visual_scene></library_visual_scenes><scene><instance_visual_scene "
+             "url='#s'/></scene></COLLADA>\n";
+static const char smooth_fbx[] =
+    "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\n\tFBXHeaderVersion: 1003\n\tFBXVersion: 7400\n}\n"
+    "Objects:  {\n\tGeometry: 1, \"Geometry::a\", \"Mesh\" {\n\t\tVertices: *9 {\n\t\t\ta: "
+    "0,0,0,1,0,0,0,1,0\n"
+    "\t\t}\n\t\tPolygonVertexIndex: *3 {\n\t\t\ta: 0,1,-3\n\t\t}\n\t\tGeometryVersion: 124\n"
+    "\t\tLayerElementNormal: 0 {\n\t\t\tMappingInformationType: \"ByVertice\"\n"
+    "\t\t\tReferenceInformationType: \"Direct\"\n\t\t\tNormals: *9 {\n\t\t\t\ta: "
+    "0,0,1,1,0,0,0,1,0\n\t\t\t}\n\t\t}\n"
+    "\t\tLayerElementUV: 0 {\n\t\t\tName: \"\"\n\t\t\tMappingInformationType: \"ByVertice\"\n"
+    "\t\t\tReferenceInformationType: \"Direct\"\n\t\t\tUV: *6 {\n\t\t\t\ta: 0,0,1,0.25,0,1\n\t\t\t}\n\t\t}\n"
+    "\t\tLayer: 0 {\n\t\t\tVersion: 100\n\t\t\tLayerElement:  {\n\t\t\t\tType: \"LayerElementNormal\"\n"
+    "\t\t\t\tTypedIndex: 0\n\t\t\t}\n\t\t\tLayerElement:  {\n\t\t\t\tType: \"LayerElementUV\"\n"
+    "\t\t\t\tTypedIndex: 0\n\t\t\t}\n\t\t}\n\t}\n\tModel: 2, \"Model::a\", \"Mesh\" {\n\t\tVersion: "
+    "232\n\t}\n}\n"
+    "Connections:  {\n\tC: \"OO\",2,0\n\tC: \"OO\",1,2\n}\n";
+
+// The texture's origin is the upper left corner in glTF.
+static void smooth_gltf_write(const char *path)
+{
+    static const float numbers[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0,     0, 1,
+                                    1, 0, 0, 0, 1, 0, 0, 1, 1, 0.75F, 0, 0};
+    Text text = {0};
+    text_appendf(&text, "%s",
+                 "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}],\n"
+                 "\"nodes\": [{\"mesh\": 0}], \"meshes\": [{\"primitives\": [{\"attributes\":\n"
+                 "{\"POSITION\": 0, \"NORMAL\": 1, \"TEXCOORD_0\": 2}}]}], \"accessors\": [\n"
+                 "{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\"},\n"
+                 "{\"bufferView\": 1, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\"},\n"
+                 "{\"bufferView\": 2, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC2\"}],\n"
+                 "\"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36},\n"
+                 "{\"buffer\": 0, \"byteOffset\": 36, \"byteLength\": 36},\n"
+                 "{\"buffer\": 0, \"byteOffset\": 72, \"byteLength\": 24}],\n"
+                 "\"buffers\": [{\"byteLength\": 96, \"uri\": \"data:application/octet-stream;base64,");
+    base64_append(&text, (const uint8_t *)numbers, sizeof numbers);
+    text_appendf(&text, "\"}]}\n");
+    file_write(path, text_c(&text));
+    text_free(&text);
+}
+
+static void every_format_has_normals_and_texture_coordinates(void **state)
+{
+    (void)state;
+    file_write("a.obj", smooth_obj);
+    file_write("a.dae", smooth_dae);
+    file_write("a.fbx", smooth_fbx);
+    smooth_gltf_write("a.gltf");
+    Scene scene =
+        scene_of_objects("  - mesh: {file: a.obj}\n  - mesh: {file: a.dae}\n  - mesh: {file: a.fbx}\n"
+                         "  - mesh: {file: a.gltf}\n");
+    for (size_t i = 0; i < scene.meshes.count; i++) {
+        const Mesh *mesh = &scene.meshes.items[i];
+        assert_non_null(mesh->normals);
+        assert_non_null(mesh->uvs);
+        assert_int_equal(mesh->triangle_count, 1);
+        const uint32_t *corners = mesh->triangles[0];
+        assert_vector(mesh->vertices[corners[1]], 1, 0, 0);
+        assert_vector(mesh->normals[corners[0]], 0, 0, 1);
+        assert_vector(mesh->normals[corners[1]], 1, 0, 0);
+        assert_vector(mesh->normals[corners[2]], 0, 1, 0);
+        const double uvs[3][2] = {{0, 0}, {1, 0.25}, {0, 1}};
+        for (size_t k = 0; k < 3; k++)
+            for (size_t axis = 0; axis < 2; axis++)
+                assert_number(mesh->uvs[corners[k]][axis], uvs[k][axis]);
+    }
+    scene_free(&scene);
+}
+
 // Files that assimp does not survive: it descends into lists and nodes by recursion, and copies a node for
 // each reference to it.
 static void damaged_gltf_is_survived(void **state)
@@ -594,6 +686,7 @@ int main(void)
         cmocka_unit_test(polygons_that_cannot_be_filled_are_reported),
         cmocka_unit_test(faults_name_file_and_vertex),
         cmocka_unit_test(other_formats_are_read),
+        cmocka_unit_test(every_format_has_normals_and_texture_coordinates),
         cmocka_unit_test(damaged_gltf_is_survived),
         cmocka_unit_test(child_is_limited),
         cmocka_unit_test(scene_file_faults_are_reported),

@@ -115,17 +115,18 @@ static uint32_t material_index(Importer *importer, unsigned index)
     return *known;
 }
 
-// Of a mesh without normals or texture coordinates these are 0 where another has some.
 static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affine *affine)
 {
     const Affine for_normals = affine_for_normals(affine);
+    const struct aiVector3D *uvs = from->mTextureCoords[0];
+    if (from->mNormals) draft_share_part(draft, DRAFT_NORMAL, draft->positions.count);
+    if (uvs) draft_share_part(draft, DRAFT_UV, draft->positions.count);
     for (unsigned i = 0; i < from->mNumVertices; i++) {
-        const Vector3 normal = from->mNormals ? vector_of(&from->mNormals[i]) : (Vector3){0, 0, 0};
         array_push(draft->positions, affine_point(affine, vector_of(&from->mVertices[i])));
-        if (draft->is_shared[DRAFT_NORMAL])
-            array_push(draft->normals, vector_normalize(affine_direction(&for_normals, normal)));
-        const struct aiVector3D *uvs = from->mTextureCoords[0];
-        if (draft->is_shared[DRAFT_UV]) draft_add_uv(draft, uvs ? uvs[i].x : 0, uvs ? uvs[i].y : 0);
+        if (from->mNormals)
+            array_push(draft->normals,
+                       vector_normalize(affine_direction(&for_normals, vector_of(&from->mNormals[i]))));
+        if (uvs) draft_add_uv(draft, uvs[i].x, uvs[i].y);
     }
 }
 
@@ -194,6 +195,9 @@ static bool file_add(Importer *importer)
     }
     const bool added = !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &identity);
     free(importer->materials);
+    for (DraftPart part = DRAFT_UV; part <= DRAFT_NORMAL; part++)
+        if (importer->draft->is_shared[part])
+            draft_share_part(importer->draft, part, importer->draft->positions.count);
     return added;
 }
 

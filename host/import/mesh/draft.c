@@ -66,6 +66,15 @@ void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner)
         indices->items[indices->count] = DRAFT_NONE;
 }
 
+void draft_share_part(MeshDraft *draft, DraftPart part, size_t count)
+{
+    draft->is_shared[part] = true;
+    while (part == DRAFT_NORMAL && draft->normals.count < count)
+        array_push(draft->normals, ((Vector3){0, 0, 0}));
+    while (part == DRAFT_UV && draft->uvs.count < count)
+        draft_add_uv(draft, 0, 0);
+}
+
 bool draft_end_face(MeshDraft *draft, size_t offset)
 {
     const size_t first = draft->face_start, count = draft->corners[DRAFT_POSITION].count - first;

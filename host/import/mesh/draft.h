@@ -90,6 +90,10 @@ size_t draft_part_count(const MeshDraft *draft, DraftPart part);
 // Gives all corners from this one on a part, and those before none.
 void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
 void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
+// Gives each position that lacks them a normal or texture coordinates of 0, up to `count` positions, which
+// from then on share their indices. A reader calls it before it adds such values and once all positions are
+// added.
+void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
 
 // The index, whose place in the file is `offset`, of the next corner; one that the file has later is checked
 // at the end. Position first.
