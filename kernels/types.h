@@ -196,8 +196,12 @@ typedef struct {
     // order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of 2^-48, for
     // double.
     uint4 optical_depth;
-    uint4 texture; // x: 1 + the index of its first level, 0: none; y: number of levels
+    // x: 1 + the index of its first level, 0: none; y: number of levels; z, w: WRAP_… along u and v
+    uint4 texture;
 } Material;
+
+// What a texture shows beyond its edges.
+enum { WRAP_REPEATED, WRAP_CLAMPED, WRAP_MIRRORED };
 
 // One level of a texture's mipmap, each half the size of the one before, down to one texel.
 typedef struct {

@@ -118,26 +118,36 @@ static void sphere_shows_north_and_south(void **state)
                0); // longitude 45, latitude -45: one texel's center
 }
 
-static double texture_at(const TestTexture *texture, long column, long row, bool repeats_upward,
-                         size_t channel)
+// Along u and v.
+static const TextureWrap repeated[2] = {TEXTURE_REPEATED, TEXTURE_REPEATED},
+                         on_sphere[2] = {TEXTURE_REPEATED, TEXTURE_CLAMPED};
+
+static long texel_wrapped(long i, long count, TextureWrap wrap)
 {
-    long width = (long)texture->width, height = (long)texture->height;
-    column = (column % width + width) % width;
-    if (repeats_upward) row = (row % height + height) % height;
-    row = row < 0 ? 0 : row >= height ? height - 1 : row;
-    return (double)texture->colors[row * width + column][channel];
+    if (wrap == TEXTURE_CLAMPED) return i < 0 ? 0 : i >= count ? count - 1 : i;
+    const long period = wrap == TEXTURE_MIRRORED ? 2 * count : count;
+    i = (i % period + period) % period;
+    return i < count ? i : period - 1 - i;
 }
 
-static double texture_between(const TestTexture *texture, double u, double v, bool repeats_upward,
+static double texture_at(const TestTexture *texture, long column, long row, const TextureWrap wraps[2],
+                         size_t channel)
+{
+    column = texel_wrapped(column, (long)texture->width, wraps[0]);
+    row = texel_wrapped(row, (long)texture->height, wraps[1]);
+    return (double)texture->colors[row * (long)texture->width + column][channel];
+}
+
+static double texture_between(const TestTexture *texture, double u, double v, const TextureWrap wraps[2],
                               size_t channel)
 {
     double x = u * texture->width - 0.5, y = (1 - v) * texture->height - 0.5;
     double left = floor(x), top = floor(y), across = x - left, down = y - top;
     long i = (long)left, j = (long)top;
-    return (1 - down) * ((1 - across) * texture_at(texture, i, j, repeats_upward, channel) +
-                         across * texture_at(texture, i + 1, j, repeats_upward, channel)) +
-           down * ((1 - across) * texture_at(texture, i, j + 1, repeats_upward, channel) +
-                   across * texture_at(texture, i + 1, j + 1, repeats_upward, channel));
+    return (1 - down) * ((1 - across) * texture_at(texture, i, j, wraps, channel) +
+                         across * texture_at(texture, i + 1, j, wraps, channel)) +
+           down * ((1 - across) * texture_at(texture, i, j + 1, wraps, channel) +
+                   across * texture_at(texture, i + 1, j + 1, wraps, channel));
 }
 
 enum { WIDTH = 61, HEIGHT = 47 };
@@ -186,11 +196,12 @@ static Vector3 vector_at(const double *values, size_t pixel)
 }
 
 // Each pixel against its place in the texture, where texels are larger than pixels.
-static void check_places(const char *camera, const char *object, TextureMap map, bool repeats_upward)
+static void check_places(const char *camera, const char *object, TextureMap map, const TextureWrap wraps[2])
 {
     TestTexture texture = texture_make(4, 2);
     texture_write(&texture);
     Scene scene = scene_make(camera, object);
+    memcpy(scene.materials.items[0].texture_wrap, wraps, sizeof scene.materials.items[0].texture_wrap);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!probe_has(precision)) continue;
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
@@ -206,7 +217,7 @@ static void check_places(const char *camera, const char *object, TextureMap map,
             map(vector_add(from_eye, scene.camera.position), normal, &u, &v);
             for (size_t channel = 0; channel < 3; channel++)
                 largest = fmax(largest, fabs(film.color[3 * i + channel] -
-                                             texture_between(&texture, u, v, repeats_upward, channel)));
+                                             texture_between(&texture, u, v, wraps, channel)));
             seen++;
         }
         assert_true(seen >= WIDTH * HEIGHT / 4 && seen <= WIDTH * HEIGHT);
@@ -220,31 +231,51 @@ static void check_places(const char *camera, const char *object, TextureMap map,
 static void sphere_agrees_all_around(void **state)
 {
     (void)state;
-    check_places("position: [1, 2, 5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, false);
+    check_places("position: [1, 2, 5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, on_sphere);
     check_places("position: [0.1, -0.3, -5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere,
-                 false);                                                                           // the seam
-    check_places("position: [0.1, 5, 0.2], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, false); // a pole
-    check_places("position: [0, -5, 0], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, false);
+                 on_sphere); // the seam
+    check_places("position: [0.1, 5, 0.2], look_at: [0, 0, 0], fov: 25", BALL, map_sphere,
+                 on_sphere); // a pole
+    check_places("position: [0, -5, 0], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, on_sphere);
 }
 
 static void planes_repeat_it(void **state)
 {
     (void)state;
     check_places("position: [0.3, 0.2, 3], look_at: [0.5, 0.5, 0]",
-                 "plane: {point: [0, 0, 0], normal: [0, 0, 1],", map_wall, true);
+                 "plane: {point: [0, 0, 0], normal: [0, 0, 1],", map_wall, repeated);
     check_places("position: [0.3, 0.2, -3], look_at: [0.5, 0.5, 0]",
-                 "plane: {point: [0, 0, 0], normal: [0, 0, -3],", map_wall_from_behind, true);
+                 "plane: {point: [0, 0, 0], normal: [0, 0, -3],", map_wall_from_behind, repeated);
     check_places("position: [0.3, 3, 0.5], look_at: [0, 0, 0]",
-                 "plane: {point: [0, 0, 0], normal: [0, 1, 0],", map_floor, true);
+                 "plane: {point: [0, 0, 0], normal: [0, 1, 0],", map_floor, repeated);
     check_places("position: [0.3, 3, 0.5], look_at: [0, 0, 0]",
-                 "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5,", map_floor, true);
+                 "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5,", map_floor, repeated);
 }
 
 static void meshes_have_it_by_uv(void **state)
 {
     (void)state;
     check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/quad.obj,",
-                 map_quad, true);
+                 map_quad, repeated);
+}
+
+// Three times in each direction, the whole texture in the middle.
+static void map_wide(Vector3 position, Vector3 normal, double *u, double *v)
+{
+    (void)normal;
+    *u = 0.75 * position.x + 0.5;
+    *v = 0.75 * position.y + 0.5;
+}
+
+static void meshes_wrap_it(void **state)
+{
+    (void)state;
+    static const TextureWrap wraps[][2] = {{TEXTURE_REPEATED, TEXTURE_REPEATED},
+                                           {TEXTURE_CLAMPED, TEXTURE_MIRRORED},
+                                           {TEXTURE_MIRRORED, TEXTURE_CLAMPED}};
+    for (size_t i = 0; i < sizeof wraps / sizeof *wraps; i++)
+        check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/wide.obj,",
+                     map_wide, wraps[i]);
 }
 
 // Far away, where a pixel sees the whole texture and more, the mean of all texels. 5 x 3 is nowhere a half of
@@ -444,6 +475,7 @@ int main(void)
         cmocka_unit_test(sphere_agrees_all_around),
         cmocka_unit_test(planes_repeat_it),
         cmocka_unit_test(meshes_have_it_by_uv),
+        cmocka_unit_test(meshes_wrap_it),
         cmocka_unit_test(far_away_it_is_its_mean),
         cmocka_unit_test(between_levels_it_blends),
         cmocka_unit_test(mirrors_filter_it_too),

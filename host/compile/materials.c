@@ -3,6 +3,9 @@
 
 #include <float.h>
 
+_Static_assert((int)WRAP_CLAMPED == TEXTURE_CLAMPED && (int)WRAP_MIRRORED == TEXTURE_MIRRORED,
+               "the kernels' values are the scene's");
+
 static uint4 optical_depth_of(double transmission)
 {
     if (transmission == 0) return (uint4){OPAQUE, 0, 0, 0};
@@ -39,7 +42,8 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
                                           fmod(eye.z, 2 * size) / size, 1 / size};
         if (material->texture == 0) continue;
         const CompiledTexture *texture = &compiled->textures[material->texture - 1];
-        materials[i].texture = (uint4){1 + texture->first_level, texture->level_count, 0, 0};
+        materials[i].texture = (uint4){1 + texture->first_level, texture->level_count,
+                                       material->texture_wrap[0], material->texture_wrap[1]};
         materials[i].reflection_transmission_ior.w = texture->width / material->texture_size;
     }
 }

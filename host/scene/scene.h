@@ -31,6 +31,9 @@ typedef struct {
     double half_angle, penumbra;
 } Light;
 
+// What a texture on a mesh shows beyond its edges.
+typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap;
+
 typedef struct {
     Color color;
     double ambient;                  // ka
@@ -41,16 +44,18 @@ typedef struct {
     double ior;
     bool full_shadow; // casts a full shadow even if transparent
     bool checker;
-    Color checker_colors[2]; // in place of color
-    double checker_size;     // side of a square, > 0, in scene units
-    uint32_t texture;        // in place of color: 1 + index into the scene's textures; 0: none
-    double texture_size;     // width of a texture on a plane or disc, > 0, in scene units
+    Color checker_colors[2];     // in place of color
+    double checker_size;         // side of a square, > 0, in scene units
+    uint32_t texture;            // in place of color: 1 + index into the scene's textures; 0: none
+    double texture_size;         // width of a texture on a plane or disc, > 0, in scene units
+    TextureWrap texture_wrap[2]; // along u and v, on a mesh
 } Material;
 
-// A texture's image file; scene_compile reads it.
+// A texture's image; scene_compile decodes it.
 typedef struct {
-    char *path;
+    char *path;    // of the image's file; where it has `bytes`, only for messages
     size_t offset; // of its name in the scene's text
+    Text bytes;    // of an image within another file; else empty
 } SceneTexture;
 
 // Every shape, by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),

@@ -7,7 +7,7 @@
 #include "scene.h"
 #include "shapes/surface_point.h"
 
-// u runs along the texture's rows, v from bottom to top, from 0 to 1; beyond that the texture repeats.
+// u runs along the texture's rows, v from bottom to top, from 0 to 1; beyond that the texture wraps.
 typedef struct {
     real u, v;
     real density; // texels of the full texture per unit of length
@@ -88,22 +88,22 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ki
 
 // From here on one lane at a time, since each reads texels of its own.
 
-// A texture coordinate of a repeated texture, in 0..1: the fractional part; 0 if that is NaN.
-static inline scalar wrap_unit(scalar a)
+// The texture coordinate in 0..1 whose color one beyond that has; 0 if it is NaN.
+static inline scalar wrap_unit(scalar a, uint wrap)
 {
     scalar part = a - floor(a);
+    if (wrap == WRAP_MIRRORED) part = fabs(a - 2 * rint(a / 2));
+    if (wrap == WRAP_CLAMPED) part = clamp(a, (scalar)0, (scalar)1);
     return part >= 0 && part <= 1 ? part : 0;
 }
 
-// Of a texel index from -1 to count: wrapped, or clamped to the edge.
-static inline uint texel_wrapped(scalar i, uint count)
+// Returns the texel for an index from -1 to count, which lies beyond an edge at both ends.
+static inline uint texel_wrapped(scalar i, uint count, uint wrap)
 {
-    return i < 0 ? count - 1 : i >= (scalar)count ? 0 : (uint)i;
-}
-
-static inline uint texel_clamped(scalar i, uint count)
-{
-    return i < 0 ? 0 : i >= (scalar)count ? count - 1 : (uint)i;
+    bool is_repeated = wrap == WRAP_REPEATED;
+    if (i < 0) return is_repeated ? count - 1 : 0;
+    if (i >= (scalar)count) return is_repeated ? 0 : count - 1;
+    return (uint)i;
 }
 
 static inline scalar4 texel_color(const Scene *scene, uint index)
@@ -117,13 +117,13 @@ static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
 }
 
 // Bilinear between texel centers. `level`: x its first texel, y width, z height.
-static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, bool wraps_v)
+static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, uint wrap_u,
+                                  uint wrap_v)
 {
     scalar x = fma(u, (scalar)level.y, (scalar)(-0.5f)), y = fma(1 - v, (scalar)level.z, (scalar)(-0.5f));
     scalar left = floor(x), top = floor(y);
-    uint column_0 = texel_wrapped(left, level.y), column_1 = texel_wrapped(left + 1, level.y);
-    uint row_0 = wraps_v ? texel_wrapped(top, level.z) : texel_clamped(top, level.z);
-    uint row_1 = wraps_v ? texel_wrapped(top + 1, level.z) : texel_clamped(top + 1, level.z);
+    uint column_0 = texel_wrapped(left, level.y, wrap_u), column_1 = texel_wrapped(left + 1, level.y, wrap_u);
+    uint row_0 = texel_wrapped(top, level.z, wrap_v), row_1 = texel_wrapped(top + 1, level.z, wrap_v);
     uint start_0 = level.x + row_0 * level.y, start_1 = level.x + row_1 * level.y;
     scalar4 above = scalar4_between(texel_color(scene, start_0 + column_0),
                                     texel_color(scene, start_0 + column_1), x - left);
@@ -135,7 +135,7 @@ static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, sca
 // `footprint`: the pixel's width in texels of the full texture. Colors are linear in it between the levels
 // for 2^n and 2^(n + 1) texels.
 static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar u, scalar v,
-                                       scalar footprint, bool wraps_v)
+                                       scalar footprint, uint wrap_v)
 {
     uint level = texture.x - 1, last = level + texture.y - 1;
     scalar part = 0;
@@ -144,10 +144,11 @@ static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar
         part = 2 * frexp(min(footprint, (scalar)0x1p30f), &exponent) - 1;
         level += (uint)(exponent - 1);
     }
-    if (level >= last) return level_color(scene, scene->texture_levels[last].place, u, v, wraps_v);
-    scalar4 color = level_color(scene, scene->texture_levels[level].place, u, v, wraps_v);
+    uint wrap_u = texture.z;
+    if (level >= last) return level_color(scene, scene->texture_levels[last].place, u, v, wrap_u, wrap_v);
+    scalar4 color = level_color(scene, scene->texture_levels[level].place, u, v, wrap_u, wrap_v);
     if (part == 0) return color;
-    scalar4 coarser = level_color(scene, scene->texture_levels[level + 1].place, u, v, wraps_v);
+    scalar4 coarser = level_color(scene, scene->texture_levels[level + 1].place, u, v, wrap_u, wrap_v);
     return scalar4_between(color, coarser, part);
 }
 
@@ -165,10 +166,10 @@ static inline Vector texture_color(const Scene *scene, uint kind, const Material
     IntegerLanes lanes = {wanted};
     for (uint lane = 0; lane < LANES; lane++) {
         if (lanes.each[lane] == 0) continue;
-        bool is_sphere = kind == KIND_SPHERES;
-        scalar lane_v = is_sphere ? v.each[lane] : wrap_unit(v.each[lane]);
-        scalar4 color = texture_filtered(scene, material->texture, wrap_unit(u.each[lane]), lane_v,
-                                         footprint.each[lane], !is_sphere);
+        uint wrap_v = kind == KIND_SPHERES ? WRAP_CLAMPED : material->texture.w;
+        scalar4 color =
+            texture_filtered(scene, material->texture, wrap_unit(u.each[lane], material->texture.z),
+                             wrap_unit(v.each[lane], wrap_v), footprint.each[lane], wrap_v);
         red.each[lane] = color.x;
         green.each[lane] = color.y;
         blue.each[lane] = color.z;
