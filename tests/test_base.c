@@ -510,6 +510,10 @@ static void test_base64(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         Text text = {0};
         base64_append(&text, (const uint8_t *)cases[i][0], strlen(cases[i][0]));
+        Text bytes = {0};
+        assert_true(base64_decode(&bytes, text.items, text.count));
+        assert_string_equal(text_c(&bytes), cases[i][0]);
+        text_free(&bytes);
         assert_string_equal(text_c(&text), cases[i][1]);
         text_free(&text);
     }

@@ -4,7 +4,6 @@
 #include "host/base/text.h"
 
 #include <stdarg.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -81,6 +80,7 @@ static Message message_place(const Source *source, size_t offset)
 {
     Message message = {0};
     if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
+    if (offset == MESSAGE_WHOLE_FILE) return message;
     if (offset > source->length) offset = source->length;
     // A byte order mark is not a character of the first line.
     size_t start = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;

@@ -3,6 +3,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 typedef enum { MESSAGE_WARNING, MESSAGE_ERROR } MessageSeverity;
@@ -30,6 +31,9 @@ typedef struct {
 // Add a message without a file. The error's returns false, as what found the error does.
 void message_warning(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool message_error(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+// The offset of a message about a whole file, which has no line.
+#define MESSAGE_WHOLE_FILE SIZE_MAX
 
 // Adds a message at a byte offset of a source, which determines its line, column and source line. An offset
 // past the end points at the end. Control characters are replaced by `?`.

@@ -157,7 +157,7 @@ static bool images_are_there(const Scene *scene, MessageList *messages)
     Report report = report_open(&source, messages);
     for (size_t i = 0; i < scene->textures.count && !report_is_full(&report); i++) {
         const SceneTexture *texture = &scene->textures.items[i];
-        const char *obstacle = file_obstacle(texture->path);
+        const char *obstacle = texture->bytes.count > 0 ? NULL : file_obstacle(texture->path);
         if (obstacle) report_error(&report, texture->offset, "cannot read '%s': %s", texture->path, obstacle);
     }
     return report_close(&report);

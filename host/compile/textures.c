@@ -122,6 +122,16 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
     return list->texel_count > TEXELS_MAX ? "too many texels in all textures" : NULL;
 }
 
+static bool texture_read(Image *image, const SceneTexture *texture, MessageList *messages)
+{
+    const Text *bytes = &texture->bytes;
+    if (bytes->count > 0)
+        return image_read_bytes(image, &(Source){texture->path, bytes->items, bytes->count}, messages);
+    const char *obstacle = file_obstacle(texture->path);
+    if (obstacle) return message_error(messages, "cannot read '%s': %s", texture->path, obstacle);
+    return image_read(image, texture->path, messages);
+}
+
 static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
                         const SceneTexture *scene_texture, MessageList *messages)
 {
@@ -129,9 +139,7 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
     const Source source = scene_source(scene);
     Image image;
     MessageList problems = {0};
-    const char *obstacle = file_obstacle(scene_texture->path);
-    if (obstacle) message_error(&problems, "cannot read '%s': %s", scene_texture->path, obstacle);
-    bool done = !obstacle && image_read(&image, scene_texture->path, &problems);
+    bool done = texture_read(&image, scene_texture, &problems);
     if (done) {
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
         *texture = (CompiledTexture){image.width, image.height, first_level,

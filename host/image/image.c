@@ -191,27 +191,36 @@ static bool image_decode(Image *image, const ImageFile *file)
     return decode ? decode(image, file) : image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
 }
 
+bool image_bytes_are_known(const void *bytes, size_t length)
+{
+    return decoder_of(bytes, length) != NULL;
+}
+
 bool image_is_known(const char *path)
 {
     char bytes[8];
     FILE *file = fopen(path, "rbe");
     const size_t length = file ? fread(bytes, 1, sizeof bytes, file) : 0;
     if (file) fclose(file);
-    return decoder_of(bytes, length) != NULL;
+    return image_bytes_are_known(bytes, length);
+}
+
+bool image_read_bytes(Image *image, const Source *source, MessageList *messages)
+{
+    *image = (Image){.transfer = TRANSFER_NONE};
+    const ImageFile file = {source->file, (const uint8_t *)source->bytes, source->length, messages};
+    const bool done = image_decode(image, &file);
+    if (!done) image_free(image);
+    return done;
 }
 
 bool image_read(Image *image, const char *path, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
     Text text = {0};
-    if (!text_read_file(&text, path, messages)) {
-        text_free(&text);
-        return false;
-    }
-    ImageFile file = {path, (const uint8_t *)text_c(&text), text.count, messages};
-    bool done = image_decode(image, &file);
+    const bool done = text_read_file(&text, path, messages) &&
+                      image_read_bytes(image, &(Source){path, text_c(&text), text.count}, messages);
     text_free(&text);
-    if (!done) image_free(image);
     return done;
 }
 

@@ -65,8 +65,11 @@ typedef struct {
 // and an empty image that need not be freed. An image whose header declares more pixels than
 // image_limit_pixels permits is refused before anything is decoded: a small file may be compressed from many.
 bool image_read(Image *image, const char *path, MessageList *messages);
-// Whether the file starts as those that image_read reads.
+// Reads an image from memory; `source->file` names it in messages.
+bool image_read_bytes(Image *image, const Source *source, MessageList *messages);
+// Whether the file, or its bytes, start as those that image_read reads.
 bool image_is_known(const char *path);
+bool image_bytes_are_known(const void *bytes, size_t length);
 enum { IMAGE_PIXELS_MAX = 1 << 27 }; // the default: 1.6 GB of floats
 void image_limit_pixels(uint32_t largest);
 double image_value(const Image *image, size_t i); // values[i], at the file's own width

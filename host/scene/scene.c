@@ -22,6 +22,30 @@ Material material_default(void)
                       .texture_size = 1};
 }
 
+void material_set_opacity(Material *material, double opacity)
+{
+    material->ambient *= opacity;
+    material->diffuse = vector_scale(material->diffuse, opacity);
+    material->specular *= opacity;
+    material->reflection *= opacity;
+    material->transmission = 1 - opacity;
+    material->ior = 1;
+}
+
+// The color becomes the emission, and the diffuse factors restore the color. A channel that does not emit
+// gets a color that no image resolves, because a factor cannot restore one from 0.
+void material_set_emission(Material *material, Color emission)
+{
+    const Color seen = {material->color.x * material->diffuse.x, material->color.y * material->diffuse.y,
+                        material->color.z * material->diffuse.z};
+    const double largest = vector_largest(emission);
+    if (largest == 0) return;
+    material->color = vector_max(emission, vector_all(0x1p-20 * largest));
+    material->diffuse =
+        (Color){seen.x / material->color.x, seen.y / material->color.y, seen.z / material->color.z};
+    material->ambient = 1;
+}
+
 uint32_t scene_add_material(Scene *scene, const Material *material, const char *name)
 {
     array_push(scene->materials, *material);
@@ -36,7 +60,7 @@ uint32_t scene_add_texture(Scene *scene, const char *path, size_t offset)
         index++;
     if (index == SCENE_TEXTURES_MAX) return 0;
     if (index == scene->textures.count)
-        array_push(scene->textures, ((SceneTexture){memory_copy_text(path), offset}));
+        array_push(scene->textures, ((SceneTexture){.path = memory_copy_text(path), .offset = offset}));
     return (uint32_t)index + 1;
 }
 
@@ -70,8 +94,10 @@ void scene_free(Scene *scene)
     for (size_t i = 0; i < scene->meshes.count; i++)
         mesh_free(&scene->meshes.items[i]);
     free(scene->meshes.items);
-    for (size_t i = 0; i < scene->textures.count; i++)
+    for (size_t i = 0; i < scene->textures.count; i++) {
         free(scene->textures.items[i].path);
+        text_free(&scene->textures.items[i].bytes);
+    }
     free(scene->textures.items);
     free(scene->file);
     text_free(&scene->text);

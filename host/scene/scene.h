@@ -212,6 +212,12 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
 // Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32,
 // ior 1.5.
 Material material_default(void);
+// Lets through the fraction 1 - opacity of the light from behind, unbent, and dims what the surface itself
+// shows by the opacity.
+void material_set_opacity(Material *material, double opacity);
+// Makes a material without a texture emit light that illuminates nothing else, in a scene whose ambient light
+// is (1, 1, 1), where it replaces the material's ambient light.
+void material_set_emission(Material *material, Color emission);
 
 // How many ids an object takes: one for each triangle of a mesh, else one.
 size_t object_primitive_count(const Scene *scene, const Object *object);
