@@ -29,6 +29,18 @@ objects:
 HAS_DOUBLE = need_device()["fp64"]
 
 
+ARTICLE = f"{ROOT}/scenes/article.yaml"
+
+
+def at_the_edge_of_the_cone(article):
+    """The article's scene through a longer lens."""
+    with open(article) as file:
+        text = file.read()
+    seen = text.replace("look_at: [0, 1.05, 0], focal_length: 2,", "look_at: [-1.6947, 1.4227, 0.2414], focal_length: 60,")
+    assert seen != text
+    return seen
+
+
 class Certify(TestCase):
     def certify(self, scene, options):
         report = self.json(f"certify {scene} {SMALL} --json {options}")
@@ -56,6 +68,15 @@ class Certify(TestCase):
         for row in rows.values():
             self.assertEqual([row["wrong"][name] for name in ("object", "shadow", "path")], [0, 0, 0])
         self.assertLess(rows["double"]["color"]["max_right"], 1e-10)
+
+    @unittest.skipUnless(HAS_DOUBLE, "no fp64")
+    def test_colors_of_certified(self):
+        """Next to the edges of round shapes, too, they are as exact as those of single."""
+        write("edge-of-a-cone.yaml", at_the_edge_of_the_cone(ARTICLE))
+        for options in ["edge-of-a-cone.yaml --size 96x64 --pixels 6144"] + IS_LONG * [f"{ARTICLE} --size 640x360 --pixels 230400"]:
+            report = self.json(f"certify {options} --precision single,certified --json")
+            single, certified = (row["color"]["max_right"] for row in report["precisions"])
+            self.assertLessEqual(certified, 2 * single)
 
     def test_errors_are_noticed(self):
         """A planet at fast loses the shadow of a small sphere; a wrong pixel has a wrong color."""

@@ -11,8 +11,8 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// A lane's answer: a hit, which is the exact ray's between low and high; or no hit; or in doubt: a hit, if
-// any, is not before low.
+// A lane's answer: a hit, which is the exact ray's between low and high, and about at t; or no hit; or in
+// doubt: a hit, if any, is not before low.
 typedef struct {
     mask found, doubt;
     real t, low, high;
@@ -57,6 +57,13 @@ static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask per
     hit.t = (real)(0.5f) * (low + high);
     hit.low = low;
     hit.high = high;
+    return hit;
+}
+
+// Moves a hit to t, which may be far from the middle of its bounds, unless t is outside of them.
+static inline CertainHit certain_at(CertainHit hit, real t)
+{
+    hit.t = lanes_select((t >= hit.low) & (t <= hit.high), t, hit.t);
     return hit;
 }
 

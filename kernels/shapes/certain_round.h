@@ -10,9 +10,10 @@
 #include "shapes/certain.h"
 #include "shapes/surface_point.h"
 
-// The exact interval of t contains `inner`, if `certain`, and lies within `outer`, if `perhaps`.
+// The exact interval of t contains `inner`, if `certain`, and lies within `outer`, if `perhaps`. Its ends are
+// about those of `roots`.
 typedef struct {
-    Interval outer, inner;
+    Interval outer, inner, roots;
     mask certain, perhaps;
 } CertainInterval;
 
@@ -184,7 +185,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
                                              real to, bool is_finite)
 {
     CertainInterval interval;
-    interval.outer = interval.inner = (Interval){(real)(-LARGEST), (real)(LARGEST)};
+    interval.outer = interval.inner = interval.roots = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     interval.certain = mask_none();
     const RoundQuadratic quadratic = round_quadratic(round, ray);
     real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF); // of rays to a light
@@ -213,7 +214,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         real step = divide_or((real)(0.5f) * point.value, slope, (real)(0));
         // else the root was none; from an end, where it is clamped, a step would lead beyond it
         mask settles = (t == roots[i]) & (fabs(step) * (real)(0x1p6f) < fabs(t));
-        t = lanes_select(settles, t - step, t);
+        roots[i] = t = lanes_select(settles, t - step, t);
         real band = (real)(2.5f) * point.band, bend = fabs(a) * band;
         real steepness = real_max(fabs(slope), (real)(0.5f) * real_sqrt(bend));
         real width =
@@ -222,6 +223,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         before[i] = t - width;
         after[i] = t + width;
     }
+    interval.roots = (Interval){roots[0], roots[1]};
     const real enter_out = real_max(before[0], from), enter_in = real_min(after[0], to),
                leave_in = real_max(before[1], from), leave_out = real_min(after[1], to);
     RoundPoint outside_before = round_point(round, ray, enter_out),

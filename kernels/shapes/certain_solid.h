@@ -11,13 +11,16 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
 {
     if (flags & REVOLUTION_CAPPED) {
         Interval outer = intervals_common(side->outer, slab->outer),
-                 inner = intervals_common(side->inner, slab->inner);
+                 inner = intervals_common(side->inner, slab->inner),
+                 roots = intervals_common(side->roots, slab->roots);
         mask perhaps = side->perhaps & slab->perhaps & (outer.near <= outer.far);
         mask certain = perhaps & side->certain & slab->certain & (inner.near < inner.far);
         real near_high = lanes_select(certain, inner.near, NEVER);
         CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
         CertainHit far =
             certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
+        near = certain_at(near, roots.near);
+        far = certain_at(far, roots.far);
         return certain_select(left, far, certain_first(ray, near, near_high, far));
     }
     CertainHit hits[2];
@@ -28,7 +31,8 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
         mask within = (low >= slab->inner.near) & (high <= slab->inner.far) & slab->certain;
         mask beyond = !slab->perhaps | (high <= slab->outer.near) | (low >= slab->outer.far);
         mask perhaps = side->perhaps & !beyond;
-        hits[i] = certain_crossing(ray, side->certain & within, perhaps, low, high);
+        hits[i] = certain_at(certain_crossing(ray, side->certain & within, perhaps, low, high),
+                             i == 0 ? side->roots.near : side->roots.far);
         passed[i] = beyond | (high < ray->tmin);
     }
     if (flags & IGNORES_FRONT_FACES) return hits[1];
@@ -38,7 +42,7 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
 static inline CertainInterval round_unbounded(void)
 {
     const Interval everywhere = {(real)(-LARGEST), (real)(LARGEST)};
-    return (CertainInterval){everywhere, everywhere, mask_all(), mask_all()};
+    return (CertainInterval){everywhere, everywhere, everywhere, mask_all(), mask_all()};
 }
 
 // A cylinder or cone with its ends' heights.
@@ -74,6 +78,7 @@ static inline CertainInterval round_slab(const Round *round, const Ray *ray, rea
                                   interval_above(error_per_t - rise, z - high - high_error));
     slab.inner = intervals_common(interval_above(rise - error_per_t, low - z + low_error),
                                   interval_above(-rise - error_per_t, z - high + high_error));
+    slab.roots = intervals_common(interval_above(rise, low - z), interval_above(-rise, z - high));
     slab.certain = slab.inner.near < slab.inner.far;
     slab.perhaps = slab.outer.near <= slab.outer.far;
     return slab;

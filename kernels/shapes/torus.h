@@ -277,11 +277,11 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
     return lanes_select(known, (real)(0.5f) * cosine * least * ray_inverse_length(ray), (real)(0));
 }
 
-// Narrows a bracket at whose ends the exact ray is certainly on different sides. Only signs beyond `place`
-// count; the constants just choose the points: the zero is off by `place` over the slope, and beyond twice
-// that the sign is certain.
-static inline Interval torus_bracket(const CertainTorus *torus, const Ray *ray, Interval bracket,
-                                     mask entering)
+// The crossing in a bracket at whose ends the exact ray is certainly on different sides. It is narrowed. Only
+// signs beyond `place` count; the constants just choose the points: the zero is off by `place` over the
+// slope, and beyond twice that the sign is certain.
+static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
+                                        mask crosses, mask entering)
 {
     real low = bracket.near, high = bracket.far, t = (real)(0.5f) * (low + high);
     TorusPoint point;
@@ -309,7 +309,7 @@ static inline Interval torus_bracket(const CertainTorus *torus, const Ray *ray, 
         bracket.near = lanes_select(certain & before, sides[i], bracket.near);
         bracket.far = lanes_select(certain & !before, sides[i], bracket.far);
     }
-    return bracket;
+    return certain_at(certain_crossing(ray, crosses, crosses, bracket.near, bracket.far), t);
 }
 
 static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
@@ -368,8 +368,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
         after_known = lanes_select(same_place, known, after_known);
         mask doubt = open & !(known & after_known), crosses = open & !doubt & (outside != after_outside);
         if (lanes_any(crosses)) {
-            Interval bracket = torus_bracket(&certain, ray, (Interval){before, after}, outside);
-            CertainHit crossing = certain_crossing(ray, crosses, crosses, bracket.near, bracket.far);
+            CertainHit crossing = torus_crossing(&certain, ray, (Interval){before, after}, crosses, outside);
             hit = certain_select(crosses, crossing, hit);
         }
         CertainHit doubtful = certain_crossing(ray, mask_none(), doubt, before, to);

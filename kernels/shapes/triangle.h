@@ -346,7 +346,8 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
     high = high + vertex_error;
     low = lanes_select(narrows, real_max(low, t - t_error), low);
     high = lanes_select(narrows, real_min(high, t + t_error), high);
-    return certain_crossing(ray, certain, perhaps, low, high);
+    CertainHit hit = certain_crossing(ray, certain, perhaps, low, high);
+    return certain_select(narrows, certain_at(hit, t), hit);
 }
 
 // By the vertices' distances from the ray's start, which may be much less than those from the eye.
