@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 4 }; // at most
+enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 6 }; // at most
 
 static const char path[] = "a.exr";
 
@@ -29,10 +29,10 @@ static void must(exr_result_t code)
     assert_int_equal(code, EXR_ERR_SUCCESS);
 }
 
-static void chunk_write(exr_context_t context, const exr_chunk_info_t *chunk, const float *pixels)
+static void chunk_write(exr_context_t context, int part, const exr_chunk_info_t *chunk, const float *pixels)
 {
     exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
-    must(exr_encoding_initialize(context, 0, chunk, &pipeline));
+    must(exr_encoding_initialize(context, part, chunk, &pipeline));
     for (int i = 0; i < pipeline.channel_count; i++) {
         pipeline.channels[i].encode_from_ptr = (const uint8_t *)(pixels + i);
         pipeline.channels[i].user_pixel_stride = CHANNELS * sizeof(float);
@@ -40,72 +40,127 @@ static void chunk_write(exr_context_t context, const exr_chunk_info_t *chunk, co
         pipeline.channels[i].user_bytes_per_element = sizeof(float);
         pipeline.channels[i].user_data_type = EXR_PIXEL_FLOAT;
     }
-    must(exr_encoding_choose_default_routines(context, 0, &pipeline));
-    must(exr_encoding_run(context, 0, &pipeline));
+    must(exr_encoding_choose_default_routines(context, part, &pipeline));
+    must(exr_encoding_run(context, part, &pipeline));
     must(exr_encoding_destroy(context, &pipeline));
 }
 
-// `names`: a letter for each channel, in the order of EXR, which is that of the alphabet.
-static void exr_write(const char *names, exr_compression_t compression, exr_pixel_type_t type, bool is_tiled)
+// The files that this writes, apart from their names of channels.
+typedef struct {
+    exr_compression_t compression;
+    exr_pixel_type_t type;
+    bool is_tiled;
+} Kind;
+
+static const Kind plain = {EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, false};
+
+// Opens a file of scan lines or tiles with its channels, one part for each item of `names`, and returns its
+// context. A part's channels are separated by commas and in the order of EXR, which is that of the alphabet.
+// A name of a part precedes them, ended by a colon.
+static exr_context_t exr_open(const char *const *names, int part_count, Kind kind)
+{
+    exr_context_t context;
+    must(exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, NULL));
+    for (int i = 0; i < part_count; i++) {
+        char text[256], *rest = text;
+        snprintf(text, sizeof text, "%s", names[i]);
+        const char *part_name = strchr(text, ':') ? strsep(&rest, ":") : "";
+        int part;
+        must(exr_add_part(context, part_name, kind.is_tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE,
+                          &part));
+        must(exr_initialize_required_attr_simple(context, part, WIDTH, HEIGHT, kind.compression));
+        if (kind.is_tiled)
+            must(exr_set_tile_descriptor(context, part, TILE, TILE, EXR_TILE_ONE_LEVEL, EXR_TILE_ROUND_DOWN));
+        for (const char *name; (name = strsep(&rest, ","));)
+            must(exr_add_channel(context, part, name, kind.type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+        if (part_count > 1) must(exr_set_version(context, part, 1));
+    }
+    return context;
+}
+
+// Writes the pixels of all parts and closes the file.
+static void exr_close(exr_context_t context, int part_count, Kind kind)
 {
     static float pixels[HEIGHT][WIDTH][CHANNELS];
-    for (uint32_t y = 0; y < HEIGHT; y++) {
-        for (uint32_t x = 0; x < WIDTH; x++) {
-            for (uint32_t i = 0; i < CHANNELS; i++)
-                pixels[y][x][i] = value_at(x, y, i);
-        }
-    }
-    exr_context_t context;
-    int part;
-    must(exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, NULL));
-    must(exr_add_part(context, "", is_tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part));
-    must(exr_initialize_required_attr_simple(context, 0, WIDTH, HEIGHT, compression));
-    if (is_tiled)
-        must(exr_set_tile_descriptor(context, 0, TILE, TILE, EXR_TILE_ONE_LEVEL, EXR_TILE_ROUND_DOWN));
-    for (const char *name = names; *name; name++)
-        must(exr_add_channel(context, 0, (char[]){*name, '\0'}, type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
     must(exr_write_header(context));
-    exr_chunk_info_t chunk;
-    if (is_tiled) {
-        for (int y = 0; y * TILE < HEIGHT; y++) {
-            for (int x = 0; x * TILE < WIDTH; x++) {
-                must(exr_write_tile_chunk_info(context, 0, x, y, 0, 0, &chunk));
-                chunk_write(context, &chunk, pixels[y * TILE][x * TILE]);
+    for (int part = 0; part < part_count; part++) {
+        for (uint32_t y = 0; y < HEIGHT; y++) {
+            for (uint32_t x = 0; x < WIDTH; x++) {
+                for (uint32_t i = 0; i < CHANNELS; i++)
+                    pixels[y][x][i] = value_at(x, y, i + CHANNELS * (uint32_t)part);
             }
         }
-    } else {
-        int32_t rows;
-        must(exr_get_scanlines_per_chunk(context, 0, &rows));
-        for (int y = 0; y < HEIGHT; y += rows) {
-            must(exr_write_scanline_chunk_info(context, 0, y, &chunk));
-            chunk_write(context, &chunk, pixels[y][0]);
+        exr_chunk_info_t chunk;
+        if (kind.is_tiled) {
+            for (int y = 0; y * TILE < HEIGHT; y++) {
+                for (int x = 0; x * TILE < WIDTH; x++) {
+                    must(exr_write_tile_chunk_info(context, part, x, y, 0, 0, &chunk));
+                    chunk_write(context, part, &chunk, pixels[y * TILE][x * TILE]);
+                }
+            }
+        } else {
+            int32_t rows;
+            must(exr_get_scanlines_per_chunk(context, part, &rows));
+            for (int y = 0; y < HEIGHT; y += rows) {
+                must(exr_write_scanline_chunk_info(context, part, y, &chunk));
+                chunk_write(context, part, &chunk, pixels[y][0]);
+            }
         }
     }
     must(exr_finish(&context));
 }
 
-// `expected`: the letters of the channels that are read, in the image's order.
-static void check_read(const char *names, const char *expected, exr_compression_t compression,
-                       exr_pixel_type_t type, bool is_tiled)
+static void exr_write(const char *names, Kind kind)
 {
-    exr_write(names, compression, type, is_tiled);
+    exr_close(exr_open(&names, 1, kind), 1, kind);
+}
+
+static bool layer_read(Image *image, const char *layer, MessageList *messages)
+{
+    const bool done = image_read_layer(image, path, layer, messages);
+    assert_true(done == (message_count(messages, MESSAGE_ERROR) == 0));
+    return done;
+}
+
+// `expected`: the numbers of the channels that are read, in the image's order.
+static void check_values(const char *layer, const char *expected, const char *what)
+{
     MessageList messages = {0};
     Image image;
-    if (!image_read(&image, path, &messages))
-        fail_msg("%s, compression %d, type %d, tiled %d: %s", names, (int)compression, (int)type, is_tiled,
-                 messages.items[0].text);
+    if (!layer_read(&image, layer, &messages)) fail_msg("%s: %s", what, messages.items[0].text);
+    assert_int_equal(messages.count, 0);
     assert_int_equal(image.width, WIDTH);
     assert_int_equal(image.height, HEIGHT);
     assert_int_equal(image.channels, strlen(expected));
     for (uint32_t y = 0; y < HEIGHT; y++) {
         for (uint32_t x = 0; x < WIDTH; x++) {
             for (uint32_t i = 0; i < image.channels; i++) {
-                uint32_t channel = (uint32_t)(strchr(names, expected[i]) - names);
-                assert_true(image.values[(y * WIDTH + x) * image.channels + i] == value_at(x, y, channel));
+                const float value = value_at(x, y, (uint32_t)(expected[i] - '0'));
+                if (image.values[(y * WIDTH + x) * image.channels + i] != value)
+                    fail_msg("%s: channel %u of pixel %u, %u", what, i, x, y);
             }
         }
     }
     image_free(&image);
+}
+
+static void check_read(const char *names, const char *expected, Kind kind)
+{
+    char what[128];
+    snprintf(what, sizeof what, "%s, compression %d, type %d, tiled %d", names, (int)kind.compression,
+             (int)kind.type, kind.is_tiled);
+    exr_write(names, kind);
+    check_values(NULL, expected, what);
+}
+
+static void check_refused(const char *layer, const char *reason)
+{
+    MessageList messages = {0};
+    Image image;
+    assert_false(layer_read(&image, layer, &messages));
+    assert_int_equal(messages.count, 1);
+    if (!strstr(messages.items[0].text, reason)) fail_msg("%s, not: %s", messages.items[0].text, reason);
+    message_list_free(&messages);
 }
 
 static void test_compressions(void **state)
@@ -115,8 +170,8 @@ static void test_compressions(void **state)
                                               EXR_COMPRESSION_ZIP, EXR_COMPRESSION_PIZ};
     for (size_t i = 0; i < sizeof compressions / sizeof *compressions; i++) {
         for (int is_tiled = 0; is_tiled < 2; is_tiled++) {
-            check_read("ABGR", "RGB", compressions[i], EXR_PIXEL_HALF, is_tiled);
-            check_read("ABGR", "RGB", compressions[i], EXR_PIXEL_FLOAT, is_tiled);
+            check_read("A,B,G,R", "321", (Kind){compressions[i], EXR_PIXEL_HALF, is_tiled});
+            check_read("A,B,G,R", "321", (Kind){compressions[i], EXR_PIXEL_FLOAT, is_tiled});
         }
     }
 }
@@ -125,16 +180,151 @@ static void test_compressions(void **state)
 static void test_choice_of_channels(void **state)
 {
     (void)state;
-    static const char *const files[][2] = {{"Y", "Y"},     {"AY", "Y"},     {"BGY", "Y"},
-                                           {"ABGY", "Y"},  {"BGR", "RGB"},  {"BGRZ", "RGB"},
-                                           {"UVW", "UVW"}, {"TUVW", "TUV"}, {"UV", "U"}};
+    static const char *const files[][2] = {
+        {"Y", "0"},
+        {"A,Y", "1"},
+        {"B,G,Y", "2"},
+        {"A,B,G,Y", "3"},
+        {"B,G,R", "210"},
+        {"B,G,R,Z", "210"},
+        {"b,g,r", "210"},
+        {"Blue,Green,Red", "210"},
+        {"X,Y,Z", "012"},
+        {"depth", "0"},
+        {"A,Z", "1"},
+        {"ViewLayer.Combined.A,ViewLayer.Combined.B,ViewLayer.Combined.G,ViewLayer.Combined.R", "321"},
+        {"diffuse.B,diffuse.G,diffuse.R,normal.X,normal.Y,normal.Z", "210"},
+        {"B,G,R,diffuse.B,diffuse.G,diffuse.R", "210"},
+        {"Z,albedo.B,albedo.G,albedo.R", "321"},
+    };
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         for (int is_tiled = 0; is_tiled < 2; is_tiled++) {
-            check_read(files[i][0], files[i][1], EXR_COMPRESSION_ZIPS, EXR_PIXEL_HALF, is_tiled);
-            check_read(files[i][0], files[i][1], EXR_COMPRESSION_NONE, EXR_PIXEL_HALF, is_tiled);
-            check_read(files[i][0], files[i][1], EXR_COMPRESSION_ZIPS, EXR_PIXEL_FLOAT, is_tiled);
-            check_read(files[i][0], files[i][1], EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, is_tiled);
+            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_ZIPS, EXR_PIXEL_HALF, is_tiled});
+            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_NONE, EXR_PIXEL_HALF, is_tiled});
+            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_ZIPS, EXR_PIXEL_FLOAT, is_tiled});
+            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, is_tiled});
         }
+    }
+}
+
+static void test_layers_by_name(void **state)
+{
+    (void)state;
+    exr_write("a.B,a.G,a.R,b.c.X,b.c.Y,b.c.Z", plain);
+    check_values("a", "210", "a");
+    check_values("b.c", "345", "b.c");
+    check_refused("c", "it has no layer 'c'; its channels are a.B, a.G, a.R, b.c.X, b.c.Y, b.c.Z");
+    exr_write("a.B,a.G,a.R,b.B,b.G,b.R", plain);
+    check_values("b", "543", "b");
+    check_refused(NULL, "which of its layers is meant? They are a, b");
+    exr_write("a.Z,b.Z", plain);
+    check_refused(NULL, "which of its layers is meant? They are a, b");
+    exr_write("G,R", plain);
+    check_refused(NULL, "no layer has red, green and blue, or luminance; its channels are G, R");
+    exr_write("T,U,V", plain);
+    check_refused(NULL, "its channels are T, U, V");
+    exr_write("B,G,R,d.G,d.R", plain);
+    check_refused("d", "its layer 'd' has neither colors, luminance");
+}
+
+static void test_parts_are_layers(void **state)
+{
+    (void)state;
+    static const char *const parts[] = {"depth:Z", "beauty:B,G,R", "other:B,G,R,a.X,a.Y,a.Z"};
+    exr_close(exr_open(parts, 2, plain), 2, plain);
+    check_values(NULL, "876", "the only part with colors");
+    exr_close(exr_open(parts, 3, plain), 3, plain);
+    check_values("other", "\x3e\x3d\x3c", "a part's name");
+    check_values("a", "\x3f\x40\x41", "a layer of a part");
+    check_refused(NULL, "They are beauty, other");
+}
+
+// Where the file has no pixels the image is black, and pixels outside of the image are not read.
+static void test_windows(void **state)
+{
+    (void)state;
+    static const int shifts[][2] = {{3, 5}, {-4, -2}, {-30, 1}};
+    for (size_t i = 0; i < sizeof shifts / sizeof *shifts; i++) {
+        const int left = shifts[i][0], top = shifts[i][1];
+        const char *names = "Y";
+        exr_context_t context = exr_open(&names, 1, plain);
+        const exr_attr_box2i_t display = {.min = {{{left, top}}}, .max = {{{left + 19, top + 9}}}};
+        must(exr_set_display_window(context, 0, &display));
+        exr_close(context, 1, plain);
+        MessageList messages = {0};
+        Image image;
+        assert_true(layer_read(&image, NULL, &messages));
+        assert_int_equal(messages.count, 0);
+        assert_int_equal(image.width, 20);
+        assert_int_equal(image.height, 10);
+        for (int y = 0; y < 10; y++) {
+            for (int x = 0; x < 20; x++) {
+                const int column = x + left, row = y + top;
+                const bool is_there = column >= 0 && column < WIDTH && row >= 0 && row < HEIGHT;
+                const float expected = is_there ? value_at((uint32_t)column, (uint32_t)row, 0) : 0;
+                assert_true(image.values[y * 20 + x] == expected);
+            }
+        }
+        image_free(&image);
+    }
+}
+
+// A color of luminance and chroma at half the resolution, as OpenEXR stores it: of (0.8, 0.2, 0.1) Y is
+// 0.2126 R + 0.7152 G + 0.0722 B.
+static void test_luminance_and_chroma(void **state)
+{
+    (void)state;
+    enum { SIDE = 4 };
+    const float y = 0.32034F;
+    exr_context_t context;
+    int part;
+    must(exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, NULL));
+    must(exr_add_part(context, "", EXR_STORAGE_SCANLINE, &part));
+    must(exr_initialize_required_attr_simple(context, 0, SIDE, SIDE, EXR_COMPRESSION_NONE));
+    must(exr_add_channel(context, 0, "BY", EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 2, 2));
+    must(exr_add_channel(context, 0, "RY", EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 2, 2));
+    must(exr_add_channel(context, 0, "Y", EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+    must(exr_write_header(context));
+    for (int row = 0; row < SIDE; row++) {
+        const float by = (0.1F - y) / y, ry = (0.8F - y) / y;
+        const float both[] = {by, by, ry, ry, y, y, y, y};
+        const float *values = row % 2 == 0 ? both : both + 4;
+        must(exr_write_scanline_chunk(context, 0, row, values, row % 2 == 0 ? sizeof both : 4 * sizeof y));
+    }
+    must(exr_finish(&context));
+    MessageList messages = {0};
+    Image image;
+    assert_true(layer_read(&image, NULL, &messages));
+    assert_int_equal(messages.count, 0);
+    assert_int_equal(image.channels, 3);
+    assert_false(image.data);
+    for (size_t i = 0; i < (size_t)SIDE * SIDE; i++) {
+        const float expected[] = {0.8F, 0.2F, 0.1F};
+        for (size_t channel = 0; channel < 3; channel++)
+            assert_float_equal(image.values[3 * i + channel], expected[channel], 1e-6F);
+    }
+    image_free(&image);
+}
+
+static void test_other_primaries_are_named(void **state)
+{
+    (void)state;
+    const char *names = "B,G,R";
+    for (int is_wide = 0; is_wide < 2; is_wide++) {
+        exr_context_t context = exr_open(&names, 1, plain);
+        exr_attr_chromaticities_t rec_2020 = {0.708F, 0.292F, 0.17F, 0.797F, 0.131F, 0.046F, 0.3127F, 0.329F};
+        exr_attr_chromaticities_t rec_709 = {0.64F, 0.33F, 0.3F, 0.6F, 0.15F, 0.06F, 0.3127F, 0.329F};
+        must(exr_attr_set_chromaticities(context, 0, "chromaticities", is_wide ? &rec_2020 : &rec_709));
+        exr_close(context, 1, plain);
+        MessageList messages = {0};
+        Image image;
+        assert_true(layer_read(&image, NULL, &messages));
+        assert_int_equal(messages.count, is_wide);
+        if (is_wide)
+            assert_string_equal(messages.items[0].text, "'a.exr': EXR: the chromaticities are ignored; the "
+                                                        "colors are taken for Rec. 709's");
+        image_free(&image);
+        message_list_free(&messages);
     }
 }
 
@@ -177,13 +367,7 @@ static void test_integer_channels_are_refused(void **state)
     must(exr_write_header(context));
     must(exr_write_scanline_chunk(context, 0, 0, &(uint32_t){7}, 4));
     must(exr_finish(&context));
-    MessageList messages = {0};
-    Image image;
-    assert_false(image_read(&image, path, &messages));
-    assert_int_equal(messages.count, 1);
-    assert_non_null(
-        strstr(messages.items[0].text, "EXR: channel Y is not of floats or not of full resolution"));
-    message_list_free(&messages);
+    check_refused(NULL, "EXR: channel Y is not of floats or not of full resolution");
 }
 
 int main(void)
@@ -191,6 +375,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_compressions),
         cmocka_unit_test(test_choice_of_channels),
+        cmocka_unit_test(test_layers_by_name),
+        cmocka_unit_test(test_parts_are_layers),
+        cmocka_unit_test(test_windows),
+        cmocka_unit_test(test_luminance_and_chroma),
+        cmocka_unit_test(test_other_primaries_are_named),
         cmocka_unit_test(test_blocks_as_large_as_compressed),
         cmocka_unit_test(test_integer_channels_are_refused),
     };

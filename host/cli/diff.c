@@ -24,7 +24,7 @@ static const struct {
     [LIMIT_ULP] = {"ulp", "ulp", "floating-point values"},
 };
 
-enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON, OPTION_LIMIT };
+enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON, OPTION_LAYER, OPTION_LIMIT };
 
 static const struct option long_options[] = {
     {"max-rmse", required_argument, NULL, OPTION_LIMIT + LIMIT_RMSE},
@@ -32,6 +32,7 @@ static const struct option long_options[] = {
     {"max-off", required_argument, NULL, OPTION_LIMIT + LIMIT_OFF},
     {"max-ulp", required_argument, NULL, OPTION_LIMIT + LIMIT_ULP},
     {"heatmap", required_argument, NULL, OPTION_HEATMAP},
+    {"layer", required_argument, NULL, OPTION_LAYER},
     {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},
     {"json", no_argument, NULL, OPTION_JSON},
     {"help", no_argument, NULL, 'h'},
@@ -46,11 +47,12 @@ static const char help_text[] =
     "      --max-flip E      allow this mean FLIP\n"
     "      --max-off N       allow N differing 8-bit sRGB values; a color pixel has three\n"
     "      --max-ulp N       allow N units in the last place of any value of EXR or NPY, such as distances\n"
-    "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n" HELP_MAX_PIXELS
-        HELP_JSON HELP_HELP;
+    "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n"
+    "      --layer NAME      compare this layer of two EXR files, not the default or only "
+    "one\n" HELP_MAX_PIXELS HELP_JSON HELP_HELP;
 
 typedef struct {
-    const char *reference_path, *test_path, *heatmap_path;
+    const char *reference_path, *test_path, *heatmap_path, *layer;
     bool as_json, has_limits, has_limit[LIMIT_COUNT];
     double limits[LIMIT_COUNT];
 } DiffOptions;
@@ -265,8 +267,8 @@ static bool heatmap_make(const DiffOptions *options, const Comparison *compariso
 
 static bool images_compare(const DiffOptions *options, Comparison *comparison, MessageList *messages)
 {
-    if (!image_read(&comparison->reference, options->reference_path, messages) ||
-        !image_read(&comparison->test, options->test_path, messages) ||
+    if (!image_read_layer(&comparison->reference, options->reference_path, options->layer, messages) ||
+        !image_read_layer(&comparison->test, options->test_path, options->layer, messages) ||
         !image_comparable(&comparison->reference, &comparison->test, messages))
         return false;
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
@@ -299,6 +301,9 @@ int command_diff(int argument_count, char **arguments)
         switch (option) {
         case OPTION_HEATMAP:
             options.heatmap_path = optarg;
+            break;
+        case OPTION_LAYER:
+            options.layer = optarg;
             break;
         case OPTION_JSON:
             options.as_json = true;

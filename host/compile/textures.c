@@ -129,7 +129,7 @@ static bool texture_read(Image *image, const SceneTexture *texture, MessageList 
         return image_read_bytes(image, &(Source){texture->path, bytes->items, bytes->count}, messages);
     const char *obstacle = file_obstacle(texture->path);
     if (obstacle) return message_error(messages, "cannot read '%s': %s", texture->path, obstacle);
-    return image_read(image, texture->path, messages);
+    return image_read_layer(image, texture->path, texture->layer, messages);
 }
 
 static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,

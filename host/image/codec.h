@@ -29,6 +29,7 @@ extern const Encoder png_encoder, ppm_encoder, exr_encoder, npy_encoder;
 // Decoders read a file's bytes from memory.
 typedef struct {
     const char *path;
+    const char *layer; // of an EXR file; NULL: see exr_layer_find
     const uint8_t *bytes;
     size_t length;
     MessageList *messages;
@@ -43,6 +44,8 @@ bool jpeg_decode(Image *image, const ImageFile *file);
 
 // Adds `cannot read 'path': …` and returns false.
 bool image_refuse(const ImageFile *file, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Adds the warning `'path': …`, which states what the image loses.
+void image_warn(const ImageFile *file, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 // Allocates zeroed values for an image of the declared size. Fails if it is empty or has more than
 // `expansion` bytes of values per byte of the file.

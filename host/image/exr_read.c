@@ -1,18 +1,28 @@
-// OpenEXR input through the C core: the first part at full resolution, scan lines or tiles, halves or floats.
+// OpenEXR input through the C core: one layer at full resolution, scan lines or tiles, halves or floats.
 #include "host/image/codec.h"
+#include "host/image/exr_layers.h"
 
 #include "host/base/memory.h"
 
+#include <math.h>
 #include <openexr.h>
 #include <stdlib.h>
 #include <string.h>
 
+// A channel's values, one per sample.
+typedef struct {
+    int channel; // index in the part's channel list
+    float *values;
+    uint32_t width, height;
+    uint32_t across, down; // pixels per sample
+} Plane;
+
 typedef struct {
     const ImageFile *file;
     exr_context_t context;
-    const exr_attr_chlist_t *list;
-    int chosen[3]; // indices in the channel list, in image order
-    exr_attr_box2i_t window;
+    ExrLayer layer;
+    exr_attr_box2i_t window, display; // pixels with data; pixels of the image
+    Plane planes[3];
     char problem[256];
 } ExrReader;
 
@@ -51,141 +61,214 @@ static bool exr_refuse(const ExrReader *reader, exr_result_t code)
                         reader->problem[0] ? reader->problem : exr_get_default_error_message(code));
 }
 
-static int channel_find(const exr_attr_chlist_t *list, const char *name)
+static uint32_t sample_count(uint32_t pixels, int sampling)
 {
-    for (int i = 0; i < list->num_channels; i++) {
-        if (strcmp(list->entries[i].name.str, name) == 0) return i;
-    }
-    return -1;
+    return sampling > 0 ? (pixels + (uint32_t)sampling - 1) / (uint32_t)sampling : 0;
 }
 
-// R, G, B; else Y; else the first three channels, or the first of fewer.
-static uint32_t channels_choose(ExrReader *reader, Image *image)
+// Sets up a plane per channel of the layer; `store` holds their values.
+static bool planes_allocate(ExrReader *reader, Image *store)
 {
-    const exr_attr_chlist_t *list = reader->list;
-    static const char *const colors[] = {"R", "G", "B"};
-    bool has_colors = true;
-    for (int i = 0; i < 3; i++) {
-        reader->chosen[i] = channel_find(list, colors[i]);
-        has_colors = has_colors && reader->chosen[i] >= 0;
-    }
-    if (has_colors) return 3;
-    int luminance = channel_find(list, "Y");
-    image->data = luminance < 0;
-    for (int i = 0; i < 3; i++)
-        reader->chosen[i] = luminance >= 0 ? luminance : i;
-    return luminance >= 0 || list->num_channels < 3 ? 1 : 3;
-}
-
-static bool exr_prepare(ExrReader *reader, Image *image)
-{
-    exr_result_t code = exr_get_channels(reader->context, 0, &reader->list);
-    if (code == EXR_ERR_SUCCESS) code = exr_get_data_window(reader->context, 0, &reader->window);
+    const exr_attr_chlist_t *list = NULL;
+    const ExrLayer *layer = &reader->layer;
+    exr_result_t code = exr_get_channels(reader->context, layer->part, &list);
     int32_t chunk_count = 0;
-    if (code == EXR_ERR_SUCCESS) code = exr_get_chunk_count(reader->context, 0, &chunk_count);
+    if (code == EXR_ERR_SUCCESS) code = exr_get_chunk_count(reader->context, layer->part, &chunk_count);
     if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
-    if (reader->list->num_channels < 1 || chunk_count < 1)
-        return image_refuse(reader->file, "EXR: the image is empty");
-    uint32_t channels = channels_choose(reader, image);
-    for (uint32_t i = 0; i < channels; i++) {
-        const exr_attr_chlist_entry_t *entry = &reader->list->entries[reader->chosen[i]];
-        if (entry->pixel_type == EXR_PIXEL_UINT || entry->x_sampling != 1 || entry->y_sampling != 1)
-            return image_refuse(reader->file, "EXR: channel %s is not of floats or not of full resolution",
-                                entry->name.str);
-    }
+    if (chunk_count < 1) return image_refuse(reader->file, "EXR: the image is empty");
     // Each block has a table entry and a header; even a constant image compresses by less than 65536 to 1.
-    int64_t width = (int64_t)reader->window.max.x - reader->window.min.x + 1;
-    int64_t height = (int64_t)reader->window.max.y - reader->window.min.y + 1;
     if ((uint64_t)chunk_count > reader->file->length / 16)
         return image_refuse(reader->file, "EXR: the file is too short for its image");
-    return image_allocate(image, reader->file, width < 0 ? 0 : (uint64_t)width,
-                          height < 0 ? 0 : (uint64_t)height, channels, 65536);
+    const int64_t width = (int64_t)reader->window.max.x - reader->window.min.x + 1;
+    const int64_t height = (int64_t)reader->window.max.y - reader->window.min.y + 1;
+    if (!image_allocate(store, reader->file, width < 0 ? 0 : (uint64_t)width,
+                        height < 0 ? 0 : (uint64_t)height, layer->channel_count, 65536))
+        return false;
+    for (uint32_t i = 0; i < layer->channel_count; i++) {
+        const exr_attr_chlist_entry_t *entry = &list->entries[layer->channels[i]];
+        const bool is_full = entry->x_sampling == 1 && entry->y_sampling == 1;
+        if (entry->pixel_type == EXR_PIXEL_UINT || !(is_full || layer->form == EXR_CHROMA))
+            return image_refuse(reader->file, "EXR: channel %s is not of floats or not of full resolution",
+                                entry->name.str);
+        reader->planes[i] = (Plane){layer->channels[i],
+                                    store->values + (size_t)i * store->width * store->height,
+                                    sample_count(store->width, entry->x_sampling),
+                                    sample_count(store->height, entry->y_sampling),
+                                    (uint32_t)entry->x_sampling,
+                                    (uint32_t)entry->y_sampling};
+    }
+    return true;
 }
 
-// Destination of a channel's values: the image, or a scratch buffer. OpenEXR 3.1 writes through the null
+// Destination of a channel's values: a plane, or a scratch buffer. OpenEXR 3.1 writes through the null
 // pointer that should make it skip a channel if there are three channels of halves.
-static void channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t pixel_values,
-                          uint32_t row_pixels)
+static void channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t row_values)
 {
     channel->decode_to_ptr = (uint8_t *)place;
-    channel->user_pixel_stride = (int32_t)(pixel_values * sizeof *place);
-    channel->user_line_stride = (int32_t)(pixel_values * row_pixels * sizeof *place);
+    channel->user_pixel_stride = sizeof *place;
+    channel->user_line_stride = (int32_t)(row_values * sizeof *place);
 }
 
-static void channels_place(const ExrReader *reader, Image *image, exr_decode_pipeline_t *pipeline,
-                           float *scratch, uint32_t x, uint32_t y)
+// False if the block, which starts at pixel (x, y) of the data, does not fit into the planes.
+static bool channels_place(const ExrReader *reader, exr_decode_pipeline_t *pipeline, float *scratch,
+                           uint32_t x, uint32_t y)
 {
     for (int i = 0; i < pipeline->channel_count; i++)
-        channel_place(&pipeline->channels[i], scratch, 1, (uint32_t)pipeline->chunk.width);
-    float *place = image->values + ((size_t)y * image->width + x) * image->channels;
-    for (uint32_t i = 0; i < image->channels; i++) {
-        exr_coding_channel_info_t *channel = &pipeline->channels[reader->chosen[i]];
-        channel_place(channel, place + i, image->channels, image->width);
-        channel->user_bytes_per_element = sizeof *place;
+        channel_place(&pipeline->channels[i], scratch, (uint32_t)pipeline->chunk.width);
+    for (uint32_t i = 0; i < reader->layer.channel_count; i++) {
+        const Plane *plane = &reader->planes[i];
+        exr_coding_channel_info_t *channel = &pipeline->channels[plane->channel];
+        const uint32_t column = x / plane->across, row = y / plane->down;
+        if (channel->width < 0 || channel->height < 0 || (uint64_t)channel->width + column > plane->width ||
+            (uint64_t)channel->height + row > plane->height)
+            return false;
+        channel_place(channel, plane->values + (size_t)row * plane->width + column, plane->width);
+        channel->user_bytes_per_element = sizeof *plane->values;
         channel->user_data_type = EXR_PIXEL_FLOAT;
     }
+    return true;
 }
 
-// Decodes one block of rows or one tile into the image.
-static exr_result_t exr_chunk(const ExrReader *reader, Image *image, const exr_chunk_info_t *chunk,
-                              uint32_t x, uint32_t y)
+// Decodes one block of rows or one tile.
+static exr_result_t exr_chunk(const ExrReader *reader, const exr_chunk_info_t *chunk, uint32_t x, uint32_t y)
 {
-    if (chunk->width < 1 || chunk->height < 1 || (uint64_t)chunk->width + x > image->width ||
-        (uint64_t)chunk->height + y > image->height)
-        return EXR_ERR_BAD_CHUNK_LEADER;
+    if (chunk->width < 1 || chunk->height < 1) return EXR_ERR_BAD_CHUNK_LEADER;
+    const int part = reader->layer.part;
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
-    exr_result_t code = exr_decoding_initialize(reader->context, 0, chunk, &pipeline);
+    exr_result_t code = exr_decoding_initialize(reader->context, part, chunk, &pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
     float *scratch = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *scratch);
-    channels_place(reader, image, &pipeline, scratch, x, y);
-    code = exr_decoding_choose_default_routines(reader->context, 0, &pipeline);
-    if (code == EXR_ERR_SUCCESS) code = exr_decoding_run(reader->context, 0, &pipeline);
+    code = channels_place(reader, &pipeline, scratch, x, y) ? EXR_ERR_SUCCESS : EXR_ERR_BAD_CHUNK_LEADER;
+    if (code == EXR_ERR_SUCCESS)
+        code = exr_decoding_choose_default_routines(reader->context, part, &pipeline);
+    if (code == EXR_ERR_SUCCESS) code = exr_decoding_run(reader->context, part, &pipeline);
     exr_decoding_destroy(reader->context, &pipeline);
     free(scratch);
     return code;
 }
 
-static exr_result_t exr_scanlines(const ExrReader *reader, Image *image)
+static exr_result_t exr_scanlines(const ExrReader *reader, uint32_t height)
 {
+    const int part = reader->layer.part;
     int32_t block_rows;
-    exr_result_t code = exr_get_scanlines_per_chunk(reader->context, 0, &block_rows);
+    exr_result_t code = exr_get_scanlines_per_chunk(reader->context, part, &block_rows);
     if (code == EXR_ERR_SUCCESS && block_rows < 1) return EXR_ERR_FILE_BAD_HEADER;
-    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < image->height; y += (uint32_t)block_rows) {
+    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < height; y += (uint32_t)block_rows) {
         exr_chunk_info_t chunk;
         int row = (int)((int64_t)reader->window.min.y + y);
-        code = exr_read_scanline_chunk_info(reader->context, 0, row, &chunk);
-        if (code == EXR_ERR_SUCCESS) code = exr_chunk(reader, image, &chunk, 0, y);
+        code = exr_read_scanline_chunk_info(reader->context, part, row, &chunk);
+        if (code == EXR_ERR_SUCCESS) code = exr_chunk(reader, &chunk, 0, y);
     }
     return code;
 }
 
-static exr_result_t exr_tiles(const ExrReader *reader, Image *image)
+static exr_result_t exr_tiles(const ExrReader *reader, uint32_t width, uint32_t height)
 {
+    const int part = reader->layer.part;
     int32_t tile_width, tile_height;
-    exr_result_t code = exr_get_tile_sizes(reader->context, 0, 0, 0, &tile_width, &tile_height);
+    exr_result_t code = exr_get_tile_sizes(reader->context, part, 0, 0, &tile_width, &tile_height);
     if (code == EXR_ERR_SUCCESS && (tile_width < 1 || tile_height < 1)) return EXR_ERR_FILE_BAD_HEADER;
-    for (uint32_t y = 0, row = 0; code == EXR_ERR_SUCCESS && y < image->height;
-         y += (uint32_t)tile_height, row++) {
-        for (uint32_t x = 0, column = 0; code == EXR_ERR_SUCCESS && x < image->width;
+    for (uint32_t y = 0, row = 0; code == EXR_ERR_SUCCESS && y < height; y += (uint32_t)tile_height, row++) {
+        for (uint32_t x = 0, column = 0; code == EXR_ERR_SUCCESS && x < width;
              x += (uint32_t)tile_width, column++) {
             exr_chunk_info_t chunk;
-            code = exr_read_tile_chunk_info(reader->context, 0, (int)column, (int)row, 0, 0, &chunk);
-            if (code == EXR_ERR_SUCCESS) code = exr_chunk(reader, image, &chunk, x, y);
+            code = exr_read_tile_chunk_info(reader->context, part, (int)column, (int)row, 0, 0, &chunk);
+            if (code == EXR_ERR_SUCCESS) code = exr_chunk(reader, &chunk, x, y);
         }
     }
     return code;
 }
 
+// The value at a pixel of the data; between samples, on the line between them in each direction.
+static float plane_value(const Plane *plane, uint32_t x, uint32_t y)
+{
+    const uint32_t column = x / plane->across, row = y / plane->down;
+    const float *value = plane->values + (size_t)row * plane->width + column;
+    if (plane->across == 1 && plane->down == 1) return *value;
+    const size_t right = column + 1 < plane->width ? 1 : 0,
+                 below = row + 1 < plane->height ? plane->width : 0;
+    const float along = (float)(x % plane->across) / (float)plane->across;
+    const float down = (float)(y % plane->down) / (float)plane->down;
+    const float upper = value[0] + along * (value[right] - value[0]);
+    return upper + down * (value[below] + along * (value[below + right] - value[below]) - upper);
+}
+
+// Luminance and chroma as in OpenEXR's "Technical Introduction" (2013), "Luminance/chroma images", with the
+// weights of Rec. 709.
+static void chroma_convert(float *pixel)
+{
+    const float luminance = pixel[0];
+    pixel[0] = (pixel[1] + 1) * luminance;
+    pixel[2] = (pixel[2] + 1) * luminance;
+    pixel[1] = (luminance - 0.2126F * pixel[0] - 0.0722F * pixel[2]) / 0.7152F;
+}
+
+// Fills the image, which is the display window; where the file has no data it stays 0.
+static void image_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
+{
+    const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
+    const int64_t top = (int64_t)reader->display.min.y - reader->window.min.y;
+    for (uint32_t y = 0; y < image->height; y++) {
+        for (uint32_t x = 0; x < image->width; x++) {
+            if (x + left < 0 || x + left >= width || y + top < 0 || y + top >= height) continue;
+            float *pixel = image->values + ((size_t)y * image->width + x) * image->channels;
+            for (uint32_t i = 0; i < image->channels; i++)
+                pixel[i] = plane_value(&reader->planes[i], (uint32_t)(x + left), (uint32_t)(y + top));
+            if (reader->layer.form == EXR_CHROMA) chroma_convert(pixel);
+        }
+    }
+}
+
+static void primaries_check(const ExrReader *reader)
+{
+    static const float rec_709[] = {0.64F, 0.33F, 0.3F, 0.6F, 0.15F, 0.06F, 0.3127F, 0.329F};
+    const exr_attribute_t *attribute;
+    if (exr_get_attribute_by_name(reader->context, reader->layer.part, "chromaticities", &attribute) !=
+            EXR_ERR_SUCCESS ||
+        attribute->type != EXR_ATTR_CHROMATICITIES)
+        return;
+    const exr_attr_chromaticities_t *c = attribute->chromaticities;
+    const float found[] = {c->red_x,  c->red_y,  c->green_x, c->green_y,
+                           c->blue_x, c->blue_y, c->white_x, c->white_y};
+    for (size_t i = 0; i < sizeof found / sizeof *found; i++) {
+        if (fabsf(found[i] - rec_709[i]) < 0.001F) continue;
+        image_warn(reader->file, "EXR: the chromaticities are ignored; the colors are taken for Rec. 709's");
+        return;
+    }
+}
+
+static bool exr_decode_planes(ExrReader *reader, Image *store)
+{
+    if (!planes_allocate(reader, store)) return false;
+    exr_storage_t storage;
+    exr_result_t code = exr_get_storage(reader->context, reader->layer.part, &storage);
+    if (code == EXR_ERR_SUCCESS)
+        code = storage == EXR_STORAGE_TILED ? exr_tiles(reader, store->width, store->height)
+                                            : exr_scanlines(reader, store->height);
+    return code == EXR_ERR_SUCCESS || exr_refuse(reader, code);
+}
+
 static bool exr_pixels(ExrReader *reader, Image *image)
 {
-    exr_storage_t storage;
-    exr_result_t code = exr_get_storage(reader->context, 0, &storage);
-    if (code == EXR_ERR_SUCCESS && storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)
-        return image_refuse(reader->file, "EXR: deep images are not supported");
-    if (!exr_prepare(reader, image)) return false;
+    ExrLayer *layer = &reader->layer;
+    if (!exr_layer_find(reader->context, reader->file, layer)) return false;
+    exr_result_t code = exr_get_data_window(reader->context, layer->part, &reader->window);
     if (code == EXR_ERR_SUCCESS)
-        code = storage == EXR_STORAGE_TILED ? exr_tiles(reader, image) : exr_scanlines(reader, image);
-    return code == EXR_ERR_SUCCESS || exr_refuse(reader, code);
+        code = exr_get_display_window(reader->context, layer->part, &reader->display);
+    if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
+    const int64_t width = (int64_t)reader->display.max.x - reader->display.min.x + 1;
+    const int64_t height = (int64_t)reader->display.max.y - reader->display.min.y + 1;
+    Image store = {0};
+    const bool done = exr_decode_planes(reader, &store) &&
+                      image_allocate(image, reader->file, width < 0 ? 0 : (uint64_t)width,
+                                     height < 0 ? 0 : (uint64_t)height, layer->channel_count, UINT64_MAX);
+    if (done) {
+        image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
+        image_fill(reader, image, store.width, store.height);
+        if (!image->data) primaries_check(reader);
+    }
+    image_free(&store);
+    return done;
 }
 
 bool exr_decode(Image *image, const ImageFile *file)

@@ -136,6 +136,16 @@ bool image_refuse(const ImageFile *file, const char *format, ...)
     return message_error(file->messages, "cannot read '%s': %s", file->path, reason);
 }
 
+void image_warn(const ImageFile *file, const char *format, ...)
+{
+    char loss[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(loss, sizeof loss, format, arguments);
+    va_end(arguments);
+    message_warning(file->messages, "'%s': %s", file->path, loss);
+}
+
 static uint32_t pixels_max = IMAGE_PIXELS_MAX;
 
 void image_limit_pixels(uint32_t largest)
@@ -188,6 +198,8 @@ static bool (*decoder_of(const void *bytes, size_t length))(Image *image, const 
 static bool image_decode(Image *image, const ImageFile *file)
 {
     bool (*decode)(Image *, const ImageFile *) = decoder_of(file->bytes, file->length);
+    if (file->layer && decode && decode != exr_decode)
+        return image_refuse(file, "it has no layer '%.40s': only EXR files have layers", file->layer);
     return decode ? decode(image, file) : image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
 }
 
@@ -205,23 +217,33 @@ bool image_is_known(const char *path)
     return image_bytes_are_known(bytes, length);
 }
 
-bool image_read_bytes(Image *image, const Source *source, MessageList *messages)
+static bool image_read_from(Image *image, const Source *source, const char *layer, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
-    const ImageFile file = {source->file, (const uint8_t *)source->bytes, source->length, messages};
+    const ImageFile file = {source->file, layer, (const uint8_t *)source->bytes, source->length, messages};
     const bool done = image_decode(image, &file);
     if (!done) image_free(image);
     return done;
 }
 
-bool image_read(Image *image, const char *path, MessageList *messages)
+bool image_read_bytes(Image *image, const Source *source, MessageList *messages)
+{
+    return image_read_from(image, source, NULL, messages);
+}
+
+bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
     Text text = {0};
     const bool done = text_read_file(&text, path, messages) &&
-                      image_read_bytes(image, &(Source){path, text_c(&text), text.count}, messages);
+                      image_read_from(image, &(Source){path, text_c(&text), text.count}, layer, messages);
     text_free(&text);
     return done;
+}
+
+bool image_read(Image *image, const char *path, MessageList *messages)
+{
+    return image_read_layer(image, path, NULL, messages);
 }
 
 double image_value(const Image *image, size_t i)

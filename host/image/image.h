@@ -57,7 +57,7 @@ typedef struct {
     float *values;
     Transfer transfer;
     bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
-    bool data;       // no light: NPY of other than 3 channels, EXR without colors and luminance
+    bool data;       // no light: NPY of other than 3 channels, EXR without colors or luminance
     bool integers;   // NPY of <u4 or |u1, such as numbers of objects
     double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL
 } Image;
@@ -65,6 +65,9 @@ typedef struct {
 // and an empty image that need not be freed. An image whose header declares more pixels than
 // image_limit_pixels permits is refused before anything is decoded: a small file may be compressed from many.
 bool image_read(Image *image, const char *path, MessageList *messages);
+// Reads the layer of an EXR file that has the name; NULL reads what image_read does: the default layer, or
+// the only one with colors.
+bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages);
 // Reads an image from memory; `source->file` names it in messages.
 bool image_read_bytes(Image *image, const Source *source, MessageList *messages);
 // Whether the file, or its bytes, start as those that image_read reads.

@@ -53,14 +53,22 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
     return (uint32_t)(scene->materials.count - 1);
 }
 
-uint32_t scene_add_texture(Scene *scene, const char *path, size_t offset)
+static bool texture_is(const SceneTexture *texture, const char *path, const char *layer)
+{
+    return strcmp(texture->path, path) == 0 && !texture->layer == !layer &&
+           (!layer || strcmp(texture->layer, layer) == 0);
+}
+
+uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, size_t offset)
 {
     size_t index = 0;
-    while (index < scene->textures.count && strcmp(scene->textures.items[index].path, path) != 0)
+    while (index < scene->textures.count && !texture_is(&scene->textures.items[index], path, layer))
         index++;
     if (index == SCENE_TEXTURES_MAX) return 0;
     if (index == scene->textures.count)
-        array_push(scene->textures, ((SceneTexture){.path = memory_copy_text(path), .offset = offset}));
+        array_push(scene->textures, ((SceneTexture){.path = memory_copy_text(path),
+                                                    .layer = layer ? memory_copy_text(layer) : NULL,
+                                                    .offset = offset}));
     return (uint32_t)index + 1;
 }
 
@@ -96,6 +104,7 @@ void scene_free(Scene *scene)
     free(scene->meshes.items);
     for (size_t i = 0; i < scene->textures.count; i++) {
         free(scene->textures.items[i].path);
+        free(scene->textures.items[i].layer);
         text_free(&scene->textures.items[i].bytes);
     }
     free(scene->textures.items);

@@ -54,6 +54,7 @@ typedef struct {
 // A texture's image; scene_compile decodes it.
 typedef struct {
     char *path;    // of the image's file; where it has `bytes`, only for messages
+    char *layer;   // of an EXR file; NULL: its default layer, or its only one with colors
     size_t offset; // of its name in the scene's text
     Text bytes;    // of an image within another file; else empty
 } SceneTexture;
@@ -196,9 +197,10 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
 // Bounds the cost of a hostile file.
 enum { SCENE_TEXTURES_MAX = 1000 };
 
-// Returns what a material's `texture` is for the image; materials with the same image share it. 0: the scene
+// Returns what a material's `texture` is for the image; materials with the same image share it. `layer` may
+// be NULL, as in SceneTexture. 0: the scene
 // has too many.
-uint32_t scene_add_texture(Scene *scene, const char *path, size_t offset);
+uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, size_t offset);
 
 // Adds an object with a material of its own.
 void scene_add_object(Scene *scene, Object object, const Material *material);

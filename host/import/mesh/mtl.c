@@ -317,7 +317,7 @@ static void texture_use(MeshDraft *draft, MtlMaterial *material)
                    material->name);
         return;
     }
-    const uint32_t texture = scene_add_texture(draft->scene, material->image, draft->import->offset);
+    const uint32_t texture = scene_add_texture(draft->scene, material->image, NULL, draft->import->offset);
     if (texture == 0) {
         draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
                    material->name);

@@ -47,11 +47,27 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     return path;
 }
 
+// The name of a file, or a mapping of one and its layer.
 static bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    char *path = yaml_read_path(reader, field->name, node);
+    typedef struct {
+        const YamlNode *file, *layer;
+    } Names;
+    static const Field fields[] = {
+        {"file", read_node, offsetof(Names, file), FORM_ANY, REQUIRED, NULL},
+        {"layer", read_node, offsetof(Names, layer), FORM_ANY, OPTIONAL, NULL},
+    };
+    Names names = {.file = node};
+    if (node->kind == YAML_MAPPING &&
+        !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &names, NULL))
+        return false;
+    if (names.layer && (names.layer->kind != YAML_SCALAR || !yaml_text(&reader->tree, names.layer)[0]))
+        return expected_report(reader, "layer", "the name of a layer", names.layer);
+    char *path = yaml_read_path(reader, field->name, names.file);
     if (!path) return false;
-    const uint32_t texture = scene_add_texture(reader->scene, path, node->offset);
+    node = names.file;
+    const char *layer = names.layer ? yaml_text(&reader->tree, names.layer) : NULL;
+    const uint32_t texture = scene_add_texture(reader->scene, path, layer, node->offset);
     free(path);
     if (texture == 0)
         report_error(&reader->report, node->offset, "more than %d textures", SCENE_TEXTURES_MAX);

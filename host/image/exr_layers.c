@@ -1,0 +1,216 @@
+// Layers as in OpenEXR's "Technical Introduction" (2013), "Naming conventions": a channel's name is its
+// layer's, a dot and a base name. In a file of several parts a channel without a layer has the part's name
+// for one.
+#include "host/image/exr_layers.h"
+
+#include "host/base/array.h"
+#include "host/base/text.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+typedef enum { BASE_R, BASE_G, BASE_B, BASE_Y, BASE_RY, BASE_BY, BASE_X, BASE_Z, BASE_COUNT } Base;
+
+// Bounds the time for a hostile file, in which each layer is compared with all others.
+enum { LAYERS_MAX = 4096 };
+
+typedef struct {
+    const char *name; // not terminated
+    size_t length;
+    int part;
+    int first;             // channel that is no alpha, or -1
+    int bases[BASE_COUNT]; // channels, or -1
+    uint32_t count;        // of channels without alpha
+} Candidate;
+
+typedef struct {
+    Candidate *items;
+    size_t count, capacity;
+} CandidateList;
+
+static Base base_of(const char *name)
+{
+    static const struct {
+        const char *name;
+        Base base;
+    } names[] = {{"R", BASE_R},   {"G", BASE_G},     {"B", BASE_B},   {"Y", BASE_Y},
+                 {"RY", BASE_RY}, {"BY", BASE_BY},   {"X", BASE_X},   {"Z", BASE_Z},
+                 {"red", BASE_R}, {"green", BASE_G}, {"blue", BASE_B}};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcasecmp(name, names[i].name) == 0) return names[i].base;
+    return BASE_COUNT;
+}
+
+static bool is_alpha(const char *base)
+{
+    return strcasecmp(base, "A") == 0 || strcasecmp(base, "alpha") == 0;
+}
+
+static Candidate *candidate_of(CandidateList *list, int part, const char *name, size_t length)
+{
+    for (size_t i = list->count; i-- > 0;) {
+        Candidate *known = &list->items[i];
+        if (known->part == part && known->length == length && memcmp(known->name, name, length) == 0)
+            return known;
+    }
+    Candidate candidate = {.name = name, .length = length, .part = part, .first = -1};
+    for (size_t i = 0; i < BASE_COUNT; i++)
+        candidate.bases[i] = -1;
+    array_push(*list, candidate);
+    return &list->items[list->count - 1];
+}
+
+static exr_result_t candidates_add_part(CandidateList *list, exr_const_context_t context, int part)
+{
+    exr_storage_t storage;
+    const exr_attr_chlist_t *channels;
+    exr_result_t code = exr_get_storage(context, part, &storage);
+    if (code == EXR_ERR_SUCCESS) code = exr_get_channels(context, part, &channels);
+    if (code != EXR_ERR_SUCCESS) return code;
+    if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) return EXR_ERR_SUCCESS;
+    const char *part_name = NULL;
+    if (part == 0 || exr_get_name(context, part, &part_name) != EXR_ERR_SUCCESS || !part_name) part_name = "";
+    for (int i = 0; i < channels->num_channels; i++) {
+        const char *name = channels->entries[i].name.str, *dot = strrchr(name, '.');
+        const char *base = dot ? dot + 1 : name;
+        if (list->count > LAYERS_MAX) return EXR_ERR_FILE_BAD_HEADER;
+        Candidate *candidate =
+            candidate_of(list, part, dot ? name : part_name, dot ? (size_t)(dot - name) : strlen(part_name));
+        if (is_alpha(base)) continue;
+        if (candidate->first < 0) candidate->first = i;
+        candidate->count++;
+        const Base kind = base_of(base);
+        if (kind < BASE_COUNT && candidate->bases[kind] < 0) candidate->bases[kind] = i;
+    }
+    return EXR_ERR_SUCCESS;
+}
+
+static ExrLayer layer_of(const Candidate *candidate)
+{
+    const int *bases = candidate->bases;
+    ExrLayer layer = {.part = candidate->part, .form = EXR_OTHER};
+#define LAYER(condition, layer_form, size, ...)                                                              \
+    if (layer.form == EXR_OTHER && (condition))                                                              \
+    layer = (ExrLayer){candidate->part, layer_form, {__VA_ARGS__}, size}
+    LAYER(bases[BASE_R] >= 0 && bases[BASE_G] >= 0 && bases[BASE_B] >= 0, EXR_COLORS, 3, bases[BASE_R],
+          bases[BASE_G], bases[BASE_B]);
+    LAYER(bases[BASE_X] >= 0 && bases[BASE_Y] >= 0 && bases[BASE_Z] >= 0, EXR_DIRECTION, 3, bases[BASE_X],
+          bases[BASE_Y], bases[BASE_Z]);
+    LAYER(bases[BASE_Y] >= 0 && bases[BASE_RY] >= 0 && bases[BASE_BY] >= 0, EXR_CHROMA, 3, bases[BASE_Y],
+          bases[BASE_RY], bases[BASE_BY]);
+    LAYER(bases[BASE_Y] >= 0 && bases[BASE_RY] < 0 && bases[BASE_BY] < 0, EXR_GRAY, 1, bases[BASE_Y]);
+    LAYER(candidate->count == 1, EXR_NUMBERS, 1, candidate->first);
+#undef LAYER
+    return layer;
+}
+
+static bool has_light(ExrForm form)
+{
+    return form == EXR_COLORS || form == EXR_GRAY || form == EXR_CHROMA;
+}
+
+static const char *shown_name(const Candidate *candidate, int *length)
+{
+    *length = candidate->length > 0 ? (int)candidate->length : 7;
+    return candidate->length > 0 ? candidate->name : "default";
+}
+
+// At most this many bytes of names are shown.
+enum { NAMES_SHOWN = 200 };
+
+static void names_add(Text *names, const char *name, size_t length)
+{
+    if (names->count < NAMES_SHOWN)
+        text_appendf(names, "%s%.*s", names->count > 0 ? ", " : "", (int)length, name);
+    else if (names->items[names->count - 1] != '.')
+        text_appendf(names, ", ...");
+}
+
+static bool channels_refuse(exr_const_context_t context, const ImageFile *file, const char *problem)
+{
+    Text names = {0};
+    int part_count = 0;
+    exr_get_count(context, &part_count);
+    for (int part = 0; part < part_count; part++) {
+        const exr_attr_chlist_t *channels;
+        if (exr_get_channels(context, part, &channels) != EXR_ERR_SUCCESS) continue;
+        for (int i = 0; i < channels->num_channels; i++)
+            names_add(&names, channels->entries[i].name.str, strlen(channels->entries[i].name.str));
+    }
+    image_refuse(file, "EXR: %s; its channels are %s", problem, names.count > 0 ? text_c(&names) : "none");
+    text_free(&names);
+    return false;
+}
+
+// The candidates that qualify are those whose light is `with_light`.
+static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool with_light)
+{
+    Text names = {0};
+    for (size_t i = 0; i < list->count; i++) {
+        const ExrForm form = layer_of(&list->items[i]).form;
+        if (form == EXR_OTHER || has_light(form) != with_light) continue;
+        int length;
+        const char *name = shown_name(&list->items[i], &length);
+        names_add(&names, name, (size_t)length);
+    }
+    image_refuse(file, "EXR: which of its layers is meant? They are %s", text_c(&names));
+    text_free(&names);
+    return false;
+}
+
+static bool named_layer_find(exr_const_context_t context, const CandidateList *list, const ImageFile *file,
+                             ExrLayer *layer)
+{
+    const size_t length = strlen(file->layer);
+    char problem[128];
+    for (size_t i = 0; i < list->count; i++) {
+        const Candidate *candidate = &list->items[i];
+        if (candidate->length != length || memcmp(candidate->name, file->layer, length) != 0) continue;
+        *layer = layer_of(candidate);
+        if (layer->form != EXR_OTHER) return true;
+        snprintf(problem, sizeof problem,
+                 "its layer '%.40s' has neither colors, luminance, X, Y and Z, nor one channel", file->layer);
+        return channels_refuse(context, file, problem);
+    }
+    snprintf(problem, sizeof problem, "it has no layer '%.40s'", file->layer);
+    return channels_refuse(context, file, problem);
+}
+
+static bool unnamed_layer_find(exr_const_context_t context, const CandidateList *list, const ImageFile *file,
+                               ExrLayer *layer)
+{
+    for (int with_light = 1; with_light >= 0; with_light--) {
+        size_t found = 0;
+        for (size_t i = 0; i < list->count; i++) {
+            const ExrLayer candidate = layer_of(&list->items[i]);
+            if (candidate.form == EXR_OTHER || has_light(candidate.form) != with_light) continue;
+            *layer = candidate;
+            if (list->items[i].length == 0) return true;
+            found++;
+        }
+        if (found == 1) return true;
+        if (found > 1) return layers_refuse(list, file, with_light);
+    }
+    return channels_refuse(context, file, "no layer has red, green and blue, or luminance");
+}
+
+bool exr_layer_find(exr_const_context_t context, const ImageFile *file, ExrLayer *layer)
+{
+    CandidateList list = {0};
+    int part_count = 0;
+    exr_result_t code = exr_get_count(context, &part_count);
+    for (int part = 0; part < part_count && code == EXR_ERR_SUCCESS; part++)
+        code = candidates_add_part(&list, context, part);
+    bool found = false;
+    if (code != EXR_ERR_SUCCESS)
+        image_refuse(file, "EXR: %s", exr_get_default_error_message(code));
+    else if (list.count == 0 && part_count > 0)
+        image_refuse(file, "EXR: deep images are not supported");
+    else if (file->layer)
+        found = named_layer_find(context, &list, file, layer);
+    else
+        found = unnamed_layer_find(context, &list, file, layer);
+    free(list.items);
+    return found;
+}

@@ -1,0 +1,27 @@
+// Which channels of an EXR file are its image.
+#pragma once
+
+#include "host/image/codec.h"
+
+#include <openexr.h>
+
+typedef enum {
+    EXR_COLORS,    // red, green, blue
+    EXR_GRAY,      // luminance
+    EXR_CHROMA,    // luminance, (R - Y) / Y and (B - Y) / Y
+    EXR_DIRECTION, // X, Y, Z: no light
+    EXR_NUMBERS,   // one channel of any other name: no light
+    EXR_OTHER      // channels that form no image
+} ExrForm;
+
+typedef struct {
+    int part;
+    ExrForm form;
+    int channels[3]; // indices in the part's channel list
+    uint32_t channel_count;
+} ExrLayer;
+
+// Finds the layer that `file->layer` names. Without a name it is the default layer, whose channels have no
+// prefix, if it has light; else the only layer with light; else the default layer or the only one with
+// numbers. Refuses the file if no layer or more than one qualifies, with the names to choose from.
+bool exr_layer_find(exr_const_context_t context, const ImageFile *file, ExrLayer *layer);
