@@ -7,7 +7,7 @@ BUILD  ?= build
 CFLAGS ?= $(if $(filter %-sanitize,$(BUILD)),-O1,-O2) -g
 PKG_CONFIG ?= pkg-config
 
-packages := libfyaml jansson libpng libturbojpeg OpenEXR assimp libsodium OpenCL
+packages := libfyaml jansson libpng libturbojpeg libexif OpenEXR assimp libsodium OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
 ifneq ($(shell $(PKG_CONFIG) --exists $(packages) && echo found),found)
 $(error Libraries are missing; tools/setup installs or lists them)
@@ -38,7 +38,7 @@ OURS     := -std=c11 -D_GNU_SOURCE $(large_files) $(arithmetic) -I. \
             $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
             -DHAS_WINDOW=$(or $(has_window),0) $(sanitize) $(reproducible)
 # Of OpenEXR only the library with the C interface.
-LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson libpng libturbojpeg assimp libsodium OpenCL) \
+LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson libpng libturbojpeg libexif assimp libsodium OpenCL) \
             $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail

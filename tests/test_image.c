@@ -1,4 +1,5 @@
 // Images out and in: every format's round trip, notes, and failures that leave the old file as it was.
+#include "host/base/text.h"
 #include "host/image/image.h"
 #include "tests/files.h"
 
@@ -12,6 +13,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <turbojpeg.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -328,6 +330,142 @@ static void test_finished_is_yet_to_be_renamed(void **state)
     free(values);
 }
 
+static const char colors_path[] = "colors.png";
+
+// A PNG of one pixel. `profile`, `primaries`: NULL for none; `gamma`: 0 for none.
+static void colors_write(const char *profile, double gamma, const double *primaries, bool is_srgb)
+{
+    FILE *file = fopen(colors_path, "wb");
+    assert_non_null(file);
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+    png_infop info = png_create_info_struct(png);
+    png_init_io(png, file);
+    png_set_IHDR(png, info, 1, 1, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    if (gamma > 0) png_set_gAMA(png, info, gamma);
+    if (primaries)
+        png_set_cHRM(png, info, primaries[0], primaries[1], primaries[2], primaries[3], primaries[4],
+                     primaries[5], primaries[6], primaries[7]);
+    if (is_srgb) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+    png_write_info(png, info);
+    if (profile) { // as no reader would accept it, which glint does not notice
+        uint8_t chunk[80] = {0};
+        memcpy(chunk, profile, strlen(profile));
+        png_write_chunk(png, (const png_byte *)"iCCP", chunk, strlen(profile) + 8);
+    }
+    png_write_row(png, (const uint8_t[]){10, 20, 30});
+    png_write_end(png, NULL);
+    png_destroy_write_struct(&png, &info);
+    assert_int_equal(fclose(file), 0);
+}
+
+// Reads the PNG, and expects one warning that starts so, or none.
+static void check_warning(const char *path, const char *expected)
+{
+    MessageList messages = {0};
+    Image image;
+    assert_true(image_read(&image, path, &messages));
+    assert_int_equal(messages.count, expected ? 1 : 0);
+    if (expected && !strstr(messages.items[0].text, expected)) fail_msg("%s", messages.items[0].text);
+    image_free(&image);
+    message_list_free(&messages);
+}
+
+static void test_png_of_other_colors(void **state)
+{
+    (void)state;
+    static const double rec_709[] = {0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06};
+    static const double adobe[] = {0.3127, 0.329, 0.64, 0.33, 0.21, 0.71, 0.15, 0.06};
+    colors_write(NULL, 1 / 2.2, rec_709, false);
+    check_warning(colors_path, NULL);
+    colors_write(NULL, 1, NULL, false);
+    check_warning(colors_path,
+                  "'colors.png': PNG: the gamma of 1/1 is ignored; the colors are taken for sRGB");
+    colors_write(NULL, 1 / 2.2, adobe, false);
+    check_warning(colors_path, "PNG: the choice of primaries is ignored");
+    colors_write("Display P3", 0, NULL, false);
+    check_warning(colors_path, "PNG: the color profile 'Display P3' is ignored");
+    colors_write("sRGB IEC61966-2.1", 1 / 2.2, adobe, false);
+    check_warning(colors_path, NULL);
+    colors_write(NULL, 0, NULL, true);
+    check_warning(colors_path, NULL);
+}
+
+// A JPEG of 32 x 16 pixels, whose quarters have the gray levels 0, 80, 160 and 240 in reading order, with
+// application segments before its image.
+static void jpeg_write(const char *path, const char *segments, size_t length, int pixel_format)
+{
+    enum { WIDTH = 32, HEIGHT = 16 };
+    uint8_t pixels[HEIGHT][WIDTH][4];
+    for (size_t y = 0; y < HEIGHT; y++) {
+        for (size_t x = 0; x < WIDTH; x++)
+            memset(pixels[y][x], (int)(80 * (2 * (y / (HEIGHT / 2)) + x / (WIDTH / 2))), 4);
+    }
+    unsigned char *bytes = NULL;
+    unsigned long count = 0;
+    tjhandle encoder = tjInitCompress();
+    assert_int_equal(tjCompress2(encoder, pixels[0][0], WIDTH, 4 * WIDTH, HEIGHT, pixel_format, &bytes,
+                                 &count, TJSAMP_444, 95, 0),
+                     0);
+    Text text = {0};
+    text_append(&text, (const char *)bytes, 2); // start of image
+    text_append(&text, segments, length);
+    text_append(&text, (const char *)bytes + 2, count - 2);
+    file_write_bytes(path, text.items, text.count);
+    text_free(&text);
+    tjFree(bytes);
+    tjDestroy(encoder);
+}
+
+static void test_jpeg_is_turned_upright(void **state)
+{
+    (void)state;
+    // quarters in reading order, as the orientation's place of row 0 and column 0 has them
+    static const int quarters[9][4] = {{0},          {0, 1, 2, 3}, {1, 0, 3, 2}, {3, 2, 1, 0}, {2, 3, 0, 1},
+                                       {0, 2, 1, 3}, {2, 0, 3, 1}, {3, 1, 2, 0}, {1, 3, 0, 2}};
+    for (int orientation = 0; orientation <= 9; orientation++) {
+        char segment[] = "\xFF\xE1\0\x22"
+                         "Exif\0\0MM\0\x2A\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\0\0\0\0\0\0\0";
+        segment[29] = (char)orientation;
+        jpeg_write("turned.jpg", segment, sizeof segment - 1, TJPF_RGBX);
+        MessageList messages = {0};
+        Image image;
+        assert_true(image_read(&image, "turned.jpg", &messages));
+        check_no_messages(&messages);
+        const bool is_upright = orientation < 5 || orientation > 8;
+        assert_int_equal(image.width, is_upright ? 32 : 16);
+        assert_int_equal(image.height, is_upright ? 16 : 32);
+        const int *expected = quarters[orientation >= 1 && orientation <= 8 ? orientation : 1];
+        for (size_t i = 0; i < 4; i++) {
+            const size_t x = (1 + 2 * (i % 2)) * image.width / 4, y = (1 + 2 * (i / 2)) * image.height / 4;
+            const float value = image.values[(y * image.width + x) * 3];
+            assert_float_equal(value, (float)(80 * expected[i]) / 255, 0.02F);
+        }
+        image_free(&image);
+    }
+}
+
+static void test_jpeg_of_other_colors(void **state)
+{
+    (void)state;
+    static const char p3[] = "\xFF\xE2\0\x1A"
+                             "ICC_PROFILE\0\1\1Display P3",
+                      srgb[] = "\xFF\xE2\0\x14"
+                               "ICC_PROFILE\0\1\1sRGB";
+    jpeg_write("a.jpg", p3, sizeof p3 - 1, TJPF_RGBX);
+    check_warning("a.jpg", "'a.jpg': JPEG: the color profile is ignored; the colors are taken for sRGB");
+    jpeg_write("a.jpg", srgb, sizeof srgb - 1, TJPF_RGBX);
+    check_warning("a.jpg", NULL);
+    jpeg_write("a.jpg", "", 0, TJPF_CMYK);
+    MessageList messages = {0};
+    Image image;
+    assert_false(image_read(&image, "a.jpg", &messages));
+    assert_int_equal(messages.count, 1);
+    assert_string_equal(messages.items[0].text, "cannot read 'a.jpg': JPEG: CMYK colors are not supported; "
+                                                "convert the image to RGB");
+    message_list_free(&messages);
+}
+
 static void test_folder_that_is_not_there(void **state)
 {
     (void)state;
@@ -474,6 +612,9 @@ int main(void)
         cmocka_unit_test(test_abandoned_leaves_the_old_file),
         cmocka_unit_test(test_finished_is_yet_to_be_renamed),
         cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_png_of_other_colors),
+        cmocka_unit_test(test_jpeg_is_turned_upright),
+        cmocka_unit_test(test_jpeg_of_other_colors),
         cmocka_unit_test(test_folder_that_is_not_there),
         cmocka_unit_test(test_format_by_ending),
         cmocka_unit_test(test_bad_files),

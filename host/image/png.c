@@ -6,6 +6,7 @@
 #include "host/base/memory.h"
 
 #include <errno.h>
+#include <math.h>
 #include <png.h>
 #include <setjmp.h>
 #include <stdlib.h>
@@ -151,9 +152,11 @@ static bool png_prepare(PngReader *reader, Image *image)
     png_infop info = reader->state.info;
     png_set_read_fn(png, reader, png_read_bytes);
     png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    // notes, color profiles and the like are skipped: libpng allocates what they declare, up to 2 GB each
+    // Notes and the like are skipped, because libpng allocates what they declare, up to 2 GB each. A color
+    // profile is kept as it is stored.
     png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, NULL, -1);
-    png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, (const png_byte *)"sRGB", 1);
+    png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, (const png_byte *)"sRGB\0gAMA\0cHRM", 3);
+    png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_ALWAYS, (const png_byte *)"iCCP", 1);
     png_read_info(png, info);
     if (png_get_color_type(png, info) == PNG_COLOR_TYPE_PALETTE)
         png_set_palette_to_rgb(png);
@@ -200,6 +203,35 @@ static bool png_read_all(PngReader *reader, Image *image)
     return true;
 }
 
+// Warns of colors that are not sRGB's, unless the file states that they are.
+static void png_check_colors(const PngReader *reader)
+{
+    png_structp png = reader->state.png;
+    png_infop info = reader->state.info;
+    static const char meaning[] = "is ignored; the colors are taken for sRGB";
+    if (png_get_valid(png, info, PNG_INFO_sRGB)) return;
+    png_unknown_chunkp chunks;
+    const int chunk_count = png_get_unknown_chunks(png, info, &chunks);
+    for (int i = 0; i < chunk_count; i++) {
+        const char *name = (const char *)chunks[i].data; // ended by a null
+        const int length = (int)strnlen(name, chunks[i].size < 79 ? chunks[i].size : 79);
+        if (!memmem(name, (size_t)length, "sRGB", 4))
+            image_warn(reader->file, "PNG: the color profile '%.*s' %s", length, name, meaning);
+        return; // it overrides gamma and primaries
+    }
+    double gamma;
+    if (png_get_gAMA(png, info, &gamma) && fabs(gamma * 2.2 - 1) > 0.05)
+        image_warn(reader->file, "PNG: the gamma of 1/%.3g %s", 1 / gamma, meaning);
+    static const double rec_709[] = {0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06};
+    double c[8];
+    if (!png_get_cHRM(png, info, &c[0], &c[1], &c[2], &c[3], &c[4], &c[5], &c[6], &c[7])) return;
+    for (size_t i = 0; i < 8; i++) {
+        if (fabs(c[i] - rec_709[i]) < 0.005) continue;
+        image_warn(reader->file, "PNG: the choice of primaries %s", meaning);
+        return;
+    }
+}
+
 bool png_decode(Image *image, const ImageFile *file)
 {
     PngReader reader = {.file = file};
@@ -210,6 +242,7 @@ bool png_decode(Image *image, const ImageFile *file)
     bool done = png_read_all(&reader, image);
     if (done) {
         png_values(&reader, image);
+        png_check_colors(&reader);
         image->display = true;
         image->transfer =
             png_get_valid(state->png, state->info, PNG_INFO_sRGB) ? TRANSFER_SRGB : TRANSFER_NONE;
