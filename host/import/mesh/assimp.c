@@ -201,10 +201,16 @@ static bool file_add(Importer *importer)
     return added;
 }
 
+bool assimp_knows(const char *path)
+{
+    const char *ending = strrchr(path, '.');
+    return ending && aiIsExtensionSupported(ending);
+}
+
 bool assimp_read(MeshDraft *draft)
 {
-    const char *path = draft->import->path, *ending = strrchr(path, '.');
-    if (!ending || !aiIsExtensionSupported(ending))
+    const char *path = draft->import->path;
+    if (!assimp_knows(path))
         return draft_refuse(draft,
                             "no mesh that is known by its ending: .obj, .ply, .stl, .gltf, .fbx, .dae, …");
     Importer importer = {.draft = draft, .file = aiImportFile(path, 0)};

@@ -1,4 +1,6 @@
 #include "host/import/mesh/draft.h"
+#include "host/base/file.h"
+#include "host/image/image.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -11,7 +13,10 @@ static void draft_report(const MeshDraft *draft, bool is_error, const char *form
     char text[512];
     vsnprintf(text, sizeof text, format, arguments);
     const MeshImport *import = draft->import;
-    if (is_error)
+    if (import->offset == MESSAGE_WHOLE_FILE) // of a file that is the scene, which the message names
+        (is_error ? (void)report_error(import->report, import->offset, "%s", text)
+                  : report_warning(import->report, import->offset, "%s", text));
+    else if (is_error)
         report_error(import->report, import->offset, "%s: %s", import->path, text);
     else
         report_warning(import->report, import->offset, "%s: %s", import->path, text);
@@ -73,6 +78,38 @@ void draft_share_part(MeshDraft *draft, DraftPart part, size_t count)
         array_push(draft->normals, ((Vector3){0, 0, 0}));
     while (part == DRAFT_UV && draft->uvs.count < count)
         draft_add_uv(draft, 0, 0);
+}
+
+static uint32_t texture_add(MeshDraft *draft, const char *path, const char *owner)
+{
+    const uint32_t texture = scene_add_texture(draft->scene, path, NULL, draft->import->offset);
+    if (texture == 0) draft_warn(draft, "%s: too many images in one scene: the color is used", owner);
+    return texture;
+}
+
+uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner)
+{
+    const SceneOptions *options = draft->import->options;
+    if (options && options->file_named) options->file_named(options->context, path);
+    const char *obstacle = file_obstacle(path);
+    if (!obstacle && image_is_known(path)) return texture_add(draft, path, owner);
+    draft_warn(draft, "%s: cannot read '%.100s': %s: the color is used", owner, path,
+               obstacle ? obstacle : "not a PNG, JPEG, PPM or EXR");
+    return 0;
+}
+
+uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, const char *owner)
+{
+    if (!image_bytes_are_known(bytes->bytes, bytes->length)) {
+        draft_warn(draft, "%s: not a PNG, JPEG, PPM or EXR: the color is used", owner);
+        return 0;
+    }
+    char *path = text_format("%s: %s", draft->import->path, owner);
+    const uint32_t texture = texture_add(draft, path, owner);
+    free(path);
+    Text *copy = texture > 0 ? &draft->scene->textures.items[texture - 1].bytes : NULL;
+    if (copy && copy->count == 0) text_append(copy, bytes->bytes, bytes->length);
+    return texture;
 }
 
 bool draft_end_face(MeshDraft *draft, size_t offset)

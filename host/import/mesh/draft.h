@@ -116,6 +116,11 @@ static inline bool draft_has(const MeshDraft *draft, DraftPart part)
     return draft->is_shared[part] || draft->corners[part].count > 0;
 }
 
+// Adds an image to the scene's textures, of a file or of bytes, which are copied. 0 with a warning where that
+// cannot be; `owner` is what messages name.
+uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner);
+uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, const char *owner);
+
 // Ends the face at the corners since the last one: points and lines are skipped. False: too many corners.
 bool draft_end_face(MeshDraft *draft, size_t offset);
 
@@ -130,5 +135,6 @@ void draft_free(MeshDraft *draft);
 bool obj_read(MeshDraft *draft);
 bool ply_read(MeshDraft *draft);
 bool stl_read(MeshDraft *draft);
+bool gltf_read(MeshDraft *draft);
 // By assimp.
 bool assimp_process_read(MeshDraft *draft);

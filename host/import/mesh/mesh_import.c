@@ -1,7 +1,7 @@
 // Chooses a mesh's reader, and makes what it read a mesh of the scene.
 #include "host/import/mesh/mesh_import.h"
 #include "host/base/file.h"
-#include "host/import/mesh/draft.h"
+#include "host/import/mesh/assimp_process.h"
 
 #include <string.h>
 #include <strings.h>
@@ -12,11 +12,20 @@ static bool (*reader_of(const char *path))(MeshDraft *draft)
     static const struct {
         const char *ending;
         bool (*read)(MeshDraft *draft);
-    } readers[] = {{".obj", obj_read}, {".ply", ply_read}, {".stl", stl_read}};
+    } readers[] = {{".obj", obj_read},
+                   {".ply", ply_read},
+                   {".stl", stl_read},
+                   {".gltf", gltf_read},
+                   {".glb", gltf_read}};
     const char *ending = strrchr(path, '.');
     for (size_t i = 0; ending && i < sizeof readers / sizeof *readers; i++)
         if (!strcasecmp(ending, readers[i].ending)) return readers[i].read;
     return assimp_process_read;
+}
+
+bool mesh_is_known(const char *path)
+{
+    return reader_of(path) != assimp_process_read || assimp_knows(path);
 }
 
 // The text is gone before the draft becomes a mesh, which needs memory too.

@@ -14,15 +14,36 @@ typedef struct {
 // Source of shading normals: the file if it has any; none; the file, else the triangles around each vertex.
 typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 
+// A light that fades: with 1 / (fading[0] + fading[1] d + fading[2] d^2) at the distance d.
+typedef struct {
+    Light light;
+    double fading[3];
+} MeshLight;
+
+// What a file shows besides its triangles.
+typedef struct {
+    Camera camera;
+    bool has_camera;
+    double half_height; // of the frame of an orthographic camera; else 0
+    struct {
+        MeshLight *items;
+        size_t count, capacity;
+    } lights;
+} MeshView;
+
 typedef struct {
     const char *path; // to open, and in messages
     MeshTransform transform;
     MeshSmoothing smoothing;
     bool own_materials; // the file's materials join the scene's
+    MeshView *view;     // filled where the file is the whole scene; else NULL
     const SceneOptions *options;
     Report *report; // of the scene
-    size_t offset;  // of the file's name in the scene
+    size_t offset;  // of the file's name in the scene, or MESSAGE_WHOLE_FILE where the file is the scene
 } MeshImport;
+
+// Whether the ending is that of a mesh that glint reads.
+bool mesh_is_known(const char *path);
 
 // Adds the file's triangles to the scene as one mesh and sets *index to its index. Reports an error and
 // returns false if the file cannot be read as a mesh, or if a vertex of a face is missing, not finite or

@@ -1,0 +1,303 @@
+// glTF: the JSON text, its values, and what of it is not shown.
+#include "host/import/mesh/gltf.h"
+#include "host/base/memory.h"
+#include "host/import/number.h"
+
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The numbers of a JSON text take some 20 times as many bytes in memory.
+enum { JSON_BYTES_MAX = 1 << 28 };
+
+static const char *const loss_texts[GLTF_LOSS_COUNT] = {
+    [GLTF_SKIN] = "skins are not applied: a mesh stands at its node, in its own shape",
+    [GLTF_MORPH] = "morph targets are not applied: a mesh has its own shape",
+    [GLTF_VERTEX_COLOR] = "vertex colors are not used: the material's color is",
+    [GLTF_POINTS] = "points and lines are not shown",
+    [GLTF_SCENES] = "one scene is shown, and not the others",
+    [GLTF_ANIMATION] = "animations are not played: nodes stand as the file has them",
+    [GLTF_VIEW] = "cameras and lights of a mesh are not used: those of the scene are",
+    [GLTF_CAMERAS] = "the first camera is used, and not the others",
+    [GLTF_EMISSION] =
+        "emission and unlit materials need a scene of their own, as by glint render FILE: lit by the "
+        "lights instead",
+    [GLTF_EMISSIVE_TEXTURE] =
+        "the emissive texture is not used, as another texture is: the surface does not emit",
+    [GLTF_UNLIT_TINT] = "the factors of an emitted texture become their mean",
+    [GLTF_METAL_TEXTURE] = "the texture of metal and roughness is not used: the factors are",
+    [GLTF_METAL_COLOR] = "what a metal reflects does not get its color",
+    [GLTF_NORMAL_TEXTURE] = "normal textures are not used: the normals of the vertices are",
+    [GLTF_OCCLUSION_TEXTURE] = "occlusion textures are not used: the lights' shadows are",
+    [GLTF_TEXTURE_ALPHA] = "the alpha of textures is not used: that of baseColorFactor is",
+    [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
+    [GLTF_ABSORPTION] = "the absorption of a volume is not used: it is clear",
+    [GLTF_GLASS_COLOR] = "what a surface lets through does not get its color",
+};
+
+static const char *const extensions_read[] = {
+    "KHR_lights_punctual",   "KHR_materials_emissive_strength", "KHR_materials_ior",
+    "KHR_materials_unlit",   "KHR_materials_transmission",      "KHR_materials_volume",
+    "KHR_mesh_quantization", "KHR_texture_transform",
+};
+
+bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
+{
+    char text[256];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (!gltf->is_optional) return draft_refuse(gltf->draft, "%s: %s", item->path, text);
+    draft_warn(gltf->draft, "%s: %s: not used", item->path, text);
+    return false;
+}
+
+void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
+{
+    char text[256];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    draft_warn(gltf->draft, "%s: %s", item->path, text);
+}
+
+void gltf_lose(Gltf *gltf, GltfLoss loss, const GltfItem *item)
+{
+    if (!(gltf->losses >> loss & 1)) gltf_warn(gltf, item, "%s", loss_texts[loss]);
+    gltf->losses |= 1u << loss;
+}
+
+GltfItem gltf_member(const GltfItem *item, const char *key)
+{
+    GltfItem member = {.json = json_object_get(item->json, key)};
+    const int length =
+        snprintf(member.path, sizeof member.path, "%s%s", item->path, item->path[0] ? "." : "");
+    if (length < (int)sizeof member.path)
+        snprintf(member.path + length, sizeof member.path - (size_t)length, "%s", key);
+    return member;
+}
+
+GltfItem gltf_element(const GltfItem *item, size_t index)
+{
+    GltfItem element = {.json = json_array_get(item->json, index)};
+    const int length = snprintf(element.path, sizeof element.path, "%s", item->path);
+    if (length < (int)sizeof element.path)
+        snprintf(element.path + length, sizeof element.path - (size_t)length, "[%zu]", index);
+    return element;
+}
+
+static GltfItem gltf_root_member(const Gltf *gltf, const char *key)
+{
+    const GltfItem root = {.json = gltf->root};
+    return gltf_member(&root, key);
+}
+
+GltfItem gltf_entry(const Gltf *gltf, const char *array, size_t index)
+{
+    const GltfItem entries = gltf_root_member(gltf, array);
+    return gltf_element(&entries, index);
+}
+
+size_t gltf_count(const Gltf *gltf, const char *array)
+{
+    return json_array_size(json_object_get(gltf->root, array));
+}
+
+GltfItem gltf_extension(const GltfItem *item, const char *name)
+{
+    const GltfItem extensions = gltf_member(item, "extensions");
+    return gltf_member(&extensions, name);
+}
+
+static bool integer_read(Gltf *gltf, const GltfItem *item, size_t low, size_t high, size_t *value)
+{
+    // writers of floating-point numbers add a fraction of 0
+    const double real = json_number_value(item->json);
+    const bool is_whole = json_is_integer(item->json) || (fabs(real) <= 0x1p53 && real == floor(real));
+    const json_int_t number = json_is_integer(item->json) ? json_integer_value(item->json) : (json_int_t)real;
+    if (!json_is_number(item->json) || !is_whole || number < 0 || (uint64_t)number < low ||
+        (uint64_t)number > high)
+        return gltf_fails(gltf, item, "must be an integer from %zu to %zu", low, high);
+    *value = (size_t)number;
+    return true;
+}
+
+static bool index_read(Gltf *gltf, const GltfItem *item, const char *array, size_t *index)
+{
+    const size_t count = gltf_count(gltf, array);
+    if (count == 0) return gltf_fails(gltf, item, "the file has no '%s'", array);
+    return integer_read(gltf, item, 0, count - 1, index);
+}
+
+bool gltf_integer(Gltf *gltf, const GltfItem *item, const char *key, size_t low, size_t high, size_t *value)
+{
+    const GltfItem member = gltf_member(item, key);
+    return !member.json || integer_read(gltf, &member, low, high, value);
+}
+
+bool gltf_index(Gltf *gltf, const GltfItem *item, const char *key, const char *array, size_t *index)
+{
+    const GltfItem member = gltf_member(item, key);
+    return !member.json || index_read(gltf, &member, array, index);
+}
+
+bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const char *array, size_t *index)
+{
+    const GltfItem item = gltf_element(list, element);
+    return index_read(gltf, &item, array, index);
+}
+
+static bool number_is_sound(const json_t *json)
+{
+    return json_is_number(json) && fabs(json_number_value(json)) <= NUMBER_MAX;
+}
+
+bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t count, double *values)
+{
+    const GltfItem member = gltf_member(item, key);
+    if (!member.json) return true;
+    bool is_sound = count == 1 || json_array_size(member.json) == count;
+    for (size_t i = 0; i < count && is_sound; i++)
+        is_sound = number_is_sound(count == 1 ? member.json : json_array_get(member.json, i));
+    if (!is_sound && count == 1) return gltf_fails(gltf, &member, "must be a number up to %g", NUMBER_MAX);
+    if (!is_sound) return gltf_fails(gltf, &member, "must be %zu numbers up to %g", count, NUMBER_MAX);
+    for (size_t i = 0; i < count; i++)
+        values[i] = json_number_value(count == 1 ? member.json : json_array_get(member.json, i));
+    return true;
+}
+
+static bool extension_is_read(const char *name)
+{
+    for (size_t i = 0; i < sizeof extensions_read / sizeof *extensions_read; i++)
+        if (strcmp(name, extensions_read[i]) == 0) return true;
+    return false;
+}
+
+// Names those extensions of a list that are not read, at most so many bytes.
+static Text extensions_unread(const json_t *list)
+{
+    enum { NAMES_BYTES_MAX = 200 };
+    Text names = {0};
+    for (size_t i = 0; i < json_array_size(list) && names.count < NAMES_BYTES_MAX; i++) {
+        const char *name = json_string_value(json_array_get(list, i));
+        if (name && !extension_is_read(name))
+            text_appendf(&names, "%s%.60s", names.count > 0 ? ", " : "", name);
+    }
+    return names;
+}
+
+static bool extensions_check(Gltf *gltf)
+{
+    const GltfItem required = gltf_root_member(gltf, "extensionsRequired"),
+                   used = gltf_root_member(gltf, "extensionsUsed");
+    Text names = extensions_unread(required.json);
+    const bool all_read = names.count == 0;
+    if (!all_read)
+        gltf_fails(gltf, &required, "the file needs %s, which glint does not read; export it without",
+                   text_c(&names));
+    text_free(&names);
+    names = extensions_unread(used.json);
+    if (all_read && names.count > 0)
+        gltf_warn(gltf, &used, "not read, and what they add is not shown: %s", text_c(&names));
+    text_free(&names);
+    return all_read;
+}
+
+static bool asset_check(Gltf *gltf)
+{
+    const GltfItem asset = gltf_root_member(gltf, "asset");
+    const GltfItem needed =
+        gltf_member(&asset, json_object_get(asset.json, "minVersion") ? "minVersion" : "version");
+    const char *version = json_string_value(needed.json);
+    if (!version) return gltf_fails(gltf, &needed, "is missing; glint reads glTF 2.0");
+    return strcmp(version, "2.0") == 0 ||
+           (strncmp(version, "2.", 2) == 0 && strcmp(needed.path, "asset.version") == 0) ||
+           gltf_fails(gltf, &needed, "'%.20s' is not read; glint reads glTF 2.0", version);
+}
+
+static bool json_read(Gltf *gltf, const char *text, size_t length, size_t offset)
+{
+    json_error_t error;
+    if (length > JSON_BYTES_MAX)
+        return draft_refuse(gltf->draft, "a JSON text of %zu bytes; %d is the most", length, JSON_BYTES_MAX);
+    gltf->root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
+    // the position is behind the word that is wrong
+    const size_t position = error.position > 0 ? (size_t)error.position - 1 : 0;
+    if (!gltf->root) return draft_fails(gltf->draft, offset + position, "%s", error.text);
+    return json_is_object(gltf->root) || draft_fails(gltf->draft, offset, "not a JSON object");
+}
+
+static uint32_t word_at(const char *bytes)
+{
+    const unsigned char *byte = (const unsigned char *)bytes;
+    return (uint32_t)byte[0] | (uint32_t)byte[1] << 8 | (uint32_t)byte[2] << 16 | (uint32_t)byte[3] << 24;
+}
+
+// A header of 12 bytes, then chunks of a length, a type and bytes: JSON first, then perhaps BIN.
+static bool glb_read(Gltf *gltf, const Source *source)
+{
+    enum { HEADER_BYTES = 12, CHUNK_BYTES = 8, CHUNK_JSON = 0x4E4F534A, CHUNK_BINARY = 0x004E4942 };
+    MeshDraft *draft = gltf->draft;
+    draft->places = DRAFT_BYTES;
+    if (source->length < HEADER_BYTES + CHUNK_BYTES) return draft_refuse(draft, "too short for a GLB file");
+    if (word_at(source->bytes + 4) != 2)
+        return draft_fails(draft, 4, "GLB version %u is not read; glint reads 2", word_at(source->bytes + 4));
+    size_t at = HEADER_BYTES;
+    for (int i = 0; i < 2 && source->length - at >= CHUNK_BYTES; i++) {
+        const size_t length = word_at(source->bytes + at);
+        const uint32_t type = word_at(source->bytes + at + 4);
+        if (length > source->length - at - CHUNK_BYTES)
+            return draft_fails(draft, at, "the file ends within a chunk of %zu bytes", length);
+        const char *bytes = source->bytes + at + CHUNK_BYTES;
+        if (i == 0 && type != CHUNK_JSON) return draft_fails(draft, at + 4, "the first chunk must be JSON");
+        if (i == 0 && !json_read(gltf, bytes, length, at + CHUNK_BYTES)) return false;
+        if (i == 1 && type == CHUNK_BINARY) gltf->binary = (GltfBuffer){.bytes = bytes, .length = length};
+        at += CHUNK_BYTES + length;
+        if (at > source->length) break;
+    }
+    return true;
+}
+
+static void gltf_open(Gltf *gltf)
+{
+    const size_t material_count = gltf_count(gltf, "materials") + 1;
+    gltf->buffer_count = gltf_count(gltf, "buffers");
+    gltf->buffers = memory_allocate_zeroed(gltf->buffer_count + 1, sizeof *gltf->buffers);
+    gltf->materials = memory_allocate_zeroed(material_count, sizeof *gltf->materials);
+    const size_t image_count = gltf_count(gltf, "images");
+    gltf->images = memory_allocate(image_count + 1, sizeof *gltf->images);
+    memset(gltf->images, 0xff, image_count * sizeof *gltf->images);
+    gltf->is_visited = memory_allocate_zeroed(gltf_count(gltf, "nodes") + 1, sizeof *gltf->is_visited);
+}
+
+static void gltf_close(Gltf *gltf)
+{
+    for (size_t i = 0; i < gltf->buffer_count; i++)
+        text_free(&gltf->buffers[i].owned);
+    free(gltf->buffers);
+    free(gltf->materials);
+    free(gltf->images);
+    free(gltf->is_visited);
+    json_decref(gltf->root);
+}
+
+bool gltf_read(MeshDraft *draft)
+{
+    const Source *source = &draft->source;
+    Gltf gltf = {.draft = draft};
+    const bool is_binary = source->length >= 4 && memcmp(source->bytes, "glTF", 4) == 0;
+    const size_t mark = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
+    bool read = is_binary ? glb_read(&gltf, source)
+                          : json_read(&gltf, source->bytes + mark, source->length - mark, mark);
+    if (read) {
+        gltf_open(&gltf);
+        const GltfItem animations = gltf_root_member(&gltf, "animations");
+        if (animations.json) gltf_lose(&gltf, GLTF_ANIMATION, &animations);
+        read = asset_check(&gltf) && extensions_check(&gltf) && gltf_scene_read(&gltf);
+    }
+    draft->places = DRAFT_NO_PLACES;
+    gltf_close(&gltf);
+    return read;
+}

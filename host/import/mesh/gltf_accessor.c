@@ -1,0 +1,297 @@
+// glTF: buffers, views of them and accessors. Whatever the file claims, nothing is read outside a buffer, and
+// memory grows with what the buffers have.
+#include "host/base/base64.h"
+#include "host/base/file.h"
+#include "host/base/memory.h"
+#include "host/import/mesh/gltf.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+// Of lengths and offsets that the file has: their sums fit.
+static const size_t size_max = SIZE_MAX >> 2;
+
+// Numbers that accessors may have beyond the bytes of the buffers: accessors may overlap, have no buffer, or
+// be of a mesh that stands at many nodes.
+enum { ELEMENTS_MAX = 1 << 26 };
+
+static int hex_digit(char character)
+{
+    if (character >= '0' && character <= '9') return character - '0';
+    const int letter = character | 0x20;
+    return letter >= 'a' && letter <= 'f' ? letter - 'a' + 10 : -1;
+}
+
+// Decodes %xx (RFC 3986, Uniform Resource Identifier, 2005, section 2.1); other text stays.
+static void percent_decode(Text *bytes, const char *text)
+{
+    for (const char *at = text; *at; at++) {
+        char byte = *at;
+        if (byte == '%' && hex_digit(at[1]) >= 0 && hex_digit(at[2]) >= 0) {
+            byte = (char)(hex_digit(at[1]) << 4 | hex_digit(at[2]));
+            at += 2;
+        }
+        text_append(bytes, &byte, 1);
+    }
+}
+
+bool gltf_data_decode(Text *bytes, const char *uri)
+{
+    static const char scheme[] = "data:", encoding[] = ";base64";
+    const size_t encoding_length = sizeof encoding - 1;
+    const char *comma = strncmp(uri, scheme, sizeof scheme - 1) == 0 ? strchr(uri, ',') : NULL;
+    if (!comma) return false;
+    if ((size_t)(comma - uri) >= sizeof scheme - 1 + encoding_length &&
+        strncmp(comma - encoding_length, encoding, encoding_length) == 0)
+        return base64_decode(bytes, comma + 1, strlen(comma + 1));
+    percent_decode(bytes, comma + 1);
+    return true;
+}
+
+char *gltf_path(const Gltf *gltf, const char *uri)
+{
+    const size_t scheme = strspn(uri, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
+    if (uri[0] == '\0' || uri[scheme] == ':') return NULL;
+    const char *from = gltf->draft->import->path, *slash = strrchr(from, '/');
+    Text path = {0};
+    if (slash && uri[0] != '/') text_append(&path, from, (size_t)(slash + 1 - from));
+    percent_decode(&path, uri);
+    // a NUL would end the name early
+    if (strlen(path.items) != path.count) text_free(&path);
+    return path.items;
+}
+
+// Reads the buffer's file, or shares the bytes of another buffer that has it.
+static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri)
+{
+    char *path = gltf_path(gltf, json_string_value(uri->json));
+    if (!path) return gltf_fails(gltf, uri, "must be a relative path or base64 data");
+    const SceneOptions *options = gltf->draft->import->options;
+    if (options && options->file_named) options->file_named(options->context, path);
+    const char *obstacle = file_obstacle(path);
+    struct stat status = {0};
+    MessageList problems = {0};
+    if (!obstacle && stat(path, &status) == 0) {
+        for (size_t i = 0; i < gltf->buffer_count; i++)
+            if (gltf->buffers[i].bytes && gltf->buffers[i].device == status.st_dev &&
+                gltf->buffers[i].file == status.st_ino)
+                *buffer = (GltfBuffer){.bytes = gltf->buffers[i].bytes, .length = gltf->buffers[i].length};
+        if (!buffer->bytes && !text_read_file(&buffer->owned, path, &problems))
+            obstacle = problems.items[0].text;
+        buffer->device = status.st_dev;
+        buffer->file = status.st_ino;
+    }
+    if (obstacle) gltf_fails(gltf, uri, "cannot read '%.100s': %s", path, obstacle);
+    message_list_free(&problems);
+    free(path);
+    return !obstacle;
+}
+
+static bool buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bool is_first)
+{
+    const GltfItem uri = gltf_member(item, "uri");
+    const char *text = json_string_value(uri.json);
+    size_t length = 0;
+    if (!gltf_integer(gltf, item, "byteLength", 1, size_max, &length)) return false;
+    if (!uri.json && is_first && gltf->binary.bytes)
+        *buffer = gltf->binary;
+    else if (!text)
+        return gltf_fails(gltf, &uri, "is missing: the file lacks the buffer's bytes");
+    else if (strncmp(text, "data:", 5) == 0 && !gltf_data_decode(&buffer->owned, text))
+        return gltf_fails(gltf, &uri, "is not base64");
+    else if (strncmp(text, "data:", 5) != 0 && !buffer_read_file(gltf, buffer, &uri))
+        return false;
+    if (!buffer->bytes) buffer->length = buffer->owned.count;
+    if (length > buffer->length)
+        return gltf_fails(gltf, item, "has %zu bytes; byteLength is %zu", buffer->length, length);
+    if (!buffer->bytes || buffer->bytes == gltf->binary.bytes) gltf->byte_count += buffer->length;
+    if (!buffer->bytes) buffer->bytes = text_c(&buffer->owned);
+    return true;
+}
+
+// The bytes of a buffer, which stays without any where it cannot be read.
+static const GltfBuffer *buffer_open(Gltf *gltf, size_t index)
+{
+    GltfBuffer *buffer = &gltf->buffers[index], read = {0};
+    const GltfItem item = gltf_entry(gltf, "buffers", index);
+    if (buffer->bytes) return buffer;
+    if (buffer_read(gltf, &item, &read, index == 0)) {
+        *buffer = read;
+        return buffer;
+    }
+    text_free(&read.owned);
+    return NULL;
+}
+
+bool gltf_view_read(Gltf *gltf, const GltfItem *item, const char *key, Source *bytes, size_t *stride)
+{
+    enum { STRIDE_MIN = 4, STRIDE_MAX = 252 };
+    size_t index = SIZE_MAX, buffer_index = SIZE_MAX, offset = 0, length = 0;
+    if (!gltf_index(gltf, item, key, "bufferViews", &index)) return false;
+    const GltfItem view = gltf_entry(gltf, "bufferViews", index);
+    if (!gltf_index(gltf, &view, "buffer", "buffers", &buffer_index) ||
+        !gltf_integer(gltf, &view, "byteOffset", 0, size_max, &offset) ||
+        !gltf_integer(gltf, &view, "byteLength", 1, size_max, &length) ||
+        !gltf_integer(gltf, &view, "byteStride", STRIDE_MIN, STRIDE_MAX, stride))
+        return false;
+    if (buffer_index == SIZE_MAX || length == 0)
+        return gltf_fails(gltf, &view, "lacks 'buffer' or 'byteLength'");
+    const GltfBuffer *buffer = buffer_open(gltf, buffer_index);
+    if (!buffer) return false;
+    if (offset + length > buffer->length)
+        return gltf_fails(gltf, &view, "ends at byte %zu of a buffer of %zu", offset + length,
+                          buffer->length);
+    *bytes = (Source){.bytes = buffer->bytes + offset, .length = length};
+    return true;
+}
+
+typedef enum {
+    GLTF_INT8 = 5120,
+    GLTF_UINT8,
+    GLTF_INT16,
+    GLTF_UINT16,
+    GLTF_UINT32 = 5125,
+    GLTF_FLOAT
+} ComponentType;
+
+static size_t component_size(size_t type)
+{
+    static const size_t sizes[] = {1, 1, 2, 2, 0, 4, 4};
+    return type >= GLTF_INT8 && type <= GLTF_FLOAT ? sizes[type - GLTF_INT8] : 0;
+}
+
+// Integers that are normalized stand for -1 or 0 to 1.
+static double component_read(const char *bytes, size_t type, bool is_normalized)
+{
+    int8_t int8;
+    uint8_t uint8;
+    int16_t int16;
+    uint16_t uint16;
+    uint32_t uint32;
+    float real;
+    switch (type) {
+    case GLTF_INT8:
+        memcpy(&int8, bytes, sizeof int8);
+        return is_normalized ? fmax(int8 / 127.0, -1) : int8;
+    case GLTF_UINT8:
+        memcpy(&uint8, bytes, sizeof uint8);
+        return is_normalized ? uint8 / 255.0 : uint8;
+    case GLTF_INT16:
+        memcpy(&int16, bytes, sizeof int16);
+        return is_normalized ? fmax(int16 / 32767.0, -1) : int16;
+    case GLTF_UINT16:
+        memcpy(&uint16, bytes, sizeof uint16);
+        return is_normalized ? uint16 / 65535.0 : uint16;
+    case GLTF_UINT32:
+        memcpy(&uint32, bytes, sizeof uint32);
+        return uint32;
+    default:
+        memcpy(&real, bytes, sizeof real);
+        return (double)real;
+    }
+}
+
+// How numbers lie in memory: `count` elements of `width` components.
+typedef struct {
+    size_t type, width, count, stride, offset;
+    bool is_normalized;
+} Layout;
+
+// Finds the elements in a buffer view. False with an error if that is too short.
+static bool elements_find(Gltf *gltf, const GltfItem *item, const Layout *layout, const char **bytes,
+                          size_t *stride)
+{
+    Source view;
+    const size_t size = layout->width * component_size(layout->type);
+    *stride = size;
+    if (!gltf_view_read(gltf, item, "bufferView", &view, stride)) return false;
+    const uint64_t end = layout->offset + (uint64_t)(layout->count - 1) * *stride + size;
+    if (end > view.length)
+        return gltf_fails(gltf, item, "ends at byte %ju of a buffer view of %zu", (uintmax_t)end,
+                          view.length);
+    *bytes = view.bytes + layout->offset;
+    return true;
+}
+
+static void elements_read(const char *bytes, const Layout *layout, size_t stride, size_t row, double *values)
+{
+    const size_t size = component_size(layout->type);
+    for (size_t i = 0; i < layout->width; i++)
+        values[i] = component_read(bytes + row * stride + i * size, layout->type, layout->is_normalized);
+}
+
+// Replaces some elements.
+static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Layout *layout, GltfNumbers *numbers)
+{
+    const GltfItem sparse = gltf_member(accessor, "sparse");
+    if (!sparse.json) return true;
+    const GltfItem indices = gltf_member(&sparse, "indices"), values = gltf_member(&sparse, "values");
+    Layout of_indices = {.width = 1}, of_values = *layout;
+    of_values.offset = 0;
+    if (!gltf_integer(gltf, &sparse, "count", 1, layout->count, &of_indices.count) ||
+        !gltf_integer(gltf, &indices, "componentType", GLTF_UINT8, GLTF_UINT32, &of_indices.type) ||
+        !gltf_integer(gltf, &indices, "byteOffset", 0, size_max, &of_indices.offset) ||
+        !gltf_integer(gltf, &values, "byteOffset", 0, size_max, &of_values.offset))
+        return false;
+    of_values.count = of_indices.count;
+    if (of_indices.count == 0 || component_size(of_indices.type) == 0 ||
+        !json_object_get(indices.json, "bufferView") || !json_object_get(values.json, "bufferView"))
+        return gltf_fails(gltf, &sparse, "lacks 'count', 'indices' or 'values'");
+    const char *index_bytes, *value_bytes;
+    size_t index_stride, value_stride;
+    if (!elements_find(gltf, &indices, &of_indices, &index_bytes, &index_stride) ||
+        !elements_find(gltf, &values, &of_values, &value_bytes, &value_stride))
+        return false;
+    for (size_t i = 0; i < of_indices.count; i++) {
+        double row;
+        elements_read(index_bytes, &of_indices, index_stride, i, &row);
+        if (!(row >= 0 && row < (double)layout->count))
+            return gltf_fails(gltf, &indices, "element %zu names %.0f; there are %zu", i, row, layout->count);
+        elements_read(value_bytes, &of_values, value_stride, i,
+                      numbers->items + (size_t)row * numbers->width);
+    }
+    return true;
+}
+
+static bool layout_read(Gltf *gltf, const GltfItem *accessor, size_t width, Layout *layout)
+{
+    static const char *const types[] = {NULL, "SCALAR", "VEC2", "VEC3"};
+    const GltfItem type = gltf_member(accessor, "type");
+    const char *name = json_string_value(type.json);
+    *layout = (Layout){.width = width,
+                       .is_normalized = json_is_true(json_object_get(accessor->json, "normalized"))};
+    if (!name || strcmp(name, types[width]) != 0)
+        return gltf_fails(gltf, &type, "must be '%s' here", types[width]);
+    if (!gltf_integer(gltf, accessor, "componentType", GLTF_INT8, GLTF_FLOAT, &layout->type) ||
+        !gltf_integer(gltf, accessor, "byteOffset", 0, size_max, &layout->offset) ||
+        !gltf_integer(gltf, accessor, "count", 1, DRAFT_NONE - 1, &layout->count))
+        return false;
+    return (layout->count > 0 && component_size(layout->type) > 0) ||
+           gltf_fails(gltf, accessor, "lacks 'count' or a 'componentType' that glTF has");
+}
+
+bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width, GltfNumbers *numbers)
+{
+    size_t index = SIZE_MAX;
+    Layout layout;
+    *numbers = (GltfNumbers){.width = width};
+    if (!gltf_index(gltf, item, key, "accessors", &index)) return false;
+    if (index == SIZE_MAX) return true;
+    const GltfItem accessor = gltf_entry(gltf, "accessors", index);
+    if (!layout_read(gltf, &accessor, width, &layout)) return false;
+    const char *bytes = NULL;
+    size_t stride = 0;
+    if (json_object_get(accessor.json, "bufferView") &&
+        !elements_find(gltf, &accessor, &layout, &bytes, &stride))
+        return false;
+    gltf->element_count += layout.count;
+    if (gltf->element_count > gltf->byte_count + ELEMENTS_MAX)
+        return gltf_fails(gltf, &accessor, "nodes name so many that all have %zu elements, more than %zu",
+                          gltf->element_count, gltf->byte_count + ELEMENTS_MAX);
+    numbers->count = layout.count;
+    numbers->items = memory_allocate_zeroed(layout.count, width * sizeof *numbers->items);
+    for (size_t i = 0; i < layout.count && bytes; i++)
+        elements_read(bytes, &layout, stride, i, numbers->items + i * width);
+    return sparse_read(gltf, &accessor, &layout, numbers);
+}

@@ -1,0 +1,285 @@
+// glTF: materials of metal and roughness, as far as glint's have it (docs/scene-format.md), and their
+// textures.
+#include "host/base/memory.h"
+#include "host/import/mesh/gltf.h"
+#include "host/import/number.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// What a material has, before it becomes one of glint's.
+typedef struct {
+    double base[4], emissive[3], emissive_strength;
+    double metal, roughness, transmission, ior, thickness, cutoff;
+    GltfItem base_texture, emissive_texture;
+    bool is_unlit;
+} Surface;
+
+static bool surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
+{
+    *surface = (Surface){
+        .base = {1, 1, 1, 1}, .emissive_strength = 1, .metal = 1, .roughness = 1, .ior = 1.5, .cutoff = 0.5};
+    const GltfItem pbr = gltf_member(item, "pbrMetallicRoughness"),
+                   strength = gltf_extension(item, "KHR_materials_emissive_strength"),
+                   glass = gltf_extension(item, "KHR_materials_transmission"),
+                   ior = gltf_extension(item, "KHR_materials_ior"),
+                   volume = gltf_extension(item, "KHR_materials_volume");
+    surface->is_unlit = gltf_extension(item, "KHR_materials_unlit").json != NULL;
+    surface->base_texture = gltf_member(&pbr, "baseColorTexture");
+    surface->emissive_texture = gltf_member(item, "emissiveTexture");
+    // each is read, so that each fault is named
+    bool is_sound = gltf_numbers(gltf, &pbr, "baseColorFactor", 4, surface->base);
+    is_sound &= gltf_numbers(gltf, &pbr, "metallicFactor", 1, &surface->metal);
+    is_sound &= gltf_numbers(gltf, &pbr, "roughnessFactor", 1, &surface->roughness);
+    is_sound &= gltf_numbers(gltf, item, "emissiveFactor", 3, surface->emissive);
+    is_sound &= gltf_numbers(gltf, item, "alphaCutoff", 1, &surface->cutoff);
+    is_sound &= gltf_numbers(gltf, &strength, "emissiveStrength", 1, &surface->emissive_strength);
+    is_sound &= gltf_numbers(gltf, &glass, "transmissionFactor", 1, &surface->transmission);
+    is_sound &= gltf_numbers(gltf, &ior, "ior", 1, &surface->ior);
+    is_sound &= gltf_numbers(gltf, &volume, "thicknessFactor", 1, &surface->thickness);
+    const struct {
+        const GltfItem *item;
+        const char *key;
+        GltfLoss loss;
+    } losses[] = {{&pbr, "metallicRoughnessTexture", GLTF_METAL_TEXTURE},
+                  {item, "normalTexture", GLTF_NORMAL_TEXTURE},
+                  {item, "occlusionTexture", GLTF_OCCLUSION_TEXTURE},
+                  {&volume, "attenuationDistance", GLTF_ABSORPTION}};
+    for (size_t i = 0; i < sizeof losses / sizeof *losses; i++) {
+        const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
+        if (lost.json) gltf_lose(gltf, losses[i].loss, &lost);
+    }
+    return is_sound;
+}
+
+// Adds the image to the scene's textures. 0 with a warning where that cannot be.
+static uint32_t image_add(Gltf *gltf, const GltfItem *image)
+{
+    MeshDraft *draft = gltf->draft;
+    const GltfItem uri = gltf_member(image, "uri");
+    const char *text = json_string_value(uri.json);
+    if (text && strncmp(text, "data:", 5) != 0) {
+        char *path = gltf_path(gltf, text);
+        if (!path) gltf_warn(gltf, &uri, "must be a relative path or base64 data: the color is used");
+        const uint32_t texture = path ? draft_add_texture(draft, path, image->path) : 0;
+        free(path);
+        return texture;
+    }
+    Source bytes = {.bytes = ""};
+    Text decoded = {0};
+    size_t stride;
+    if (!text) gltf_view_read(gltf, image, "bufferView", &bytes, &stride);
+    if (text && gltf_data_decode(&decoded, text))
+        bytes = (Source){.bytes = text_c(&decoded), .length = decoded.count};
+    const uint32_t texture = draft_add_embedded_texture(draft, &bytes, image->path);
+    text_free(&decoded);
+    return texture;
+}
+
+static bool wrap_read(Gltf *gltf, const GltfItem *sampler, const char *key, TextureWrap *wrap)
+{
+    enum { REPEAT = 10497, CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
+    size_t mode = REPEAT;
+    if (!gltf_integer(gltf, sampler, key, REPEAT, MIRRORED_REPEAT, &mode)) return false;
+    *wrap = mode == CLAMP_TO_EDGE     ? TEXTURE_CLAMPED
+            : mode == MIRRORED_REPEAT ? TEXTURE_MIRRORED
+                                      : TEXTURE_REPEATED;
+    return true;
+}
+
+static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfMaterial *material)
+{
+    enum { NEAREST = 9728 };
+    size_t index = SIZE_MAX;
+    if (!gltf_index(gltf, texture, "sampler", "samplers", &index) || index == SIZE_MAX) return;
+    const GltfItem sampler = gltf_entry(gltf, "samplers", index), filter = gltf_member(&sampler, "magFilter");
+    wrap_read(gltf, &sampler, "wrapS", &material->wraps[0]);
+    wrap_read(gltf, &sampler, "wrapT", &material->wraps[1]);
+    if (json_integer_value(filter.json) == NEAREST) gltf_lose(gltf, GLTF_NEAREST, &filter);
+}
+
+// KHR_texture_transform: scales, turns counterclockwise as the image is seen, with v downward, and moves.
+static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfMaterial *material)
+{
+    const GltfItem transform = gltf_extension(info, "KHR_texture_transform");
+    double offset[2] = {0, 0}, scale[2] = {1, 1}, angle = 0;
+    if (!gltf_numbers(gltf, &transform, "offset", 2, offset) ||
+        !gltf_numbers(gltf, &transform, "scale", 2, scale) ||
+        !gltf_numbers(gltf, &transform, "rotation", 1, &angle))
+        return;
+    gltf_integer(gltf, &transform, "texCoord", 0, UV_SETS_MAX, &material->uv_set);
+    const double c = cos(angle), s = sin(angle);
+    const double rows[2][3] = {{c * scale[0], s * scale[1], offset[0]},
+                               {-s * scale[0], c * scale[1], offset[1]}};
+    memcpy(material->uv_rows, rows, sizeof rows);
+}
+
+// The texture that a material names, if it can be shown.
+static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *material)
+{
+    size_t index = SIZE_MAX, source = SIZE_MAX;
+    if (!info->json || !gltf_index(gltf, info, "index", "textures", &index) || index == SIZE_MAX) return;
+    const GltfItem texture = gltf_entry(gltf, "textures", index);
+    if (!gltf_index(gltf, &texture, "source", "images", &source)) return;
+    if (source == SIZE_MAX) {
+        gltf_warn(gltf, &texture, "has no PNG or JPEG image: the color is used");
+        return;
+    }
+    if (!gltf_integer(gltf, info, "texCoord", 0, UV_SETS_MAX, &material->uv_set)) return;
+    uv_transform_read(gltf, info, material);
+    sampler_read(gltf, &texture, material);
+    const GltfItem image = gltf_entry(gltf, "images", source);
+    uint32_t *known = &gltf->images[source];
+    if (*known == DRAFT_NONE) *known = image_add(gltf, &image);
+    material->texture = *known;
+}
+
+static double mean_of(const double color[3])
+{
+    return (color[0] + color[1] + color[2]) / 3;
+}
+
+static double clamped(double value)
+{
+    return fmin(fmax(value, 0), 1);
+}
+
+// Phong's highlight with the peak and about the width of a GGX one whose light falls along the normal (Walter
+// et al., Microfacet models for refraction through rough surfaces, EGSR 2007). What a rough surface reflects
+// beyond a highlight looks diffuse, that of a smooth metal mirrors.
+static void gloss_set(Gltf *gltf, const GltfItem *item, const Surface *surface, Material *look)
+{
+    enum { SHININESS_MAX = 1 << 20 };
+    const double metal = clamped(surface->metal), roughness = clamped(surface->roughness),
+                 smooth = 1 - roughness;
+    const double alpha = roughness * roughness, facing = metal * mean_of(surface->base) + (1 - metal) * 0.04;
+    look->diffuse = vector_all(1 - metal * smooth);
+    look->reflection = clamped(metal * smooth * smooth * mean_of(surface->base));
+    look->specular = alpha > 0 ? fmin(smooth * facing / (4 * alpha * alpha), 1) : 1;
+    look->shininess = fmin(0.5 / fmax(alpha * alpha, 1e-12) - 0.5, SHININESS_MAX);
+    if (look->reflection > 0 && (surface->base[0] != surface->base[1] ||
+                                 surface->base[1] != surface->base[2] || surface->base_texture.json))
+        gltf_lose(gltf, GLTF_METAL_COLOR, item);
+}
+
+// Emission needs a scene of its own, whose ambient light is then 1 and lights nothing else.
+static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surface, GltfMaterial *material)
+{
+    Material *look = &material->look;
+    const bool is_scene = gltf->draft->import->view != NULL;
+    const double strength = fmax(surface->emissive_strength, 0);
+    const double emission[3] = {surface->emissive[0] * strength, surface->emissive[1] * strength,
+                                surface->emissive[2] * strength};
+    const bool emits = mean_of(emission) > 0;
+    look->ambient = is_scene ? 0 : look->diffuse.x;
+    material->textured_ambient = look->ambient * mean_of(surface->base);
+    if (!emits && !surface->is_unlit) return;
+    if (!is_scene) {
+        gltf_lose(gltf, GLTF_EMISSION, item);
+        return;
+    }
+    gltf->draft->scene->ambient = vector_all(1);
+    if (surface->is_unlit) {
+        const double *base = surface->base;
+        if (material->texture > 0 && (base[0] != base[1] || base[1] != base[2]))
+            gltf_lose(gltf, GLTF_UNLIT_TINT, item);
+        look->ambient = 1;
+        material->textured_ambient = mean_of(base);
+        look->diffuse = vector_all(0);
+        look->specular = look->reflection = 0;
+        return;
+    }
+    // an emissive texture is shown where it is the base color's too, or stands alone
+    const json_t *own = json_object_get(surface->emissive_texture.json, "index"),
+                 *other = json_object_get(surface->base_texture.json, "index");
+    if (own && !other && mean_of(surface->base) == 0)
+        texture_read(gltf, &surface->emissive_texture, material);
+    const bool is_shown = material->texture > 0 && own && (!other || json_equal(own, other));
+    if (is_shown) {
+        if (emission[0] != emission[1] || emission[1] != emission[2]) gltf_lose(gltf, GLTF_UNLIT_TINT, item);
+        material->textured_ambient = mean_of(emission);
+    } else if (own || material->texture > 0) {
+        gltf_lose(gltf, GLTF_EMISSIVE_TEXTURE, item);
+    } else {
+        material_set_emission(look, (Color){emission[0], emission[1], emission[2]});
+    }
+}
+
+static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *surface, GltfMaterial *material)
+{
+    Material *look = &material->look;
+    const GltfItem mode = gltf_member(item, "alphaMode");
+    const char *name = json_string_value(mode.json);
+    const bool is_mask = name && strcmp(name, "MASK") == 0, is_blend = name && strcmp(name, "BLEND") == 0;
+    const double transmission = clamped(surface->transmission) * (1 - clamped(surface->metal)),
+                 alpha = clamped(surface->base[3]);
+    if (name && !is_mask && !is_blend && strcmp(name, "OPAQUE") != 0)
+        gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND: OPAQUE is used");
+    if ((is_mask || is_blend) && surface->base_texture.json) gltf_lose(gltf, GLTF_TEXTURE_ALPHA, item);
+    const double opacity = is_mask ? alpha >= surface->cutoff : is_blend ? alpha : 1;
+    if (opacity < 1) {
+        material_set_opacity(look, opacity);
+        material->textured_ambient *= opacity;
+    } else if (transmission > 0) {
+        const Material opaque = *look;
+        material_set_opacity(look, 1 - transmission);
+        material->textured_ambient *= 1 - transmission;
+        look->specular = opaque.specular;
+        look->reflection = opaque.reflection;
+        if (surface->base_texture.json || mean_of(surface->base) < 1) gltf_lose(gltf, GLTF_GLASS_COLOR, item);
+        if (surface->thickness > 0 && surface->ior > 0) look->ior = surface->ior;
+    }
+}
+
+static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
+{
+    Surface surface;
+    gltf->is_optional = true;
+    surface_read(gltf, item, &surface);
+    *material = (GltfMaterial){.look = material_default(),
+                               .is_read = true,
+                               .uv_rows = {{1, 0, 0}, {0, 1, 0}},
+                               .scene_index = {DRAFT_NONE, DRAFT_NONE}};
+    Material *look = &material->look;
+    for (int i = 0; i < 4; i++)
+        surface.base[i] = fmax(surface.base[i], 0);
+    for (int i = 0; i < 3; i++)
+        surface.emissive[i] = fmax(surface.emissive[i], 0);
+    texture_read(gltf, &surface.base_texture, material);
+    look->color = (Color){surface.base[0], surface.base[1], surface.base[2]};
+    gloss_set(gltf, item, &surface, look);
+    emission_set(gltf, item, &surface, material);
+    transparency_set(gltf, item, &surface, material);
+    gltf->is_optional = false;
+}
+
+GltfMaterial *gltf_material(Gltf *gltf, const GltfItem *primitive)
+{
+    const size_t count = gltf_count(gltf, "materials");
+    size_t index = count;
+    gltf->is_optional = true;
+    gltf_index(gltf, primitive, "material", "materials", &index);
+    GltfMaterial *material = &gltf->materials[index];
+    const GltfItem item = gltf_entry(gltf, "materials", index);
+    if (!material->is_read) material_read(gltf, &item, material);
+    gltf->is_optional = false;
+    return material;
+}
+
+// The texture times the factors: the color, which is that of a surface without the texture.
+uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_textured)
+{
+    uint32_t *index = &material->scene_index[is_textured];
+    if (*index != DRAFT_NONE) return *index;
+    Material look = material->look;
+    if (is_textured) {
+        look.texture = material->texture;
+        look.ambient = material->textured_ambient;
+        memcpy(look.texture_wrap, material->wraps, sizeof look.texture_wrap);
+        look.diffuse = (Color){look.diffuse.x * look.color.x, look.diffuse.y * look.color.y,
+                               look.diffuse.z * look.color.z};
+    }
+    const GltfItem item = gltf_entry(gltf, "materials", (size_t)(material - gltf->materials));
+    const char *name = json_string_value(json_object_get(item.json, "name"));
+    return *index = scene_add_material(gltf->draft->scene, &look, name ? name : "");
+}

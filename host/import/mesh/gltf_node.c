@@ -1,0 +1,332 @@
+// glTF: nodes in the world, their meshes, cameras and lights.
+#include "host/base/memory.h"
+#include "host/import/mesh/gltf.h"
+#include "host/import/number.h"
+#include "host/scene/polygon.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { DEPTH_MAX = 1000 };
+
+// Translation, rotation by a quaternion, and scale; or a matrix by columns.
+static bool transform_read(Gltf *gltf, const GltfItem *node, Affine *affine)
+{
+    double m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    double move[3] = {0}, q[4] = {0, 0, 0, 1}, scale[3] = {1, 1, 1};
+    if (!gltf_numbers(gltf, node, "matrix", 16, m) || !gltf_numbers(gltf, node, "translation", 3, move) ||
+        !gltf_numbers(gltf, node, "rotation", 4, q) || !gltf_numbers(gltf, node, "scale", 3, scale))
+        return false;
+    if (json_object_get(node->json, "matrix")) {
+        *affine =
+            (Affine){{{m[0], m[4], m[8], m[12]}, {m[1], m[5], m[9], m[13]}, {m[2], m[6], m[10], m[14]}}};
+        return true;
+    }
+    // files have unit quaternions to the precision of a float
+    const double squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    if (!(squared > 0)) return gltf_fails(gltf, node, "'rotation' must not be 0");
+    const double s = 2 / squared, x = q[0], y = q[1], z = q[2], w = q[3];
+    const double turn[3][3] = {{1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)},
+                               {s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)},
+                               {s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)}};
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 3; column++)
+            affine->rows[row][column] = turn[row][column] * scale[column];
+        affine->rows[row][3] = move[row];
+    }
+    return true;
+}
+
+// A primitive's vertices: its own numbers and where they stand in the draft.
+typedef struct {
+    GltfNumbers positions, normals, uvs, indices;
+    size_t first;
+    bool is_mirrored;
+} Vertices;
+
+static void vertices_free(Vertices *vertices)
+{
+    free(vertices->positions.items);
+    free(vertices->normals.items);
+    free(vertices->uvs.items);
+    free(vertices->indices.items);
+}
+
+static Vector3 vector_at(const GltfNumbers *numbers, size_t row)
+{
+    const double *values = numbers->items + 3 * row;
+    return (Vector3){values[0], values[1], values[2]};
+}
+
+// An attribute that the positions need not have.
+static void attribute_read(Gltf *gltf, const GltfItem *attributes, const char *key, size_t width,
+                           const GltfNumbers *positions, GltfNumbers *numbers)
+{
+    gltf->is_optional = true;
+    const bool read = gltf_accessor_read(gltf, attributes, key, width, numbers);
+    const GltfItem item = gltf_member(attributes, key);
+    if (read && numbers->count > 0 && numbers->count != positions->count)
+        gltf_fails(gltf, &item, "has %zu elements for %zu positions", numbers->count, positions->count);
+    gltf->is_optional = false;
+    if (!read || numbers->count != positions->count) numbers->count = 0;
+}
+
+static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMaterial *material,
+                          Vertices *vertices)
+{
+    const GltfItem attributes = gltf_member(primitive, "attributes");
+    *vertices = (Vertices){.first = gltf->draft->positions.count};
+    if (!gltf_accessor_read(gltf, &attributes, "POSITION", 3, &vertices->positions) ||
+        !gltf_accessor_read(gltf, primitive, "indices", 1, &vertices->indices))
+        return false;
+    char uvs[24];
+    snprintf(uvs, sizeof uvs, "TEXCOORD_%zu", material ? material->uv_set : 0);
+    attribute_read(gltf, &attributes, "NORMAL", 3, &vertices->positions, &vertices->normals);
+    attribute_read(gltf, &attributes, uvs, 2, &vertices->positions, &vertices->uvs);
+    for (size_t i = 0; i < vertices->indices.count; i++) {
+        const double index = vertices->indices.items[i];
+        if (!(index >= 0 && index < (double)vertices->positions.count && index == floor(index)))
+            return gltf_fails(gltf, primitive, "index %zu names vertex %g (from 0); there are %zu", i, index,
+                              vertices->positions.count);
+    }
+    return vertices->first + vertices->positions.count < DRAFT_NONE ||
+           gltf_fails(gltf, primitive, "too many vertices");
+}
+
+// v runs downward in glTF.
+static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfMaterial *material,
+                         const Affine *affine)
+{
+    static const double plain[2][3] = {{1, 0, 0}, {0, 1, 0}};
+    const double(*rows)[3] = material ? material->uv_rows : plain;
+    const Affine for_normals = affine_for_normals(affine);
+    if (vertices->normals.count > 0) draft_share_part(draft, DRAFT_NORMAL, vertices->first);
+    if (vertices->uvs.count > 0) draft_share_part(draft, DRAFT_UV, vertices->first);
+    for (size_t i = 0; i < vertices->positions.count; i++)
+        array_push(draft->positions, affine_point(affine, vector_at(&vertices->positions, i)));
+    for (size_t i = 0; i < vertices->normals.count; i++) {
+        const Vector3 normal = affine_direction(&for_normals, vector_at(&vertices->normals, i));
+        array_push(draft->normals, vector_normalize(normal));
+    }
+    for (size_t i = 0; i < vertices->uvs.count; i++) {
+        const double *uv = vertices->uvs.items + 2 * i;
+        draft_add_uv(draft, rows[0][0] * uv[0] + rows[0][1] * uv[1] + rows[0][2],
+                     1 - (rows[1][0] * uv[0] + rows[1][1] * uv[1] + rows[1][2]));
+    }
+}
+
+// Tested before the node's transform, whose rounding could give a degenerate triangle an area.
+static void triangle_add(MeshDraft *draft, const Vertices *vertices, size_t a, size_t b, size_t c)
+{
+    size_t corners[3] = {a, vertices->is_mirrored ? c : b, vertices->is_mirrored ? b : c};
+    for (int i = 0; i < 3 && vertices->indices.count > 0; i++)
+        corners[i] = (size_t)vertices->indices.items[corners[i]];
+    const GltfNumbers *positions = &vertices->positions;
+    const bool has_area = triangle_has_area(
+        vector_at(positions, corners[0]), vector_at(positions, corners[1]), vector_at(positions, corners[2]));
+    for (int i = 0; i < 3; i++)
+        array_push(draft->corners[DRAFT_POSITION], (uint32_t)(vertices->first + corners[has_area ? i : 0]));
+    draft_end_face(draft, 0);
+}
+
+enum { MODE_TRIANGLES = 4, MODE_STRIP, MODE_FAN };
+
+static void triangles_add(MeshDraft *draft, const Vertices *vertices, size_t mode)
+{
+    const size_t count = vertices->indices.count > 0 ? vertices->indices.count : vertices->positions.count;
+    for (size_t i = 0; i + 2 < count; i += mode == MODE_TRIANGLES ? 3 : 1) {
+        const size_t odd = mode == MODE_STRIP ? i & 1 : 0;
+        triangle_add(draft, vertices, mode == MODE_FAN ? 0 : i, i + 1 + odd, i + 2 - odd);
+    }
+}
+
+static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *affine)
+{
+    MeshDraft *draft = gltf->draft;
+    size_t mode = MODE_TRIANGLES;
+    if (!gltf_integer(gltf, primitive, "mode", 0, MODE_FAN, &mode)) return false;
+    const GltfItem attributes = gltf_member(primitive, "attributes"),
+                   colors = gltf_member(&attributes, "COLOR_0"), targets = gltf_member(primitive, "targets");
+    if (mode < MODE_TRIANGLES) gltf_lose(gltf, GLTF_POINTS, primitive);
+    if (mode < MODE_TRIANGLES || !json_object_get(attributes.json, "POSITION")) return true;
+    if (colors.json) gltf_lose(gltf, GLTF_VERTEX_COLOR, &colors);
+    if (targets.json) gltf_lose(gltf, GLTF_MORPH, &targets);
+    GltfMaterial *material = draft->import->own_materials ? gltf_material(gltf, primitive) : NULL;
+    Vertices vertices;
+    const bool read = vertices_read(gltf, primitive, material, &vertices);
+    if (read && material) {
+        const uint32_t index =
+            gltf_material_index(gltf, material, material->texture > 0 && vertices.uvs.count > 0);
+        if (material->texture > 0 && vertices.uvs.count == 0)
+            gltf_warn(gltf, primitive,
+                      "has no texture coordinates for its material's texture: the color is used");
+        array_push(draft->materials, ((DraftMaterialRun){draft->face_start, index}));
+    }
+    if (read) {
+        vertices.is_mirrored = affine_determinant(affine) < 0;
+        vertices_add(draft, &vertices, material, affine);
+        triangles_add(draft, &vertices, mode);
+    }
+    vertices_free(&vertices);
+    return read;
+}
+
+// An eye at the node looks along its -z, with +y up.
+static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
+{
+    MeshView *view = gltf->draft->import->view;
+    const GltfItem perspective = gltf_member(camera, "perspective"),
+                   flat = gltf_member(camera, "orthographic");
+    double angle = 0, aspect = 0, half_height = 0;
+    if (view->has_camera) {
+        gltf_lose(gltf, GLTF_CAMERAS, camera);
+        return;
+    }
+    gltf->is_optional = true;
+    const bool is_sound = gltf_numbers(gltf, &perspective, "yfov", 1, &angle) &&
+                          gltf_numbers(gltf, &perspective, "aspectRatio", 1, &aspect) &&
+                          gltf_numbers(gltf, &flat, "ymag", 1, &half_height);
+    if (is_sound && !(angle > 0 && angle < M_PI) && !(half_height > 0))
+        gltf_fails(gltf, camera, "needs a 'yfov' between 0 and pi or a positive 'ymag'");
+    else if (is_sound) {
+        const Vector3 eye = affine_point(affine, (Vector3){0, 0, 0}),
+                      forward = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1}));
+        view->camera = (Camera){.position = eye,
+                                .look_at = vector_add(eye, forward),
+                                .up = affine_direction(affine, (Vector3){0, 1, 0}),
+                                .field_axis = FIELD_VERTICAL,
+                                .half_tangent = tan(angle / 2),
+                                .frame_aspect = fmax(aspect, 0)};
+        view->half_height = flat.json ? half_height : 0;
+        view->has_camera = true;
+    }
+    gltf->is_optional = false;
+}
+
+static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
+{
+    const GltfItem type = gltf_member(light, "type"), cone = gltf_member(light, "spot");
+    const char *name = json_string_value(type.json);
+    double color[3] = {1, 1, 1}, intensity = 1, inner = 0, outer = M_PI / 4;
+    const bool is_sun = name && strcmp(name, "directional") == 0, is_spot = name && strcmp(name, "spot") == 0;
+    gltf->is_optional = true;
+    if (!is_sun && !is_spot && !(name && strcmp(name, "point") == 0))
+        gltf_fails(gltf, &type, "must be directional, point or spot");
+    else if (gltf_numbers(gltf, light, "color", 3, color) &&
+             gltf_numbers(gltf, light, "intensity", 1, &intensity) &&
+             gltf_numbers(gltf, &cone, "innerConeAngle", 1, &inner) &&
+             gltf_numbers(gltf, &cone, "outerConeAngle", 1, &outer)) {
+        outer = fmin(fmax(outer, 1e-3), M_PI / 2);
+        inner = fmin(fmax(inner, 0), outer);
+        // of lux and candela a white surface sends back a part of 1 / pi
+        const double part = fmax(intensity, 0) / M_PI;
+        const MeshLight added = {
+            .light = {.kind = is_sun    ? LIGHT_DIRECTIONAL
+                              : is_spot ? LIGHT_SPOT
+                                        : LIGHT_POINT,
+                      .color = {fmax(color[0], 0) * part, fmax(color[1], 0) * part, fmax(color[2], 0) * part},
+                      .position = affine_point(affine, (Vector3){0, 0, 0}),
+                      .direction = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})),
+                      .half_angle = outer * (180 / M_PI),
+                      .penumbra = (outer - inner) * (180 / M_PI)},
+            .fading = {is_sun, 0, !is_sun}};
+        array_push(gltf->draft->import->view->lights, added);
+    }
+    gltf->is_optional = false;
+}
+
+// The camera and the light at a node, which a mesh of another scene has no use for.
+static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
+{
+    const GltfItem extension = gltf_extension(node, "KHR_lights_punctual"), root = {.json = gltf->root},
+                   all = gltf_extension(&root, "KHR_lights_punctual"), lights = gltf_member(&all, "lights");
+    size_t camera = SIZE_MAX, light = SIZE_MAX;
+    gltf->is_optional = true;
+    gltf_index(gltf, node, "camera", "cameras", &camera);
+    const size_t light_count = json_array_size(lights.json);
+    if (extension.json && light_count > 0)
+        gltf_integer(gltf, &extension, "light", 0, light_count - 1, &light);
+    else if (extension.json)
+        gltf_fails(gltf, &extension, "the file has no lights");
+    gltf->is_optional = false;
+    if ((camera != SIZE_MAX || light != SIZE_MAX) && !gltf->draft->import->view) {
+        gltf_lose(gltf, GLTF_VIEW, node);
+        return;
+    }
+    const GltfItem camera_item = gltf_entry(gltf, "cameras", camera),
+                   light_item = gltf_element(&lights, light);
+    if (camera != SIZE_MAX) camera_add(gltf, &camera_item, affine);
+    if (light != SIZE_MAX) light_add(gltf, &light_item, affine);
+}
+
+static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned depth)
+{
+    const GltfItem node = gltf_entry(gltf, "nodes", index), children = gltf_member(&node, "children"),
+                   skin = gltf_member(&node, "skin");
+    if (gltf->is_visited[index]) return gltf_fails(gltf, &node, "stands at two places of the scene");
+    if (depth > DEPTH_MAX) return gltf_fails(gltf, &node, "lies more than %d nodes deep", DEPTH_MAX);
+    gltf->is_visited[index] = true;
+    Affine own, affine;
+    if (!transform_read(gltf, &node, &own)) return false;
+    affine = affine_multiply(parent, &own);
+    if (skin.json) gltf_lose(gltf, GLTF_SKIN, &skin);
+    view_add(gltf, &node, &affine);
+    size_t mesh_index = SIZE_MAX;
+    if (!gltf_index(gltf, &node, "mesh", "meshes", &mesh_index)) return false;
+    const GltfItem mesh = gltf_entry(gltf, "meshes", mesh_index),
+                   primitives = gltf_member(&mesh, "primitives");
+    for (size_t i = 0; i < json_array_size(primitives.json); i++) {
+        const GltfItem primitive = gltf_element(&primitives, i);
+        if (!primitive_add(gltf, &primitive, &affine)) return false;
+    }
+    for (size_t i = 0; i < json_array_size(children.json); i++) {
+        size_t child;
+        if (!gltf_element_index(gltf, &children, i, "nodes", &child) ||
+            !node_add(gltf, child, &affine, depth + 1))
+            return false;
+    }
+    return true;
+}
+
+// The nodes of a file without scenes that are no node's children.
+static bool roots_add(Gltf *gltf, const Affine *affine)
+{
+    const size_t count = gltf_count(gltf, "nodes");
+    bool *is_child = memory_allocate_zeroed(count + 1, sizeof *is_child), read = true;
+    for (size_t i = 0; i < count && read; i++) {
+        const GltfItem node = gltf_entry(gltf, "nodes", i), children = gltf_member(&node, "children");
+        for (size_t k = 0; k < json_array_size(children.json) && read; k++) {
+            size_t child = 0;
+            read = gltf_element_index(gltf, &children, k, "nodes", &child);
+            is_child[child] = true;
+        }
+    }
+    for (size_t i = 0; i < count && read; i++)
+        read = is_child[i] || node_add(gltf, i, affine, 0);
+    free(is_child);
+    return read;
+}
+
+bool gltf_scene_read(Gltf *gltf)
+{
+    static const Affine identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    const GltfItem root = {.json = gltf->root};
+    MeshDraft *draft = gltf->draft;
+    size_t index = 0;
+    bool read = true;
+    if (gltf_count(gltf, "scenes") == 0) {
+        read = roots_add(gltf, &identity);
+    } else if (gltf_index(gltf, &root, "scene", "scenes", &index)) {
+        const GltfItem scene = gltf_entry(gltf, "scenes", index), nodes = gltf_member(&scene, "nodes");
+        if (gltf_count(gltf, "scenes") > 1) gltf_lose(gltf, GLTF_SCENES, &scene);
+        for (size_t i = 0; i < json_array_size(nodes.json) && read; i++) {
+            size_t node;
+            read = gltf_element_index(gltf, &nodes, i, "nodes", &node) && node_add(gltf, node, &identity, 0);
+        }
+    } else {
+        read = false;
+    }
+    for (DraftPart part = DRAFT_UV; part <= DRAFT_NORMAL; part++)
+        if (draft->is_shared[part]) draft_share_part(draft, part, draft->positions.count);
+    return read;
+}
