@@ -6,5 +6,5 @@ clang=${CLANG:-$(sed -n 's/^CLANG ?= //p' Makefile)}
 command -v "$clang" >/dev/null || skip_all "$clang is not here"
 is_long || skip_all "only with GLINT_LONG_TESTS=1"
 check 'every reader' env -u BUILD tools/fuzz 20000
-check 'every reader of meshes' env -u BUILD tools/fuzz 100000 obj mtl ply stl reply
+check 'every reader of meshes' env -u BUILD tools/fuzz 100000 obj mtl ply stl gltf glb reply
 finish

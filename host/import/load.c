@@ -2,6 +2,7 @@
 
 #include "host/base/hash.h"
 #include "host/base/text.h"
+#include "host/import/mesh/mesh_import.h"
 #include <string.h>
 #include <strings.h>
 
@@ -37,8 +38,13 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
     bool is_known = false;
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
         is_known |= ends_with(path, endings[i]);
+    if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
     if (!is_known)
-        return message_error(messages, "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff", path);
+        return message_error(
+            messages,
+            "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff, or in a mesh's, such as "
+            ".obj, .ply, .stl, .gltf, .glb, .fbx, .dae",
+            path);
     Text text = {0};
     stage_begin(options->stage, "reading", path, 0);
     bool read = text_read_file(&text, path, messages);

@@ -13,8 +13,8 @@ typedef struct {
     Stage *stage; // shows what is being read; NULL: not wanted
 } SceneOptions;
 
-// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff). On a mistake in the file returns
-// false with errors in `messages` and an empty scene. Warnings may be added in either case.
+// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff, or one of a mesh). On a mistake in the
+// file returns false with errors in `messages` and an empty scene. Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // The readers, from memory; `source->file` is used in messages only.
@@ -22,6 +22,10 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
+
+// A file that mesh_is_known has: its triangles, materials, camera and lights. Without a camera one frames it,
+// without lights there are two.
+bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // For the readers: closes the report. Warns of what makes an image black; frees the scene if there are
 // errors.

@@ -45,6 +45,13 @@ static void mesh_fuzz(const char *path, const Source *source, MessageList *messa
     scene_free(&scene);
 }
 
+static void mesh_scene_fuzz(const char *path, const Source *source, MessageList *messages)
+{
+    (void)source;
+    Scene scene;
+    if (scene_read_mesh(&scene, path, &(SceneOptions){0}, messages)) scene_free(&scene);
+}
+
 // The file is the one that a mesh names, which stands beside it.
 static char obj_path[PATH_MAX];
 
@@ -187,17 +194,29 @@ static const struct {
     const char *name, *file; // without one it reads only the source
     void (*read)(const char *path, const Source *source, MessageList *messages);
 } readers[] = {
-    {"png", "a.png", image_fuzz},    {"jpeg", "a.jpg", image_fuzz},
-    {"ppm", "a.ppm", image_fuzz},    {"exr", "a.exr", image_fuzz},
-    {"npy", "a.npy", image_fuzz},    {"obj", "a.obj", mesh_fuzz},
-    {"mtl", "a.mtl", mtl_fuzz},      {"ply", "a.ply", mesh_fuzz},
-    {"reply", "a", reply_fuzz},      {"stl", "a.stl", mesh_fuzz},
-    {"gltf", "a.gltf", assimp_fuzz}, {"fbx", "a.fbx", assimp_fuzz},
-    {"dae", "a.dae", assimp_fuzz},   {"3ds", "a.3ds", assimp_fuzz},
-    {"off", "a.off", assimp_fuzz},   {"yaml", NULL, yaml_fuzz},
-    {"rt", NULL, rt_fuzz},           {"cfg", NULL, cfg_fuzz},
-    {"nff", NULL, nff_fuzz},         {"checkpoint", "a", checkpoint_fuzz},
-    {"cache", NULL, cache_fuzz},     {"baseline", "a.json", baseline_fuzz},
+    {"png", "a.png", image_fuzz},
+    {"jpeg", "a.jpg", image_fuzz},
+    {"ppm", "a.ppm", image_fuzz},
+    {"exr", "a.exr", image_fuzz},
+    {"npy", "a.npy", image_fuzz},
+    {"obj", "a.obj", mesh_fuzz},
+    {"mtl", "a.mtl", mtl_fuzz},
+    {"ply", "a.ply", mesh_fuzz},
+    {"reply", "a", reply_fuzz},
+    {"stl", "a.stl", mesh_fuzz},
+    {"gltf", "a.gltf", mesh_scene_fuzz},
+    {"glb", "a.glb", mesh_scene_fuzz},
+    {"fbx", "a.fbx", assimp_fuzz},
+    {"dae", "a.dae", assimp_fuzz},
+    {"3ds", "a.3ds", assimp_fuzz},
+    {"off", "a.off", assimp_fuzz},
+    {"yaml", NULL, yaml_fuzz},
+    {"rt", NULL, rt_fuzz},
+    {"cfg", NULL, cfg_fuzz},
+    {"nff", NULL, nff_fuzz},
+    {"checkpoint", "a", checkpoint_fuzz},
+    {"cache", NULL, cache_fuzz},
+    {"baseline", "a.json", baseline_fuzz},
 };
 
 static size_t reader;

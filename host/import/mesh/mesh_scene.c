@@ -1,0 +1,160 @@
+// A mesh's file as a scene: what it shows, or else a camera that frames it and two lights.
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/import/mesh/mesh_import.h"
+#include "host/import/number.h"
+#include "host/scene/bounds.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static const double gray = 0.18; // of the background
+
+static Vector3 mesh_center(const Mesh *mesh)
+{
+    Bounds bounds = bounds_empty();
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        bounds = bounds_join(bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+    return vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+}
+
+// STL's z points upward by custom, and everyone else's y.
+static Vector3 upward(const char *path)
+{
+    const char *ending = strrchr(path, '.');
+    return ending && strcasecmp(ending, ".stl") == 0 ? (Vector3){0, 0, 1} : (Vector3){0, 1, 0};
+}
+
+// From the front, the right and above, so that nine tenths of the image's height show the mesh.
+static Camera camera_around(const Mesh *mesh, Vector3 center, Vector3 up)
+{
+    const double half_tangent = 0.36397023426620234, filled = 0.9; // tan 20 degrees
+    const Vector3 front = up.z > 0 ? (Vector3){0, -1, 0} : (Vector3){0, 0, 1}, side = vector_cross(up, front);
+    const Vector3 toward =
+        vector_normalize(vector_add(vector_add(vector_scale(front, 2), vector_scale(up, 0.8)), side));
+    const Vector3 right = vector_normalize(vector_cross(up, toward)), above = vector_cross(toward, right);
+    double distance = 0;
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        const Vector3 from_center = vector_subtract(mesh->vertices[i], center);
+        const double off_axis =
+            fmax(fabs(vector_dot(from_center, right)), fabs(vector_dot(from_center, above)));
+        distance = fmax(distance, vector_dot(from_center, toward) + off_axis / (filled * half_tangent));
+    }
+    return (Camera){.position = vector_add(center, vector_scale(toward, distance)),
+                    .look_at = center,
+                    .up = up,
+                    .field_axis = FIELD_VERTICAL,
+                    .half_tangent = half_tangent};
+}
+
+// From above at the camera's left, and a third as bright from its right.
+static void lights_around(Scene *scene)
+{
+    const Camera *camera = &scene->camera;
+    const Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position)),
+                  right = vector_normalize(vector_cross(forward, camera->up)),
+                  up = vector_cross(right, forward);
+    const Vector3 key = vector_add(vector_add(forward, vector_scale(right, 0.6)), vector_scale(up, -0.8)),
+                  fill = vector_add(vector_add(forward, vector_scale(right, -0.9)), vector_scale(up, -0.1));
+    array_push(scene->lights,
+               ((Light){.kind = LIGHT_DIRECTIONAL, .color = {0.75, 0.75, 0.75}, .direction = key}));
+    array_push(scene->lights,
+               ((Light){.kind = LIGHT_DIRECTIONAL, .color = {0.25, 0.25, 0.25}, .direction = fill}));
+}
+
+static bool is_sound(Vector3 v)
+{
+    return vector_largest(v) <= NUMBER_MAX;
+}
+
+// The light as it is at the center: glint's do not fade.
+static void light_add(Scene *scene, const MeshLight *from, Vector3 center, bool *fades)
+{
+    Light light = from->light;
+    if (light.kind != LIGHT_DIRECTIONAL) {
+        const double d = vector_length(vector_subtract(light.position, center));
+        const double fading = from->fading[0] + d * (from->fading[1] + d * from->fading[2]);
+        *fades |= from->fading[1] != 0 || from->fading[2] != 0;
+        light.color = vector_scale(light.color, fading > 0 ? 1 / fading : 0);
+    }
+    const bool has_direction = light.kind == LIGHT_POINT || !vector_is_zero(light.direction);
+    if (is_sound(light.position) && is_sound(light.direction) && is_sound(light.color) && has_direction)
+        array_push(scene->lights, light);
+}
+
+// Lights so bright or dark that nothing but white or black would be seen are scaled.
+static void lights_add(Scene *scene, const MeshView *view, Vector3 center, Report *report)
+{
+    const double brightest = 4, darkest = 0x1p-6;
+    bool fades = false;
+    for (size_t i = 0; i < view->lights.count; i++)
+        light_add(scene, &view->lights.items[i], center, &fades);
+    double sum = 0;
+    for (size_t i = 0; i < scene->lights.count; i++)
+        sum += vector_largest(scene->lights.items[i].color);
+    if (fades)
+        report_warning(report, MESSAGE_WHOLE_FILE,
+                       "lights do not fade with distance: each is as bright as at the center");
+    if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
+    report_warning(report, MESSAGE_WHOLE_FILE,
+                   "lights of %.3g in total at the center, where 1 shows white as white: scaled to 1", sum);
+    for (size_t i = 0; i < scene->lights.count; i++)
+        scene->lights.items[i].color = vector_scale(scene->lights.items[i].color, 1 / sum);
+}
+
+// A camera with the frame that an orthographic one has at the center.
+static void camera_set(Scene *scene, const MeshView *view, Vector3 center, Report *report)
+{
+    Camera *camera = &scene->camera;
+    *camera = view->camera;
+    if (view->half_height == 0) return;
+    const Vector3 forward = vector_subtract(camera->look_at, camera->position);
+    const double distance = vector_dot(vector_subtract(center, camera->position), forward);
+    camera->half_tangent = view->half_height / (distance > 0 ? distance : 1);
+    report_warning(report, MESSAGE_WHOLE_FILE,
+                   "the orthographic camera becomes one in perspective with its frame at the center");
+}
+
+static bool camera_is_sound(const Camera *camera)
+{
+    return is_sound(camera->position) && is_sound(camera->look_at) && is_sound(camera->up) &&
+           !vectors_equal(camera->position, camera->look_at) && camera->half_tangent > 0 &&
+           camera->half_tangent <= NUMBER_MAX;
+}
+
+static void scene_show(Scene *scene, const MeshView *view, const char *path, Report *report)
+{
+    const Mesh *mesh = &scene->meshes.items[0];
+    const Vector3 center = mesh_center(mesh);
+    if (view->has_camera) camera_set(scene, view, center, report);
+    if (!view->has_camera || !camera_is_sound(&scene->camera))
+        scene->camera = camera_around(mesh, center, upward(path));
+    scene->background = vector_all(gray);
+    lights_add(scene, view, center, report);
+    if (scene->lights.count == 0) lights_around(scene);
+}
+
+bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+{
+    const Source source = {.file = path, .bytes = ""};
+    Report report = report_open(&source, messages);
+    MeshView view = {0};
+    const MeshImport import = {.path = path,
+                               .transform.scale = {1, 1, 1},
+                               .own_materials = true,
+                               .view = &view,
+                               .options = options,
+                               .report = &report,
+                               .offset = MESSAGE_WHOLE_FILE};
+    Object object = {.kind = SHAPE_MESH};
+    *scene = (Scene){.file = memory_copy_text(path)};
+    if (mesh_import(scene, &import, &object.as.mesh.index)) {
+        const Material material = material_default();
+        scene->meshes.items[0].path = memory_copy_text(path);
+        scene_add_object(scene, object, &material);
+        scene_show(scene, &view, path, &report);
+    }
+    free(view.lights.items);
+    return scene_finish(scene, &report);
+}

@@ -1,0 +1,376 @@
+#!/usr/bin/env -S python3 -B
+"""glTF files, as meshes and as scenes: every layout of numbers, nodes, materials, what is refused, and what is named."""
+import base64
+import json
+import math
+import struct
+import zlib
+
+from glint import TestCase, main, npy_read, write
+
+BYTE, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT, FLOAT = 5120, 5121, 5122, 5123, 5125, 5126
+LETTERS = {BYTE: "b", UNSIGNED_BYTE: "B", SHORT: "h", UNSIGNED_SHORT: "H", UNSIGNED_INT: "I", FLOAT: "f"}
+SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+TWO_TRIANGLES = [0, 1, 2, 0, 2, 3]
+
+
+class Gltf:
+    """A file that is being made; its members are those of the JSON text."""
+
+    def __init__(self, **members):
+        self.bytes = b""
+        self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]} | members
+
+    def add(self, array, **members):
+        self.json.setdefault(array, []).append(members)
+        return len(self.json[array]) - 1
+
+    def view(self, data, **members):
+        self.bytes += bytes(-len(self.bytes) % 4)
+        offset = len(self.bytes)
+        self.bytes += data
+        return self.add("bufferViews", buffer=0, byteOffset=offset, byteLength=len(data), **members)
+
+    def accessor(self, rows, component=FLOAT, stride=0, **members):
+        rows = [row if isinstance(row, tuple) else (row,) for row in rows]
+        layout = f"<{len(rows[0])}{LETTERS[component]}"
+        data = b"".join(struct.pack(layout, *row).ljust(stride, b"\xff") for row in rows)
+        view = self.view(data, **({"byteStride": stride} if stride else {}))
+        kind = ("SCALAR", "VEC2", "VEC3", "VEC4", *[None] * 11, "MAT4")[len(rows[0]) - 1]
+        return self.add("accessors", bufferView=view, componentType=component, count=len(rows), type=kind, **members)
+
+    def square(self, uvs=None, normals=None, node=(), **primitive):
+        """Adds a unit square at a node."""
+        attributes = {"POSITION": self.accessor(SQUARE)}
+        if uvs:
+            attributes["TEXCOORD_0"] = self.accessor(uvs)
+        if normals:
+            attributes["NORMAL"] = self.accessor(normals)
+        attributes |= primitive.pop("attributes", {})
+        primitive = {"attributes": attributes, "indices": self.accessor(TWO_TRIANGLES, UNSIGNED_BYTE)} | primitive
+        return self.place(mesh=self.add("meshes", primitives=[primitive]), **dict(node))
+
+    def place(self, **node):
+        index = self.add("nodes", **node)
+        self.json["scenes"][0]["nodes"].append(index)
+        return index
+
+    def write(self, path, uri=None):
+        """As .glb, or with the bytes in the text or in a file."""
+        self.bytes += bytes(-len(self.bytes) % 4)
+        buffer = {"byteLength": len(self.bytes)}
+        if path.endswith(".glb"):
+            text = json.dumps(self.json | {"buffers": [buffer]}).encode()
+            text += b" " * (-len(text) % 4)
+            data = struct.pack("<II", len(text), 0x4E4F534A) + text
+            data += struct.pack("<II", len(self.bytes), 0x004E4942) + self.bytes
+            with open(path, "wb") as file:
+                file.write(struct.pack("<4sII", b"glTF", 2, 12 + len(data)) + data)
+            return path
+        encoded = "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
+        if self.bytes:
+            self.json.setdefault("buffers", [buffer | {"uri": uri or encoded}])
+        return write(path, json.dumps(self.json))
+
+
+def png(rows):
+    """An 8-bit RGB image of 0 and 1."""
+    raw = b"".join(b"\0" + bytes(255 * value for pixel in row for value in pixel) for row in rows)
+    chunks = ((b"IHDR", struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0)), (b"IDAT", zlib.compress(raw)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in chunks
+    )
+
+
+RED, GREEN, BLUE, WHITE = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)
+QUADRANTS = png([[RED] * 4 + [GREEN] * 4] * 4 + [[BLUE] * 4 + [WHITE] * 4] * 4)
+WHOLE = [(0, 1), (1, 1), (1, 0), (0, 0)]  # texture coordinates of SQUARE that show the image upright
+
+
+class Test(TestCase):
+    def checked(self, path, *warnings):
+        """What glint check reports; the warnings, and no others, must have these parts."""
+        report = self.json(f"check --json {path}")
+        texts = [warning["text"] for warning in report["warnings"]]
+        self.assertEqual(len(texts), len(warnings), texts)
+        for text, part in zip(texts, warnings):
+            self.assertIn(part, text)
+        return report
+
+    def assert_square(self, path, low=(0, 0, 0), high=(1, 1, 0), triangles=2):
+        report = self.checked(path)
+        self.assertEqual(report["mesh_triangles"], triangles, path)
+        for got, expected in ((report["bounds"]["min"], low), (report["bounds"]["max"], high)):
+            for a, b in zip(got, expected):
+                self.assertAlmostEqual(a, b, delta=1e-15, msg=path)
+
+    def test_containers(self):
+        gltf = Gltf()
+        gltf.square()
+        self.assert_square(gltf.write("binary.glb"))
+        self.assert_square(gltf.write("text.gltf"))
+        del gltf.json["buffers"]
+        with open("a b%.bin", "wb") as file:
+            file.write(gltf.bytes)
+        self.assert_square(gltf.write("file.gltf", uri="a%20b%25.bin"))
+        write("marked.gltf", "\ufeff" + json.dumps(gltf.json))
+        self.assert_square("marked.gltf")
+
+    def test_components(self):
+        extension = {"extensionsUsed": ["KHR_mesh_quantization"], "extensionsRequired": ["KHR_mesh_quantization"]}
+        for component, most, normalized in (
+            (FLOAT, 1, False), (UNSIGNED_BYTE, 255, True), (BYTE, 127, True), (UNSIGNED_SHORT, 65535, True), (SHORT, 32767, True),
+            (UNSIGNED_BYTE, 200, False), (BYTE, 100, False), (UNSIGNED_SHORT, 16383, False), (SHORT, 300, False),
+        ):  # fmt: skip
+            for stride in (0, 12, 16):
+                for index in (UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT):
+                    gltf = Gltf(**extension)
+                    rows = [tuple(most * value for value in row) for row in SQUARE]
+                    positions = gltf.accessor(rows, component, stride, normalized=normalized)
+                    primitive = {"attributes": {"POSITION": positions}, "indices": gltf.accessor(TWO_TRIANGLES, index)}
+                    gltf.place(mesh=gltf.add("meshes", primitives=[primitive]))
+                    size = 1 if normalized else most
+                    self.assert_square(gltf.write("a.glb"), high=(size, size, 0))
+                    if stride:
+                        break
+
+    def test_modes(self):
+        zigzag = [SQUARE[i] for i in (0, 1, 3, 2)]
+        for mode, rows in ((5, zigzag), (6, SQUARE), (4, [SQUARE[i] for i in TWO_TRIANGLES])):
+            gltf = Gltf()
+            gltf.place(mesh=gltf.add("meshes", primitives=[{"attributes": {"POSITION": gltf.accessor(rows)}, "mode": mode}]))
+            self.assert_square(gltf.write("a.gltf"))
+        gltf = Gltf()
+        gltf.square(mode=1)
+        gltf.square()
+        self.checked(gltf.write("a.gltf"), "meshes[0].primitives[0]: points and lines are not shown")
+
+    def test_sparse(self):
+        gltf = Gltf()
+        moved = {
+            "count": 2,
+            "indices": {"bufferView": gltf.view(struct.pack("<2H", 1, 2)), "componentType": UNSIGNED_SHORT},
+            "values": {"bufferView": gltf.view(struct.pack("<6f", 2, 0, 0, 2, 1, 0))},
+        }
+        rows = gltf.accessor(SQUARE, sparse=moved)
+        gltf.place(mesh=gltf.add("meshes", primitives=[{"attributes": {"POSITION": rows}, "mode": 6}]))
+        self.assert_square(gltf.write("based.gltf"), high=(2, 1, 0))
+        moved["count"] = 1
+        gltf.json["accessors"] = [{"componentType": FLOAT, "count": 3, "type": "VEC3", "sparse": moved}]
+        gltf.write("zeros.gltf")
+        self.checked("zeros.gltf", "triangles without area")
+
+    def test_nodes(self):
+        half = math.sqrt(0.5)
+        gltf = Gltf()
+        child = gltf.add("nodes", mesh=0, rotation=[0, 0, half, half], scale=[2, 1, 1])
+        middle = gltf.add("nodes", children=[child], matrix=[1, 0, 0, 0, 0, 3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
+        gltf.square(node={"children": [middle], "translation": [16777216.25, 0, 0]})
+        del gltf.json["nodes"][2]["mesh"]
+        self.assert_square(gltf.write("a.gltf"), (16777215.25, 0, 0), (16777216.25, 6, 0))
+        del gltf.json["scenes"], gltf.json["scene"]
+        self.assert_square(gltf.write("a.gltf"), (16777215.25, 0, 0), (16777216.25, 6, 0))
+
+    def test_refused(self):
+        def change(path, value):
+            *parents, last = path
+
+            def apply(root):
+                for key in parents:
+                    root = root[key]
+                root[last] = value
+
+            return apply
+
+        accessor, view, node, primitive = ("accessors", 0), ("bufferViews", 0), ("nodes", 0), ("meshes", 0, "primitives", 0)
+        faults = (
+            (("extensionsRequired",), ["KHR_draco_mesh_compression"], "extensionsRequired: .*KHR_draco_mesh_compression"),
+            (("asset", "version"), "1.0", "asset.version: '1.0'.* 2.0"),
+            (("asset",), {}, "asset.version: is missing"),
+            (("scene",), 7, "scene: must be an integer from 0 to 0"),
+            (("scenes", 0, "nodes"), [0, 0], r"nodes\[0\]: stands at two places"),
+            (("scenes", 0, "nodes"), [3], r"scenes\[0\].nodes\[0\]: must be an integer from 0 to 0"),
+            ((*node, "children"), [0], r"nodes\[0\]: stands at two places"),
+            ((*node, "mesh"), 1.5, r"nodes\[0\].mesh: must be an integer"),
+            ((*node, "rotation"), [0, 0, 0, 0], r"nodes\[0\]: 'rotation' must not be 0"),
+            ((*node, "matrix"), [1], r"nodes\[0\].matrix: must be 16 numbers"),
+            ((*node, "scale"), [1e31, 1, 1], r"nodes\[0\].scale: must be 3 numbers up to 1e\+30"),
+            ((*primitive, "indices"), 9, r"meshes\[0\].primitives\[0\].indices: must be an integer from 0 to 1"),
+            ((*primitive, "attributes", "POSITION"), -1, r"attributes.POSITION: must be an integer"),
+            ((*primitive, "attributes", "POSITION"), 1, r"accessors\[1\].type: must be 'VEC3'"),
+            ((*primitive, "mode"), 7, r"primitives\[0\].mode: must be an integer from 0 to 6"),
+            ((*accessor, "count"), 1 << 33, r"accessors\[0\].count"),
+            ((*accessor, "count"), 5, r"accessors\[0\]: ends at byte 60 of a buffer view of 48"),
+            ((*accessor, "count"), 3, r"primitives\[0\]: index 5 names vertex 3 \(from 0\); there are 3"),
+            ((*accessor, "byteOffset"), 1 << 62, r"accessors\[0\]"),
+            ((*accessor, "componentType"), 5124, r"accessors\[0\]: lacks"),
+            ((*view, "byteLength"), 1000, r"bufferViews\[0\]: ends at byte 1000 of a buffer of 56"),
+            ((*view, "byteStride"), 1, r"bufferViews\[0\].byteStride: must be an integer from 4 to 252"),
+            (("buffers", 0, "byteLength"), 57, r"buffers\[0\]: has 56 bytes; byteLength is 57"),
+            (("buffers", 0, "uri"), "data:;base64,%%", r"buffers\[0\].uri: is not base64"),
+            (("buffers", 0, "uri"), "https://example.org/a", r"buffers\[0\].uri: must be a relative path"),
+            (("buffers", 0, "uri"), "none.bin", r"buffers\[0\].uri: cannot read 'none.bin': No such file"),
+            (("bufferViews",), [], r"bufferView: the file has no 'bufferViews'"),
+        )
+        for path, value, message in faults:
+            gltf = Gltf()
+            gltf.square()
+            gltf.write("a.gltf")
+            change(path, value)(gltf.json)
+            write("a.gltf", json.dumps(gltf.json))
+            self.refuses("check a.gltf", f"^a.gltf: error: .*{message}")
+        write("a.gltf", "[" * 100000)
+        self.refuses("check a.gltf", r"^a.gltf:1:\d+: error")
+        write("a.gltf", '{\n  "asset": {"version": 2.0,}\n}')
+        self.refuses("check a.gltf", r"^a.gltf:2:28: error: .*\n.*\n +\^")
+        write("a.glb", "glTF\2")
+        self.refuses("check a.glb", "too short for a GLB file")
+        with open("a.glb", "wb") as file:
+            file.write(struct.pack("<4sIIII", b"glTF", 2, 99, 1 << 31, 0x4E4F534A))
+        self.refuses("check a.glb", "byte 12: the file ends within a chunk of 2147483648 bytes")
+
+    def test_bombs(self):
+        """Small files that claim much: accessors without bytes, a mesh at many nodes, nodes that are deep."""
+        gltf = Gltf(accessors=[{"componentType": FLOAT, "count": 1 << 27, "type": "VEC3"}])
+        gltf.place(mesh=gltf.add("meshes", primitives=[{"attributes": {"POSITION": 0}}]))
+        self.refuses(f"check {gltf.write('a.gltf')}", "elements, more than 67108864")
+        gltf = Gltf(nodes=[{"children": [i + 1]} for i in range(5000)] + [{}])
+        gltf.json["scenes"][0]["nodes"] = [0]
+        self.refuses(f"check {gltf.write('a.gltf')}", "more than 1000 nodes deep")
+
+    def test_named(self):
+        """What is not shown is named once, with its first place; the square is there."""
+        gltf = Gltf(
+            extensionsUsed=["KHR_texture_transform", "KHR_materials_clearcoat", "ACME_thing"], animations=[{}], materials=[{
+                "alphaMode": "odd", "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0},
+                "pbrMetallicRoughness": {"metallicFactor": "no", "metallicRoughnessTexture": {"index": 0}, "baseColorTexture": {"index": 5}},
+            }],
+        )  # fmt: skip
+        gltf.add("scenes", nodes=[])
+        colors = gltf.accessor([(1, 1, 1)] * 4)
+        short = gltf.accessor([(0, 0, 1)] * 3)
+        for _ in range(2):
+            gltf.square(attributes={"COLOR_0": colors, "NORMAL": short}, targets=[{}], material=0, node={"skin": 0, "camera": 3})
+        report = self.checked(
+            gltf.write("a.gltf"),
+            "animations: animations are not played",
+            "extensionsUsed: not read, and what they add is not shown: KHR_materials_clearcoat, ACME_thing",
+            "scenes[0]: one scene is shown",
+            "nodes[0].skin: skins are not applied",
+            "nodes[0].camera: the file has no 'cameras': not used",
+            "meshes[0].primitives[0].attributes.COLOR_0: vertex colors",
+            "meshes[0].primitives[0].targets: morph targets",
+            "materials[0].pbrMetallicRoughness.metallicFactor: must be a number",
+            "pbrMetallicRoughness.metallicRoughnessTexture: the texture of metal",
+            "materials[0].normalTexture: normal textures",
+            "materials[0].occlusionTexture: occlusion textures",
+            "materials[0].pbrMetallicRoughness.baseColorTexture.index: the file has no 'textures': not used",
+            "materials[0].alphaMode: must be OPAQUE, MASK or BLEND",
+            "meshes[0].primitives[0].attributes.NORMAL: has 3 elements for 4 positions: not used",
+            "nodes[1].camera: the file has no",
+            "meshes[1].primitives[0].attributes.NORMAL: has 3 elements",
+        )
+        self.assertEqual(report["mesh_triangles"], 4)
+        write("s.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nobjects:\n  - mesh: {file: b.gltf}\n")
+        gltf = Gltf(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}])
+        gltf.square(node={"camera": 0}, material=gltf.add("materials", emissiveFactor=[1, 1, 1]))
+        gltf.write("b.gltf")
+        self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[0]: emission and unlit", "no lights")
+
+    def test_missing_image_is_named(self):
+        gltf = Gltf(textures=[{"source": 0}], images=[{"uri": "a%20b.png"}])
+        material = gltf.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}})
+        gltf.square(uvs=WHOLE, material=material)
+        self.checked(gltf.write("a.gltf"), "images[0]: cannot read 'a b.png': No such file or directory: the color is used")
+        with open("a b.png", "wb") as file:
+            file.write(QUADRANTS)
+        self.assertIn("IMAGES", self.checked("a.gltf")["features"])
+
+    def test_lights_and_cameras(self):
+        gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [
+            {"type": "directional"}, {"type": "point", "intensity": 1000, "color": [1, 0.5, 0]}, {"type": "spot", "spot": {"outerConeAngle": 0.5}},
+            {"type": "area"},
+        ]}})  # fmt: skip
+        gltf.square()
+        for i in range(5):
+            gltf.place(translation=[0, 0, 3], extensions={"KHR_lights_punctual": {"light": i}})
+        gltf.place(camera=gltf.add("cameras", type="orthographic", orthographic={"xmag": 1, "ymag": 1}))
+        gltf.place(camera=gltf.add("cameras", type="perspective", perspective={"yfov": 1}))
+        report = self.checked(
+            gltf.write("a.gltf"),
+            "extensions.KHR_lights_punctual.lights[3].type: must be directional, point or spot: not used",
+            "nodes[5].extensions.KHR_lights_punctual.light: must be an integer from 0 to 3: not used",
+            "cameras[1]: the first camera is used",
+            "the orthographic camera becomes",
+            "lights do not fade",
+            "lights of 33.9 in total at the center",
+        )
+        self.assertEqual(report["lights"], 3)
+        self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"})
+
+    def test_pixels(self):
+        """One square for each material, side by side, lit by 1 along the view."""
+        gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": math.pi}]}})
+        image = gltf.add("images", bufferView=gltf.view(QUADRANTS), mimeType="image/png")
+        for clamp in (10497, 33071, 33648):
+            gltf.add("textures", source=image, sampler=gltf.add("samplers", wrapS=clamp, wrapT=clamp))
+        cells = []
+
+        def cell(colors, uvs=None, normals=None, attributes=(), **material):
+            """Colors: one for the whole square, or four by quadrants, upper left, right, lower left, right."""
+            x = len(cells)
+            cells.append(colors if isinstance(colors, list) else [colors] * 4)
+            material = gltf.add("materials", **material) if material else None
+            gltf.square(uvs, normals, {"translation": [x, 0, 0]}, attributes=dict(attributes), **({} if material is None else {"material": material}))
+
+        def factor(*color, **more):
+            return {"pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": 0} | more}
+
+        def texture(index=0, transform=None, **more):
+            info = {"index": index} | more
+            if transform:
+                info["extensions"] = {"KHR_texture_transform": transform}
+            return {"pbrMetallicRoughness": {"baseColorTexture": info}}
+
+        gray = (0.18, 0.18, 0.18)
+        quadrants = [RED, GREEN, BLUE, WHITE]
+        cell(WHITE)
+        cell(RED, **factor(1, 0, 0, 0.25))
+        cell(gray, alphaMode="MASK", **factor(1, 0, 0, 0.25))
+        cell(RED, alphaMode="MASK", alphaCutoff=0.25, **factor(1, 0, 0, 0.25))
+        cell((0.385, 0.135, 0.135), alphaMode="BLEND", **factor(1, 0, 0, 0.25))
+        cell((0.5, 0.25, 0), extensions={"KHR_materials_unlit": {}}, normals=[(1, 0, 0)] * 4, **factor(0.5, 0.25, 0, 1))
+        cell((0, 0.75, 0), emissiveFactor=[0, 0.5, 0], extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 1.5}}, **factor(0, 0, 0, 1))
+        cell((0.5, 0, 0.25), emissiveFactor=[0, 0, 0.25], **factor(0.5, 0, 0, 1))
+        cell((0.8, 0.8, 0.8), normals=[(0, 0.6, 0.8)] * 4)
+        cell((0.24, 0.24, 0.24), normals=[(0.8, 0, 0.6)] * 4, extensions={"KHR_materials_transmission": {"transmissionFactor": 0.5}}, **factor(0.5, 0.5, 0.5, 1))
+        cell(gray, **factor(1, 1, 1, 1, metallicFactor=1, roughnessFactor=0))
+        cell(quadrants, WHOLE, **texture())
+        cell([(0.5 * r, 0.25 * g, b) for r, g, b in quadrants], WHOLE, **{"pbrMetallicRoughness": texture()["pbrMetallicRoughness"] | {"baseColorFactor": [0.5, 0.25, 1, 1]}})
+        cell([GREEN, RED, WHITE, BLUE], WHOLE, **texture(transform={"offset": [0.5, 0]}))
+        cell([BLUE, RED, WHITE, GREEN], WHOLE, **texture(transform={"rotation": math.pi / 2}))
+        cell([RED] * 4, WHOLE, **texture(transform={"scale": [0.25, 0.25], "offset": [0.125, 0.125]}))
+        cell([GREEN, GREEN, WHITE, WHITE], WHOLE, **texture(1, {"offset": [1, 0]}))
+        cell([GREEN, RED, WHITE, BLUE], WHOLE, **texture(2, {"offset": [1, 0]}))
+        cell(BLUE, WHOLE, attributes={"TEXCOORD_1": gltf.accessor([(0.25, 0.75)] * 4)}, **texture(texCoord=1))
+        cell(quadrants, [], attributes={"TEXCOORD_0": gltf.accessor([(65535 * u, 65535 * v) for u, v in WHOLE], UNSIGNED_SHORT, normalized=True)}, **texture())
+        cell(quadrants, WHOLE, emissiveFactor=[1, 1, 1], emissiveTexture={"index": 0}, **factor(0, 0, 0, 1))
+        cell(WHITE, **texture())
+        distance, count = 20, len(cells)
+        camera = gltf.add("cameras", type="perspective", perspective={"yfov": 2 * math.atan(0.5 / distance), "znear": 1, "aspectRatio": count})
+        gltf.place(camera=camera, translation=[count / 2, 0.5, distance], extensions={"KHR_lights_punctual": {"light": 0}})
+        path = gltf.write("a.glb")
+        process = self.glint(f"render {path} --size {8 * count}x8 -o a.npy")
+        self.assertEqual(process.stderr.count("warning"), 2, process.stderr)
+        self.assertIn("what a surface lets through does not get its color", process.stderr)
+        self.assertIn(f"meshes[{count - 1}].primitives[0]: has no texture coordinates", process.stderr)
+        _, _, pixels = npy_read("a.npy")
+        for i, colors in enumerate(cells):
+            for k, color in enumerate(colors):
+                got = pixels[(1 + 5 * (k // 2)) * 8 * count + 8 * i + 1 + 5 * (k % 2)]
+                for a, b in zip(got, color):
+                    self.assertAlmostEqual(a, b, delta=2e-3, msg=f"material {i}, quadrant {k}: {got}, not {color}")
+
+
+if __name__ == "__main__":
+    main()
