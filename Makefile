@@ -137,7 +137,7 @@ $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o te
 # Every reader under libFuzzer, for tools/fuzz: make fuzz builds $(BUILD)-fuzz/fuzz with Debian's clang.
 CLANG ?= clang-15
 fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/import/*/*.c host/scene/*.c) \
-                $(addprefix host/,measure/baseline.c measure/series.c opencl/cache.c render/checkpoint.c render/film.c) tests/fuzz/readers.c
+                $(addprefix host/,measure/baseline.c measure/calibration.c measure/series.c opencl/cache.c render/checkpoint.c render/film.c) tests/fuzz/readers.c
 fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
 
 fuzz:

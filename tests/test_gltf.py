@@ -87,6 +87,119 @@ QUADRANTS = png([[RED] * 4 + [GREEN] * 4] * 4 + [[BLUE] * 4 + [WHITE] * 4] * 4)
 WHOLE = [(0, 1), (1, 1), (1, 0), (0, 0)]  # texture coordinates of SQUARE that show the image upright
 
 
+def dae_source(name, count, size, axes):
+    parameters = "".join(f"<param name='{axis}' type='float'/>" for axis in axes)
+    return (
+        f"<source id='{name}'><float_array id='{name}f' count='{count}'>{{{name}}}</float_array><technique_common><accessor source='#{name}f' "
+        f"count='4' stride='{size}'>{parameters}</accessor></technique_common></source>\n"
+    )
+
+
+DAE = (
+    "<?xml version='1.0'?><COLLADA version='1.4.1'><library_images><image id='i'><init_from>a.png</init_from></image></library_images>\n"
+    "<library_effects><effect id='e'><profile_COMMON><newparam sid='s1'><surface type='2D'><init_from>i</init_from></surface></newparam>"
+    "<newparam sid='s2'><sampler2D><source>s1</source></sampler2D></newparam><technique sid='t'><lambert><diffuse><texture texture='s2' "
+    "texcoord='UV'/></diffuse></lambert></technique></profile_COMMON></effect></library_effects>\n"
+    "<library_materials><material id='m' name='m'><instance_effect url='#e'/></material></library_materials>\n"
+    "<library_geometries><geometry id='g'><mesh>"
+    + dae_source("v", 12, 3, "XYZ")
+    + dae_source("n", 12, 3, "XYZ")
+    + dae_source("t", 8, 2, "ST")
+    + "<vertices id='p'><input semantic='POSITION' source='#v'/></vertices><triangles count='2' material='mm'>"
+    "<input semantic='VERTEX' source='#p' offset='0'/><input semantic='NORMAL' source='#n' offset='0'/>"
+    "<input semantic='TEXCOORD' source='#t' offset='0' set='0'/><p>0 1 2 0 2 3</p></triangles></mesh></geometry></library_geometries>\n"
+    "<library_visual_scenes><visual_scene id='s'><node id='a' name='a'><instance_geometry url='#g'><bind_material><technique_common>"
+    "<instance_material symbol='mm' target='#m'><bind_vertex_input semantic='UV' input_semantic='TEXCOORD' input_set='0'/>"
+    "</instance_material></technique_common></bind_material></instance_geometry></node></visual_scene></library_visual_scenes>\n"
+    "<scene><instance_visual_scene url='#s'/></scene></COLLADA>\n"
+)
+
+DAE_VIEW = (
+    "<library_cameras><camera id='c' name='C'><optics><technique_common><perspective><xfov>60</xfov><aspect_ratio>2</aspect_ratio>"
+    "<znear>0.1</znear><zfar>100</zfar></perspective></technique_common></optics></camera></library_cameras>\n"
+    "<library_lights><light id='l' name='L'><technique_common><directional><color>1 1 1</color></directional></technique_common></light>"
+    "<light id='p' name='P'><technique_common><spot><color>9 9 9</color><quadratic_attenuation>1</quadratic_attenuation>"
+    "<falloff_angle>60</falloff_angle></spot></technique_common></light></library_lights>\n"
+)
+
+FBX = """; FBX 7.4.0 project file
+FBXHeaderExtension:  {{
+	FBXHeaderVersion: 1003
+	FBXVersion: 7400
+}}
+Objects:  {{
+	Geometry: 1, "Geometry::a", "Mesh" {{
+		Vertices: *12 {{
+			a: {v}
+		}}
+		PolygonVertexIndex: *6 {{
+			a: 0,1,-3,0,2,-4
+		}}
+		GeometryVersion: 124
+		LayerElementNormal: 0 {{
+			MappingInformationType: "ByVertice"
+			ReferenceInformationType: "Direct"
+			Normals: *12 {{
+				a: {n}
+			}}
+		}}
+		LayerElementUV: 0 {{
+			Name: ""
+			MappingInformationType: "ByVertice"
+			ReferenceInformationType: "Direct"
+			UV: *8 {{
+				a: {t}
+			}}
+		}}
+		LayerElementMaterial: 0 {{
+			MappingInformationType: "AllSame"
+			ReferenceInformationType: "IndexToDirect"
+			Materials: *1 {{
+				a: 0
+			}}
+		}}
+		Layer: 0 {{
+			Version: 100
+			LayerElement:  {{
+				Type: "LayerElementNormal"
+				TypedIndex: 0
+			}}
+			LayerElement:  {{
+				Type: "LayerElementUV"
+				TypedIndex: 0
+			}}
+			LayerElement:  {{
+				Type: "LayerElementMaterial"
+				TypedIndex: 0
+			}}
+		}}
+	}}
+	Model: 2, "Model::a", "Mesh" {{
+		Version: 232
+	}}
+	Material: 3, "Material::m", "" {{
+		Version: 102
+		ShadingModel: "lambert"
+		Properties70:  {{
+			P: "DiffuseColor", "Color", "", "A",1,1,1
+		}}
+	}}
+	Texture: 4, "Texture::t", "" {{
+		Type: "TextureVideoClip"
+		Version: 202
+		RelativeFilename: "a.png"
+		FileName: "a.png"
+	}}
+}}
+Connections:  {{
+	C: "OO",2,0
+	C: "OO",1,2
+	C: "OO",3,2
+	C: "OP",4,3, "DiffuseColor"
+}}
+"""
+
+
 class Test(TestCase):
     def checked(self, path, *warnings):
         """What glint check reports; the warnings, and no others, must have these parts."""
@@ -307,6 +420,54 @@ class Test(TestCase):
         )
         self.assertEqual(report["lights"], 3)
         self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"})
+
+    def test_formats_look_alike(self):
+        """A smooth, textured square of four formats: the same image, with the same camera and lights."""
+        normals = [(-0.6, 0, 0.8), (0.6, 0, 0.8), (0.6, 0, 0.8), (-0.6, 0, 0.8)]
+        with open("a.png", "wb") as file:
+            file.write(QUADRANTS)
+        gltf = Gltf(images=[{"uri": "a.png"}], textures=[{"source": 0}])
+        gltf.square(WHOLE, normals, material=gltf.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}}))
+        gltf.write("a.gltf")
+
+        def lines(keyword, rows):
+            return "".join(f"{keyword} {' '.join(map(str, row))}\n" for row in rows)
+
+        upward = [(u, 1 - v) for u, v in WHOLE]
+        write("a.mtl", "newmtl m\nKd 1 1 1\nmap_Kd a.png\n")
+        text = lines("v", SQUARE) + lines("vt", upward) + lines("vn", normals)
+        write("a.obj", f"mtllib a.mtl\n{text}usemtl m\nf 1/1/1 2/2/2 3/3/3\nf 1/1/1 3/3/3 4/4/4\n")
+        numbers = {"v": SQUARE, "n": normals, "t": upward}
+        write("a.dae", DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()}))
+        write("a.fbx", FBX.format(**{name: ",".join(str(x) for row in rows for x in row) for name, rows in numbers.items()}))
+        images = []
+        for ending in ("gltf", "obj", "dae", "fbx"):
+            self.checked(f"a.{ending}")
+            self.glint(f"render a.{ending} --size 32x32 -o {ending}.npy")
+            images.append(npy_read(f"{ending}.npy")[2])
+        self.assertGreater(len(set(images[0])), 100)
+        for ending, image in zip(("obj", "dae", "fbx"), images[1:]):
+            for i, (got, expected) in enumerate(zip(image, images[0])):
+                for a, b in zip(got, expected):
+                    self.assertAlmostEqual(a, b, delta=1e-4, msg=f"{ending}, pixel {i}")
+
+    def test_scenes_of_other_formats(self):
+        """Cameras, lights and textures by assimp; an image of another machine's path lies next to the file."""
+        with open("a.png", "wb") as file:
+            file.write(QUADRANTS)
+        numbers = {"v": SQUARE, "n": [(0, 0, 1)] * 4, "t": WHOLE}
+        text = DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()})
+        text = text.replace("<library_geometries>", DAE_VIEW + "<library_geometries>").replace("<init_from>a.png", "<init_from>C:\\a\\a.png")
+        node = "<node id='{0}' name='{0}'><translate>0.5 0.5 {1}</translate><instance_{2} url='#{3}'/></node>"
+        nodes = node.format("C", 2, "camera", "c") + node.format("L", 2, "light", "l") + node.format("P", 3, "light", "p")
+        write("a.dae", text.replace("</visual_scene>", nodes + "</visual_scene>"))
+        report = self.checked("a.dae", "m: no 'C:/a/a.png': 'a.png' is used", "lights do not fade")
+        self.assertEqual(set(report["features"]), {"TRIANGLES", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "IMAGES"})
+        self.glint("render a.dae --size 20x10 -o a.npy")
+        row = npy_read("a.npy")[2][100:120]  # 60 degrees wide, at a distance of 2: the square is 8.7 columns wide
+        self.assertEqual([i for i, color in enumerate(row) if abs(color[0] - 0.18) > 1e-3 or abs(color[1] - 0.18) > 1e-3], list(range(6, 14)))
+        write("s.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, 5]}}]\nobjects:\n  - mesh: {file: a.dae}\n")
+        self.checked("s.yaml", "a.dae: cameras and lights of a mesh are not used", "a.dae: m: no 'C:/a/a.png'")
 
     def test_pixels(self):
         """One square for each material, side by side, lit by 1 along the view."""

@@ -2,6 +2,7 @@
 // distances, which distorts small meshes; its triangulation reads missing vertices and drops parts of concave
 // polygons.
 #include "host/base/fault.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/affine.h"
 #include "host/import/mesh/assimp_process.h"
@@ -13,11 +14,43 @@
 #include <stdlib.h>
 #include <string.h>
 
+// How a material looks to meshes. Those with the texture coordinates that it asks for show its texture.
+typedef struct {
+    uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
+    uint32_t texture;        // of the scene; 0: none
+    unsigned uv_set;
+    struct aiUVTransform uv_transform;
+} ImportedMaterial;
+
+// What glint does not show of a file: one warning for each.
+enum {
+    LOSES_SKINS,
+    LOSES_MORPHS,
+    LOSES_VERTEX_COLORS,
+    LOSES_EMISSION,
+    LOSES_TEXTURES,
+    LOSES_UV_TURN,
+    LOSES_CAMERAS
+};
+
 typedef struct {
     MeshDraft *draft;
     const struct aiScene *file;
-    uint32_t *materials; // scene index of each of the file's materials; UINT32_MAX: not added yet
+    ImportedMaterial *materials; // one for each of the file's; NULL: not used
+    unsigned losses;             // bits
 } Importer;
+
+static void lose(Importer *importer, unsigned loss, const char *text)
+{
+    if (!(importer->losses >> loss & 1)) draft_warn(importer->draft, "%s", text);
+    importer->losses |= 1u << loss;
+}
+
+static const char *file_name(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *backslash = strrchr(slash ? slash : path, '\\');
+    return backslash ? backslash + 1 : slash ? slash + 1 : path;
+}
 
 static Vector3 vector_of(const struct aiVector3D *v)
 {
@@ -65,60 +98,148 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
     return otherwise;
 }
 
-// One warning for each texture of the material: meshes get theirs from the scene.
-static void warn_of_textures(const Importer *importer, const struct aiMaterial *material, const char *name)
+// The file's own image under a name, or NULL.
+static const struct aiTexture *embedded_texture(const struct aiScene *file, const char *name)
 {
-    struct aiString previous = {0};
-    for (int type = aiTextureType_DIFFUSE; type <= AI_TEXTURE_TYPE_MAX; type++) {
-        struct aiString path = {0};
-        if (aiGetMaterialTextureCount(material, (enum aiTextureType)type) == 0) continue;
-        aiGetMaterialTexture(material, (enum aiTextureType)type, 0, &path, NULL, NULL, NULL, NULL, NULL,
-                             NULL);
-        // assimp lists a glTF base color under two types
-        if (strcmp(path.data, previous.data) == 0) continue;
-        draft_warn(
-            importer->draft,
-            "the texture '%.100s' of material '%.40s' is not used: give the mesh a material with an image",
-            path.data, name);
-        previous = path;
+    if (name[0] == '*') {
+        const unsigned long index = strtoul(name + 1, NULL, 10);
+        return index < file->mNumTextures ? file->mTextures[index] : NULL;
     }
+    for (unsigned i = 0; i < file->mNumTextures; i++)
+        if (strcmp(file_name(file->mTextures[i]->mFilename.data), file_name(name)) == 0)
+            return file->mTextures[i];
+    return NULL;
+}
+
+// Adds an image, which lies where the file says or else next to the file: paths are often those of another
+// machine.
+static uint32_t texture_add(const Importer *importer, const char *name, const char *owner)
+{
+    MeshDraft *draft = importer->draft;
+    const struct aiTexture *embedded = embedded_texture(importer->file, name);
+    if (embedded) {
+        // one that is not compressed has no form that glint reads
+        const Source bytes = {.bytes = (const char *)embedded->pcData,
+                              .length = embedded->mHeight == 0 ? embedded->mWidth : 0};
+        return draft_add_embedded_texture(draft, &bytes, name);
+    }
+    const char *from = draft->import->path, *slash = strrchr(from, '/');
+    const int folder_length = slash ? (int)(slash + 1 - from) : 0;
+    char *path = text_format("%.*s%s", name[0] == '/' ? 0 : folder_length, from, name);
+    for (char *at = path + folder_length; *at; at++)
+        if (*at == '\\') *at = '/';
+    char *near = text_format("%.*s%s", folder_length, from, file_name(path));
+    const bool is_moved = file_obstacle(path) && !file_obstacle(near);
+    const uint32_t texture = draft_add_texture(draft, is_moved ? near : path, owner);
+    if (is_moved && texture > 0) draft_warn(draft, "%s: no '%.100s': '%.100s' is used", owner, path, near);
+    free(near);
+    free(path);
+    return texture;
+}
+
+static TextureWrap wrap_of(enum aiTextureMapMode mode)
+{
+    return mode == aiTextureMapMode_Clamp    ? TEXTURE_CLAMPED
+           : mode == aiTextureMapMode_Mirror ? TEXTURE_MIRRORED
+                                             : TEXTURE_REPEATED;
+}
+
+// The texture of the color; one warning for all others.
+static void textures_read(Importer *importer, const struct aiMaterial *from, const char *name,
+                          ImportedMaterial *to, TextureWrap wraps[2])
+{
+    const enum aiTextureType color = aiGetMaterialTextureCount(from, aiTextureType_BASE_COLOR) > 0
+                                         ? aiTextureType_BASE_COLOR
+                                         : aiTextureType_DIFFUSE;
+    for (int type = aiTextureType_DIFFUSE; type <= AI_TEXTURE_TYPE_MAX; type++)
+        if (type != aiTextureType_BASE_COLOR && type != aiTextureType_DIFFUSE &&
+            aiGetMaterialTextureCount(from, (enum aiTextureType)type) > 0)
+            lose(importer, LOSES_TEXTURES, "textures of anything but the color are not used");
+    if (aiGetMaterialTextureCount(from, color) == 0) return;
+    struct aiString path = {0};
+    enum aiTextureMapMode modes[2] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
+    to->uv_transform = (struct aiUVTransform){.mScaling = {1, 1}};
+    if (aiGetMaterialTexture(from, color, 0, &path, NULL, &to->uv_set, NULL, NULL, modes, NULL) !=
+        aiReturn_SUCCESS)
+        return;
+    aiGetMaterialUVTransform(from, AI_MATKEY_UVTRANSFORM(color, 0), &to->uv_transform);
+    if (to->uv_transform.mRotation != 0) lose(importer, LOSES_UV_TURN, "rotations of textures are not used");
+    if (to->uv_set >= AI_MAX_NUMBER_OF_TEXTURECOORDS) to->uv_set = 0;
+    wraps[0] = wrap_of(modes[0]);
+    wraps[1] = wrap_of(modes[1]);
+    to->texture = texture_add(importer, path.data, name);
 }
 
 // glint's highlights have the light's color; only the strength of the file's specular color is kept.
-static Material material_of(const Importer *importer, const struct aiMaterial *file_material)
+static Material material_of(Importer *importer, const struct aiMaterial *from)
 {
     Material material = material_default();
-    Color specular = color_of(importer, file_material, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
-    material.color = color_of(importer, file_material, AI_MATKEY_COLOR_DIFFUSE, material.color);
-    material.specular = (specular.x + specular.y + specular.z) / 3;
-    material.shininess = number_of(importer, file_material, AI_MATKEY_SHININESS, material.shininess);
-    material.transmission = fmax(0, 1 - number_of(importer, file_material, AI_MATKEY_OPACITY, 1));
-    double ior = number_of(importer, file_material, AI_MATKEY_REFRACTI, 0);
-    if (ior > 0) material.ior = ior;
+    const bool is_scene = importer->draft->import->view != NULL;
+    const Color specular = color_of(importer, from, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0}),
+                emission = color_of(importer, from, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
+    material.color = color_of(importer, from, AI_MATKEY_COLOR_DIFFUSE, material.color);
+    // assimp gives a material of Lambert's a specular color as well
+    int shading = aiShadingMode_Phong;
+    aiGetMaterialIntegerArray(from, AI_MATKEY_SHADING_MODEL, &shading, NULL);
+    if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
+    material.shininess = number_of(importer, from, AI_MATKEY_SHININESS, material.shininess);
+    if (is_scene) material.ambient = 0;
+    if (is_scene && !vector_is_zero(emission)) {
+        material_set_emission(&material, emission);
+        importer->draft->scene->ambient = vector_all(1);
+    } else if (!vector_is_zero(emission)) {
+        lose(importer, LOSES_EMISSION,
+             "emission needs a scene of its own, as by glint render FILE: lit by the lights instead");
+    }
+    const double opacity = fmin(number_of(importer, from, AI_MATKEY_OPACITY, 1), 1),
+                 ior = number_of(importer, from, AI_MATKEY_REFRACTI, 0);
+    if (opacity < 1) material_set_opacity(&material, opacity);
+    if (opacity < 1 && ior > 0) material.ior = ior;
     return material;
 }
 
-static uint32_t material_index(Importer *importer, unsigned index)
+// The texture times the diffuse color.
+static void material_add(Importer *importer, const struct aiMaterial *from, ImportedMaterial *to)
 {
-    uint32_t *known = &importer->materials[index];
-    if (*known != UINT32_MAX) return *known;
-    const struct aiMaterial *file_material = importer->file->mMaterials[index];
     struct aiString name = {0};
-    aiGetMaterialString(file_material, AI_MATKEY_NAME, &name);
+    aiGetMaterialString(from, AI_MATKEY_NAME, &name);
     Material material = material_default();
+    TextureWrap wraps[2] = {TEXTURE_REPEATED, TEXTURE_REPEATED};
     // assimp's default where the file has none
     if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) {
-        material = material_of(importer, file_material);
-        warn_of_textures(importer, file_material, name.data);
+        material = material_of(importer, from);
+        textures_read(importer, from, name.data, to, wraps);
+    } else if (importer->draft->import->view) {
+        material.ambient = 0;
     }
-    *known = scene_add_material(importer->draft->scene, &material, name.data);
-    return *known;
+    Scene *scene = importer->draft->scene;
+    to->scene_index[0] = to->scene_index[1] = scene_add_material(scene, &material, name.data);
+    if (to->texture == 0) return;
+    if (importer->draft->import->view && material.ambient > 0)
+        lose(importer, LOSES_EMISSION, "emission in addition to a texture is not shown");
+    const Color color = material.color, diffuse = material.diffuse;
+    material.texture = to->texture;
+    memcpy(material.texture_wrap, wraps, sizeof wraps);
+    material.diffuse = (Color){diffuse.x * color.x, diffuse.y * color.y, diffuse.z * color.z};
+    material.ambient *= importer->draft->import->view ? 0 : (color.x + color.y + color.z) / 3;
+    to->scene_index[1] = scene_add_material(scene, &material, name.data);
 }
 
-static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affine *affine)
+static ImportedMaterial *material_use(Importer *importer, unsigned index)
+{
+    ImportedMaterial *material = &importer->materials[index];
+    if (material->scene_index[0] == DRAFT_NONE)
+        material_add(importer, importer->file->mMaterials[index], material);
+    return material;
+}
+
+static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affine *affine,
+                         const ImportedMaterial *material)
 {
     const Affine for_normals = affine_for_normals(affine);
-    const struct aiVector3D *uvs = from->mTextureCoords[0];
+    const struct aiVector3D *uvs = from->mTextureCoords[material ? material->uv_set : 0];
+    struct aiUVTransform change = {.mScaling = {1, 1}};
+    if (material && material->texture > 0) change = material->uv_transform;
     if (from->mNormals) draft_share_part(draft, DRAFT_NORMAL, draft->positions.count);
     if (uvs) draft_share_part(draft, DRAFT_UV, draft->positions.count);
     for (unsigned i = 0; i < from->mNumVertices; i++) {
@@ -126,7 +247,9 @@ static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affi
         if (from->mNormals)
             array_push(draft->normals,
                        vector_normalize(affine_direction(&for_normals, vector_of(&from->mNormals[i]))));
-        if (uvs) draft_add_uv(draft, uvs[i].x, uvs[i].y);
+        if (uvs)
+            draft_add_uv(draft, (double)uvs[i].x * change.mScaling.x + change.mTranslation.x,
+                         (double)uvs[i].y * change.mScaling.y + change.mTranslation.y);
     }
 }
 
@@ -163,19 +286,78 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
     if (first + from->mNumVertices >= DRAFT_NONE) return draft_refuse(draft, "too many vertices");
     if (importer->materials && from->mMaterialIndex >= importer->file->mNumMaterials)
         return draft_refuse(draft, "material %u (from 0) is not there", from->mMaterialIndex);
-    if (importer->materials)
+    const ImportedMaterial *material =
+        importer->materials ? material_use(importer, from->mMaterialIndex) : NULL;
+    if (material) {
+        const bool is_textured = material->texture > 0 && from->mTextureCoords[material->uv_set];
         array_push(draft->materials,
-                   ((DraftMaterialRun){draft->face_start, material_index(importer, from->mMaterialIndex)}));
-    vertices_add(draft, from, affine);
+                   ((DraftMaterialRun){draft->face_start, material->scene_index[is_textured]}));
+    }
+    if (from->mNumBones > 0)
+        lose(importer, LOSES_SKINS, "skins are not applied: a mesh stands at its node, in its own shape");
+    if (from->mNumAnimMeshes > 0)
+        lose(importer, LOSES_MORPHS, "morph targets are not applied: a mesh has its own shape");
+    if (from->mColors[0])
+        lose(importer, LOSES_VERTEX_COLORS, "vertex colors are not used: the material's color is");
+    vertices_add(draft, from, affine, material);
     const bool mirrored = affine_determinant(affine) < 0;
     for (unsigned i = 0; i < from->mNumFaces; i++)
         if (!face_add(draft, from, &from->mFaces[i], first, mirrored)) return false;
     return true;
 }
 
+// Cameras and lights have the name of a node, in whose space they are.
+static void view_add(Importer *importer, const struct aiNode *node, const Affine *affine)
+{
+    const struct aiScene *file = importer->file;
+    MeshView *view = importer->draft->import->view;
+    for (unsigned i = 0; i < file->mNumCameras && view; i++) {
+        const struct aiCamera *camera = file->mCameras[i];
+        if (strcmp(camera->mName.data, node->mName.data) != 0) continue;
+        if (view->has_camera) {
+            lose(importer, LOSES_CAMERAS, "the first camera is used, and not the others");
+            continue;
+        }
+        const Vector3 eye = affine_point(affine, vector_of(&camera->mPosition)),
+                      forward = vector_normalize(affine_direction(affine, vector_of(&camera->mLookAt)));
+        view->camera = (Camera){.position = eye,
+                                .look_at = vector_add(eye, forward),
+                                .up = affine_direction(affine, vector_of(&camera->mUp)),
+                                .field_axis = FIELD_HORIZONTAL,
+                                .half_tangent = tan(camera->mHorizontalFOV / 2),
+                                .frame_aspect = fmax(camera->mAspect, 0)};
+        view->has_camera = true;
+    }
+    for (unsigned i = 0; i < file->mNumLights && view; i++) {
+        const struct aiLight *light = file->mLights[i];
+        const bool is_sun = light->mType == aiLightSource_DIRECTIONAL,
+                   is_spot = light->mType == aiLightSource_SPOT;
+        if (strcmp(light->mName.data, node->mName.data) != 0) continue;
+        if (!is_sun && !is_spot && light->mType != aiLightSource_POINT) {
+            draft_warn(importer->draft, "the light '%.40s' is neither directional, point nor spot: not used",
+                       light->mName.data);
+            continue;
+        }
+        const double outer = fmin(fmax(light->mAngleOuterCone, 1e-3), M_PI) * (90 / M_PI),
+                     inner = fmin(fmax(light->mAngleInnerCone, 0) * (90 / M_PI), outer);
+        const MeshLight added = {
+            .light = {.kind = is_sun    ? LIGHT_DIRECTIONAL
+                              : is_spot ? LIGHT_SPOT
+                                        : LIGHT_POINT,
+                      .color = {light->mColorDiffuse.r, light->mColorDiffuse.g, light->mColorDiffuse.b},
+                      .position = affine_point(affine, vector_of(&light->mPosition)),
+                      .direction = vector_normalize(affine_direction(affine, vector_of(&light->mDirection))),
+                      .half_angle = outer,
+                      .penumbra = outer - inner},
+            .fading = {light->mAttenuationConstant, light->mAttenuationLinear, light->mAttenuationQuadratic}};
+        array_push(view->lights, added);
+    }
+}
+
 static bool node_add(Importer *importer, const struct aiNode *node, const Affine *parent)
 {
     const Affine own = affine_of_node(&node->mTransformation), affine = affine_multiply(parent, &own);
+    view_add(importer, node, &affine);
     for (unsigned i = 0; i < node->mNumMeshes; i++)
         if (node->mMeshes[i] < importer->file->mNumMeshes &&
             !mesh_add(importer, importer->file->mMeshes[node->mMeshes[i]], &affine))
@@ -191,8 +373,13 @@ static bool file_add(Importer *importer)
     const size_t material_count = importer->file->mNumMaterials;
     if (importer->draft->import->own_materials) {
         importer->materials = memory_allocate(material_count + 1, sizeof *importer->materials);
-        memset(importer->materials, 0xff, material_count * sizeof *importer->materials);
+        for (size_t i = 0; i < material_count; i++)
+            importer->materials[i] = (ImportedMaterial){.scene_index = {DRAFT_NONE, DRAFT_NONE}};
     }
+    if (importer->file->mNumAnimations > 0)
+        draft_warn(importer->draft, "animations are not played: nodes stand as the file has them");
+    if (!importer->draft->import->view && importer->file->mNumCameras + importer->file->mNumLights > 0)
+        draft_warn(importer->draft, "cameras and lights of a mesh are not used: those of the scene are");
     const bool added = !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &identity);
     free(importer->materials);
     for (DraftPart part = DRAFT_UV; part <= DRAFT_NORMAL; part++)

@@ -13,16 +13,24 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { REPLY_DESCRIPTOR = 3, MESSAGES_MAX = 64, MATERIALS_MAX = 1 << 20 };
+enum { REPLY_DESCRIPTOR = 3, MESSAGES_MAX = 64, MATERIALS_MAX = 1 << 20, LIGHTS_MAX = 1 << 16 };
 
 static const char command[] = "--read-mesh";
 static const char magic[8] = "glntmsh";
 
 typedef struct {
     char magic[8];
-    uint64_t is_read, message_count, material_count, has_normals, has_uvs;
+    uint64_t is_read, message_count, texture_count, material_count, has_normals, has_uvs;
+    uint64_t has_camera, light_count, glows; // its materials need an ambient light of 1
+    Camera camera;
     uint64_t counts[6]; // of the arrays
 } ReplyHeader;
+
+// Its bytes follow, if the image lies within the file.
+typedef struct {
+    char path[1024];
+    uint64_t byte_count;
+} ReplyTexture;
 
 typedef struct {
     uint64_t is_error;
@@ -30,7 +38,9 @@ typedef struct {
 } ReplyMessage;
 
 typedef struct {
-    double color[3], specular, shininess, transmission, ior;
+    Color color, diffuse;
+    double ambient, specular, shininess, transmission, ior;
+    uint32_t texture, wraps[2];
     char name[64];
 } ReplyMaterial;
 
@@ -86,15 +96,30 @@ static void messages_write(FILE *reply, const MessageList *messages)
     }
 }
 
+static void textures_write(FILE *reply, const Scene *scene)
+{
+    for (size_t i = 0; i < scene->textures.count; i++) {
+        const SceneTexture *from = &scene->textures.items[i];
+        ReplyTexture texture = {.byte_count = from->bytes.count};
+        snprintf(texture.path, sizeof texture.path, "%s", from->path);
+        fwrite(&texture, sizeof texture, 1, reply);
+        fwrite(text_c(&from->bytes), 1, from->bytes.count, reply);
+    }
+}
+
 static void materials_write(FILE *reply, const Scene *scene)
 {
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *from = &scene->materials.items[i];
-        ReplyMaterial material = {.color = {from->color.x, from->color.y, from->color.z},
+        ReplyMaterial material = {.color = from->color,
+                                  .diffuse = from->diffuse,
+                                  .ambient = from->ambient,
                                   .specular = from->specular,
                                   .shininess = from->shininess,
                                   .transmission = from->transmission,
-                                  .ior = from->ior};
+                                  .ior = from->ior,
+                                  .texture = from->texture,
+                                  .wraps = {from->texture_wrap[0], from->texture_wrap[1]}};
         snprintf(material.name, sizeof material.name, "%s", scene->material_names.items[i]);
         fwrite(&material, sizeof material, 1, reply);
     }
@@ -104,16 +129,27 @@ static void reply_write(FILE *reply, MeshDraft *draft, bool is_read)
 {
     ReplyHeader header = {.is_read = is_read,
                           .message_count = draft->import->report->messages->count,
+                          .texture_count = draft->scene->textures.count,
                           .material_count = draft->scene->materials.count,
+                          .glows = !vector_is_zero(draft->scene->ambient),
                           .has_normals = draft->is_shared[DRAFT_NORMAL],
                           .has_uvs = draft->is_shared[DRAFT_UV]};
     const ReplyArrays arrays = arrays_of(draft);
+    const MeshView *view = draft->import->view;
+    if (view) {
+        header.has_camera = view->has_camera;
+        header.camera = view->camera;
+        header.light_count = view->lights.count;
+    }
     memcpy(header.magic, magic, sizeof magic);
     for (size_t i = 0; i < 6; i++)
         header.counts[i] = is_read ? *arrays.items[i].count : 0;
     fwrite(&header, sizeof header, 1, reply);
     messages_write(reply, draft->import->report->messages);
+    textures_write(reply, draft->scene);
     materials_write(reply, draft->scene);
+    if (header.light_count > 0)
+        fwrite(view->lights.items, sizeof *view->lights.items, view->lights.count, reply);
     for (size_t i = 0; i < 6; i++)
         if (header.counts[i] > 0)
             fwrite(*arrays.items[i].items, arrays.items[i].size, *arrays.items[i].count, reply);
@@ -130,8 +166,13 @@ int assimp_process_main(int argument_count, char **arguments)
     const Source source = {.file = arguments[2], .bytes = ""};
     Report report = report_open(&source, &messages);
     Scene scene = {0};
-    const MeshImport import = {
-        .path = arguments[2], .own_materials = strcmp(arguments[3], "own") == 0, .report = &report};
+    MeshView view = {0};
+    const bool is_scene = strcmp(arguments[3], "scene") == 0;
+    const MeshImport import = {.path = arguments[2],
+                               .own_materials = is_scene || strcmp(arguments[3], "own") == 0,
+                               .view = is_scene ? &view : NULL,
+                               .report = &report,
+                               .offset = MESSAGE_WHOLE_FILE};
     MeshDraft draft = {.import = &import, .scene = &scene, .source = source, .places = DRAFT_NO_PLACES};
     const bool is_read = assimp_read(&draft);
     report_close(&report);
@@ -148,9 +189,9 @@ static bool messages_read(MeshDraft *draft, FILE *reply, uint64_t count)
         if (fread(&message, sizeof message, 1, reply) != 1) return false;
         message.text[sizeof message.text - 1] = '\0';
         if (message.is_error)
-            report_error(draft->import->report, draft->import->offset, "%s", message.text);
+            draft_refuse(draft, "%s", message.text);
         else
-            report_warning(draft->import->report, draft->import->offset, "%s", message.text);
+            draft_warn(draft, "%s", message.text);
     }
     return true;
 }
@@ -160,25 +201,87 @@ static bool number_is_sound(double number)
     return number >= 0 && number <= NUMBER_MAX;
 }
 
-static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count)
+static bool color_is_sound(Color color)
+{
+    return number_is_sound(color.x) && number_is_sound(color.y) && number_is_sound(color.z);
+}
+
+// The scene's index of each texture is set in `textures`. Memory grows with what arrives.
+static bool textures_read(MeshDraft *draft, FILE *reply, uint64_t count,
+                          uint32_t textures[SCENE_TEXTURES_MAX])
+{
+    if (count > SCENE_TEXTURES_MAX) return false;
+    for (uint64_t i = 0; i < count; i++) {
+        ReplyTexture from;
+        Text bytes = {0};
+        if (fread(&from, sizeof from, 1, reply) != 1) return false;
+        from.path[sizeof from.path - 1] = '\0';
+        char chunk[1 << 12];
+        while (bytes.count < from.byte_count) {
+            const uint64_t left = from.byte_count - bytes.count;
+            const size_t length = fread(chunk, 1, left < sizeof chunk ? (size_t)left : sizeof chunk, reply);
+            text_append(&bytes, chunk, length);
+            if (length == 0) break;
+        }
+        const bool is_whole = bytes.count == from.byte_count;
+        char owner[32];
+        snprintf(owner, sizeof owner, "image %u", (unsigned)i);
+        if (is_whole && bytes.count > 0)
+            textures[i] = draft_add_embedded_texture(
+                draft, &(Source){.bytes = bytes.items, .length = bytes.count}, owner);
+        else if (is_whole)
+            textures[i] = draft_add_texture(draft, from.path, owner);
+        text_free(&bytes);
+        if (!is_whole) return false;
+    }
+    return true;
+}
+
+static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count, const uint32_t *textures,
+                           uint64_t texture_count)
 {
     if (count > MATERIALS_MAX) return false;
     for (uint64_t i = 0; i < count; i++) {
         ReplyMaterial from;
-        if (fread(&from, sizeof from, 1, reply) != 1 || !number_is_sound(from.color[0]) ||
-            !number_is_sound(from.color[1]) || !number_is_sound(from.color[2]) ||
+        if (fread(&from, sizeof from, 1, reply) != 1 || !color_is_sound(from.color) ||
+            !color_is_sound(from.diffuse) || !number_is_sound(from.ambient) || from.texture > texture_count ||
+            from.wraps[0] > TEXTURE_MIRRORED || from.wraps[1] > TEXTURE_MIRRORED ||
             !number_is_sound(from.specular) || !number_is_sound(from.shininess) ||
             !(from.transmission >= 0 && from.transmission <= 1) || !(from.ior > 0 && from.ior <= NUMBER_MAX))
             return false;
         from.name[sizeof from.name - 1] = '\0';
         Material material = material_default();
-        material.color = (Color){from.color[0], from.color[1], from.color[2]};
+        material.color = from.color;
+        material.diffuse = from.diffuse;
+        material.ambient = from.ambient;
+        material.texture = from.texture > 0 ? textures[from.texture - 1] : 0;
+        for (int axis = 0; axis < 2; axis++)
+            material.texture_wrap[axis] = (TextureWrap)from.wraps[axis];
         material.specular = from.specular;
         material.shininess = from.shininess;
         material.transmission = from.transmission;
         material.ior = from.ior;
         scene_add_material(draft->scene, &material, from.name);
     }
+    return true;
+}
+
+// mesh_scene.c checks them.
+static bool view_read(MeshDraft *draft, FILE *reply, const ReplyHeader *header)
+{
+    MeshView *view = draft->import->view;
+    if (header->light_count > LIGHTS_MAX || (!view && (header->light_count > 0 || header->has_camera)))
+        return false;
+    for (uint64_t i = 0; i < header->light_count; i++) {
+        MeshLight light;
+        if (fread(&light, sizeof light, 1, reply) != 1) return false;
+        array_push(view->lights, light);
+    }
+    if (header->has_camera) {
+        view->has_camera = true;
+        view->camera = header->camera;
+    }
+    if (view && header->glows) draft->scene->ambient = vector_all(1);
     return true;
 }
 
@@ -254,9 +357,12 @@ bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
 {
     ReplyHeader header;
     char end[sizeof magic];
+    uint32_t textures[SCENE_TEXTURES_MAX];
     if (fread(&header, sizeof header, 1, reply) != 1 || memcmp(header.magic, magic, sizeof magic) != 0 ||
         !messages_read(draft, reply, header.message_count) ||
-        !materials_read(draft, reply, header.material_count) || !arrays_read(draft, reply, header.counts) ||
+        !textures_read(draft, reply, header.texture_count, textures) ||
+        !materials_read(draft, reply, header.material_count, textures, header.texture_count) ||
+        !view_read(draft, reply, &header) || !arrays_read(draft, reply, header.counts) ||
         fread(end, sizeof end, 1, reply) != 1 || memcmp(end, magic, sizeof magic) != 0 ||
         !draft_is_sound(draft, &header))
         return false;
@@ -268,7 +374,10 @@ bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
 static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
 {
     char *arguments[] = {"glint", (char *)command, (char *)draft->import->path,
-                         draft->import->own_materials ? "own" : "none", NULL};
+                         draft->import->view            ? "scene"
+                         : draft->import->own_materials ? "own"
+                                                        : "none",
+                         NULL};
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) return errno;
     posix_spawn_file_actions_t actions;

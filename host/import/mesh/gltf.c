@@ -23,7 +23,8 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
         "emission and unlit materials need a scene of their own, as by glint render FILE: lit by the "
         "lights instead",
     [GLTF_EMISSIVE_TEXTURE] =
-        "the emissive texture is not used, as another texture is: the surface does not emit",
+        "emission is shown without textures, or by one that is the base color's as well: left "
+        "out here",
     [GLTF_UNLIT_TINT] = "the factors of an emitted texture become their mean",
     [GLTF_METAL_TEXTURE] = "the texture of metal and roughness is not used: the factors are",
     [GLTF_METAL_COLOR] = "what a metal reflects does not get its color",

@@ -65,7 +65,17 @@ static void lights_around(Scene *scene)
 
 static bool is_sound(Vector3 v)
 {
-    return vector_largest(v) <= NUMBER_MAX;
+    return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
+}
+
+static bool light_is_sound(const Light *light)
+{
+    const bool has_cone = light->half_angle > 0 && light->half_angle < 180 && light->penumbra >= 0 &&
+                          light->penumbra <= light->half_angle;
+    return light->kind <= LIGHT_SPOT && is_sound(light->position) && is_sound(light->direction) &&
+           is_sound(light->color) && vector_is_zero(vector_min(light->color, vector_all(0))) &&
+           (light->kind == LIGHT_POINT || !vector_is_zero(light->direction)) &&
+           (light->kind != LIGHT_SPOT || has_cone);
 }
 
 // The light as it is at the center: glint's do not fade.
@@ -78,9 +88,7 @@ static void light_add(Scene *scene, const MeshLight *from, Vector3 center, bool 
         *fades |= from->fading[1] != 0 || from->fading[2] != 0;
         light.color = vector_scale(light.color, fading > 0 ? 1 / fading : 0);
     }
-    const bool has_direction = light.kind == LIGHT_POINT || !vector_is_zero(light.direction);
-    if (is_sound(light.position) && is_sound(light.direction) && is_sound(light.color) && has_direction)
-        array_push(scene->lights, light);
+    if (light_is_sound(&light)) array_push(scene->lights, light);
 }
 
 // Lights so bright or dark that nothing but white or black would be seen are scaled.
@@ -119,8 +127,9 @@ static void camera_set(Scene *scene, const MeshView *view, Vector3 center, Repor
 static bool camera_is_sound(const Camera *camera)
 {
     return is_sound(camera->position) && is_sound(camera->look_at) && is_sound(camera->up) &&
-           !vectors_equal(camera->position, camera->look_at) && camera->half_tangent > 0 &&
-           camera->half_tangent <= NUMBER_MAX;
+           !vectors_equal(camera->position, camera->look_at) && camera->field_axis <= FIELD_HORIZONTAL &&
+           camera->half_tangent > 0 && camera->half_tangent <= NUMBER_MAX && camera->frame_aspect >= 0 &&
+           camera->frame_aspect <= NUMBER_MAX;
 }
 
 static void scene_show(Scene *scene, const MeshView *view, const char *path, Report *report)
