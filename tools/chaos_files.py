@@ -24,7 +24,8 @@ GLTF = b"""\
 "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36,
 "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}
 """
-GLTF_SCENE = MESH_SCENE.partition("  - mesh")[0] + "  - mesh: {file: mesh.gltf}\n"
+OFF = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+OFF_SCENE = MESH_SCENE.partition("  - mesh")[0] + "  - mesh: {file: mesh.off}\n"
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
 PLY = """\
 ply
