@@ -368,7 +368,7 @@ class Test(TestCase):
             gltf.write("a.gltf"),
             "animations: animations are not played",
             "extensionsUsed: not read, and what they add is not shown: KHR_materials_clearcoat, ACME_thing",
-            "scenes[0]: one scene is shown",
+            "scenes[0]: only this scene is shown",
             "nodes[0].skin: skins are not applied",
             "nodes[0].camera: the file has no 'cameras': not used",
             "meshes[0].primitives[0].attributes.COLOR_0: vertex colors",
@@ -388,7 +388,7 @@ class Test(TestCase):
         gltf = Gltf(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}])
         gltf.square(node={"camera": 0}, material=gltf.add("materials", emissiveFactor=[1, 1, 1]))
         gltf.write("b.gltf")
-        self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[0]: emission and unlit", "no lights")
+        self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[0]: only glint render FILE shows emission", "no lights")
 
     def test_missing_image_is_named(self):
         gltf = Gltf(textures=[{"source": 0}], images=[{"uri": "a%20b.png"}])
@@ -413,7 +413,7 @@ class Test(TestCase):
             gltf.write("a.gltf"),
             "extensions.KHR_lights_punctual.lights[3].type: must be directional, point or spot: not used",
             "nodes[5].extensions.KHR_lights_punctual.light: must be an integer from 0 to 3: not used",
-            "cameras[1]: the first camera is used",
+            "cameras[1]: only the first camera is used",
             "the orthographic camera becomes",
             "lights do not fade",
             "lights of 33.9 in total at the center",
@@ -523,8 +523,8 @@ class Test(TestCase):
         path = gltf.write("a.glb")
         process = self.glint(f"render {path} --size {8 * count}x8 -o a.npy")
         self.assertEqual(process.stderr.count("warning"), 2, process.stderr)
-        self.assertIn("what a surface lets through does not get its color", process.stderr)
-        self.assertIn(f"meshes[{count - 1}].primitives[0]: has no texture coordinates", process.stderr)
+        self.assertIn("transmitted light is not colored", process.stderr)
+        self.assertIn(f"meshes[{count - 1}].primitives[0]: there are no texture coordinates", process.stderr)
         _, _, pixels = npy_read("a.npy")
         for i, colors in enumerate(cells):
             for k, color in enumerate(colors):

@@ -13,8 +13,8 @@ typedef struct {
     Stage *stage; // shows what is being read; NULL: not wanted
 } SceneOptions;
 
-// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff, or one of a mesh). On a mistake in the
-// file returns false with errors in `messages` and an empty scene. Warnings may be added in either case.
+// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff, or one of a mesh). On a mistake in
+// the file returns false with errors in `messages` and an empty scene. Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // The readers, from memory; `source->file` is used in messages only.

@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// How a material looks to meshes. Those with the texture coordinates that it asks for show its texture.
+// A material. Meshes that have its set of texture coordinates show its texture.
 typedef struct {
     uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
     uint32_t texture;        // of the scene; 0: none
@@ -22,13 +22,14 @@ typedef struct {
     struct aiUVTransform uv_transform;
 } ImportedMaterial;
 
-// What glint does not show of a file: one warning for each.
+// What glint does not show. Each gets one warning.
 enum {
     LOSES_SKINS,
     LOSES_MORPHS,
     LOSES_VERTEX_COLORS,
     LOSES_EMISSION,
     LOSES_TEXTURES,
+    LOSES_TEXTURE_PLACE,
     LOSES_UV_TURN,
     LOSES_CAMERAS
 };
@@ -98,7 +99,7 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
     return otherwise;
 }
 
-// The file's own image under a name, or NULL.
+// Returns the image within the file that has a name, or NULL.
 static const struct aiTexture *embedded_texture(const struct aiScene *file, const char *name)
 {
     if (name[0] == '*') {
@@ -111,14 +112,14 @@ static const struct aiTexture *embedded_texture(const struct aiScene *file, cons
     return NULL;
 }
 
-// Adds an image, which lies where the file says or else next to the file: paths are often those of another
-// machine.
+// Adds an image. Files often hold a path of another machine, so an image that is missing there is looked for
+// next to the file.
 static uint32_t texture_add(const Importer *importer, const char *name, const char *owner)
 {
     MeshDraft *draft = importer->draft;
     const struct aiTexture *embedded = embedded_texture(importer->file, name);
     if (embedded) {
-        // one that is not compressed has no form that glint reads
+        // glint reads no image that is not compressed
         const Source bytes = {.bytes = (const char *)embedded->pcData,
                               .length = embedded->mHeight == 0 ? embedded->mWidth : 0};
         return draft_add_embedded_texture(draft, &bytes, name);
@@ -144,7 +145,7 @@ static TextureWrap wrap_of(enum aiTextureMapMode mode)
                                              : TEXTURE_REPEATED;
 }
 
-// The texture of the color; one warning for all others.
+// Reads the texture of the color, and warns about all others.
 static void textures_read(Importer *importer, const struct aiMaterial *from, const char *name,
                           ImportedMaterial *to, TextureWrap wraps[2])
 {
@@ -178,7 +179,7 @@ static Material material_of(Importer *importer, const struct aiMaterial *from)
     const Color specular = color_of(importer, from, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0}),
                 emission = color_of(importer, from, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
     material.color = color_of(importer, from, AI_MATKEY_COLOR_DIFFUSE, material.color);
-    // assimp gives a material of Lambert's a specular color as well
+    // assimp gives Lambertian materials a specular color, which they do not have
     int shading = aiShadingMode_Phong;
     aiGetMaterialIntegerArray(from, AI_MATKEY_SHADING_MODEL, &shading, NULL);
     if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
@@ -188,8 +189,7 @@ static Material material_of(Importer *importer, const struct aiMaterial *from)
         material_set_emission(&material, emission);
         importer->draft->scene->ambient = vector_all(1);
     } else if (!vector_is_zero(emission)) {
-        lose(importer, LOSES_EMISSION,
-             "emission needs a scene of its own, as by glint render FILE: lit by the lights instead");
+        lose(importer, LOSES_EMISSION, "only glint render FILE shows emission: lit by the lights instead");
     }
     const double opacity = fmin(number_of(importer, from, AI_MATKEY_OPACITY, 1), 1),
                  ior = number_of(importer, from, AI_MATKEY_REFRACTI, 0);
@@ -198,7 +198,7 @@ static Material material_of(Importer *importer, const struct aiMaterial *from)
     return material;
 }
 
-// The texture times the diffuse color.
+// Adds the material twice, without and with its texture, which is multiplied by the diffuse color.
 static void material_add(Importer *importer, const struct aiMaterial *from, ImportedMaterial *to)
 {
     struct aiString name = {0};
@@ -290,13 +290,16 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
         importer->materials ? material_use(importer, from->mMaterialIndex) : NULL;
     if (material) {
         const bool is_textured = material->texture > 0 && from->mTextureCoords[material->uv_set];
+        if (material->texture > 0 && !is_textured)
+            lose(importer, LOSES_TEXTURE_PLACE,
+                 "there are no texture coordinates for a texture: the color is used");
         array_push(draft->materials,
                    ((DraftMaterialRun){draft->face_start, material->scene_index[is_textured]}));
     }
     if (from->mNumBones > 0)
-        lose(importer, LOSES_SKINS, "skins are not applied: a mesh stands at its node, in its own shape");
+        lose(importer, LOSES_SKINS, "skins are not applied: the mesh keeps its own shape, at its node");
     if (from->mNumAnimMeshes > 0)
-        lose(importer, LOSES_MORPHS, "morph targets are not applied: a mesh has its own shape");
+        lose(importer, LOSES_MORPHS, "morph targets are not applied: the mesh keeps its own shape");
     if (from->mColors[0])
         lose(importer, LOSES_VERTEX_COLORS, "vertex colors are not used: the material's color is");
     vertices_add(draft, from, affine, material);
@@ -306,7 +309,7 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
     return true;
 }
 
-// Cameras and lights have the name of a node, in whose space they are.
+// Adds the cameras and lights that have the node's name, which are in its space.
 static void view_add(Importer *importer, const struct aiNode *node, const Affine *affine)
 {
     const struct aiScene *file = importer->file;
@@ -315,7 +318,7 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
         const struct aiCamera *camera = file->mCameras[i];
         if (strcmp(camera->mName.data, node->mName.data) != 0) continue;
         if (view->has_camera) {
-            lose(importer, LOSES_CAMERAS, "the first camera is used, and not the others");
+            lose(importer, LOSES_CAMERAS, "only the first camera is used");
             continue;
         }
         const Vector3 eye = affine_point(affine, vector_of(&camera->mPosition)),

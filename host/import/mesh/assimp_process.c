@@ -26,7 +26,7 @@ typedef struct {
     uint64_t counts[6]; // of the arrays
 } ReplyHeader;
 
-// Its bytes follow, if the image lies within the file.
+// The bytes of an image within the file follow.
 typedef struct {
     char path[1024];
     uint64_t byte_count;
@@ -206,7 +206,7 @@ static bool color_is_sound(Color color)
     return number_is_sound(color.x) && number_is_sound(color.y) && number_is_sound(color.z);
 }
 
-// The scene's index of each texture is set in `textures`. Memory grows with what arrives.
+// Sets `textures` to the scene's index of each. Memory grows with what arrives.
 static bool textures_read(MeshDraft *draft, FILE *reply, uint64_t count,
                           uint32_t textures[SCENE_TEXTURES_MAX])
 {

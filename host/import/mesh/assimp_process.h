@@ -15,7 +15,7 @@ enum { ASSIMP_MEBIBYTES_MAX = 4096, ASSIMP_PROCESSOR_SECONDS_MAX = 60, ASSIMP_SE
 // Limits this process as such a one; limits that are lower stay.
 void assimp_process_limit(void);
 
-// Whether assimp reads files of this ending.
+// Returns whether assimp reads files whose names end so.
 bool assimp_knows(const char *path);
 
 // Of assimp alone, in such a process.

@@ -90,9 +90,8 @@ size_t draft_part_count(const MeshDraft *draft, DraftPart part);
 // Gives all corners from this one on a part, and those before none.
 void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
 void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
-// Gives each position that lacks them a normal or texture coordinates of 0, up to `count` positions, which
-// from then on share their indices. A reader calls it before it adds such values and once all positions are
-// added.
+// Makes the part share the indices of the positions, and gives each of the first `count` positions that lacks
+// one a value of 0. A reader calls it before it adds values and after the last position.
 void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
 
 // The index, whose place in the file is `offset`, of the next corner; one that the file has later is checked
@@ -116,8 +115,8 @@ static inline bool draft_has(const MeshDraft *draft, DraftPart part)
     return draft->is_shared[part] || draft->corners[part].count > 0;
 }
 
-// Adds an image to the scene's textures, of a file or of bytes, which are copied. 0 with a warning where that
-// cannot be; `owner` is what messages name.
+// Adds an image to the scene's textures, from a file or from bytes, which are copied. Returns 0 with a
+// warning at `owner` if the image cannot be used.
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner);
 uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, const char *owner);
 

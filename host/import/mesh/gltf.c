@@ -1,4 +1,4 @@
-// glTF: the JSON text, its values, and what of it is not shown.
+// glTF: the JSON text, its values, and the warnings about what is not shown.
 #include "host/import/mesh/gltf.h"
 #include "host/base/memory.h"
 #include "host/import/number.h"
@@ -7,33 +7,30 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The numbers of a JSON text take some 20 times as many bytes in memory.
+// A JSON text's numbers take about 20 times its bytes in memory.
 enum { JSON_BYTES_MAX = 1 << 28 };
 
 static const char *const loss_texts[GLTF_LOSS_COUNT] = {
-    [GLTF_SKIN] = "skins are not applied: a mesh stands at its node, in its own shape",
-    [GLTF_MORPH] = "morph targets are not applied: a mesh has its own shape",
+    [GLTF_SKIN] = "skins are not applied: the mesh keeps its own shape, at its node",
+    [GLTF_MORPH] = "morph targets are not applied: the mesh keeps its own shape",
     [GLTF_VERTEX_COLOR] = "vertex colors are not used: the material's color is",
     [GLTF_POINTS] = "points and lines are not shown",
-    [GLTF_SCENES] = "one scene is shown, and not the others",
+    [GLTF_SCENES] = "only this scene is shown",
     [GLTF_ANIMATION] = "animations are not played: nodes stand as the file has them",
     [GLTF_VIEW] = "cameras and lights of a mesh are not used: those of the scene are",
-    [GLTF_CAMERAS] = "the first camera is used, and not the others",
-    [GLTF_EMISSION] =
-        "emission and unlit materials need a scene of their own, as by glint render FILE: lit by the "
-        "lights instead",
-    [GLTF_EMISSIVE_TEXTURE] =
-        "emission is shown without textures, or by one that is the base color's as well: left "
-        "out here",
+    [GLTF_CAMERAS] = "only the first camera is used",
+    [GLTF_EMISSION] = "only glint render FILE shows emission and unlit materials: lit by the lights instead",
+    [GLTF_EMISSIVE_TEXTURE] = "emission next to a different texture is not shown",
     [GLTF_UNLIT_TINT] = "the factors of an emitted texture become their mean",
     [GLTF_METAL_TEXTURE] = "the texture of metal and roughness is not used: the factors are",
-    [GLTF_METAL_COLOR] = "what a metal reflects does not get its color",
+    [GLTF_METAL_COLOR] = "reflections of metals are not colored",
     [GLTF_NORMAL_TEXTURE] = "normal textures are not used: the normals of the vertices are",
     [GLTF_OCCLUSION_TEXTURE] = "occlusion textures are not used: the lights' shadows are",
     [GLTF_TEXTURE_ALPHA] = "the alpha of textures is not used: that of baseColorFactor is",
+    [GLTF_TEXTURE_PLACE] = "there are no texture coordinates for the texture: the color is used",
     [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
-    [GLTF_ABSORPTION] = "the absorption of a volume is not used: it is clear",
-    [GLTF_GLASS_COLOR] = "what a surface lets through does not get its color",
+    [GLTF_ABSORPTION] = "absorption is not used: the volume is clear",
+    [GLTF_GLASS_COLOR] = "transmitted light is not colored",
 };
 
 static const char *const extensions_read[] = {
@@ -176,7 +173,7 @@ static bool extension_is_read(const char *name)
     return false;
 }
 
-// Names those extensions of a list that are not read, at most so many bytes.
+// Lists the extensions that are not read, up to NAMES_BYTES_MAX bytes.
 static Text extensions_unread(const json_t *list)
 {
     enum { NAMES_BYTES_MAX = 200 };
@@ -236,7 +233,8 @@ static uint32_t word_at(const char *bytes)
     return (uint32_t)byte[0] | (uint32_t)byte[1] << 8 | (uint32_t)byte[2] << 16 | (uint32_t)byte[3] << 24;
 }
 
-// A header of 12 bytes, then chunks of a length, a type and bytes: JSON first, then perhaps BIN.
+// A GLB file has a header of 12 bytes and then chunks of a length, a type and bytes: JSON first, then an
+// optional BIN.
 static bool glb_read(Gltf *gltf, const Source *source)
 {
     enum { HEADER_BYTES = 12, CHUNK_BYTES = 8, CHUNK_JSON = 0x4E4F534A, CHUNK_BINARY = 0x004E4942 };

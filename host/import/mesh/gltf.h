@@ -7,7 +7,7 @@
 
 #include <jansson.h>
 
-// A value of the JSON text, NULL where it is missing, and its path for messages, such as "nodes[3].mesh".
+// A value of the JSON text, which is NULL where it is missing, and its path for messages: "nodes[3].mesh".
 typedef struct {
     const json_t *json;
     char path[112];
@@ -16,13 +16,13 @@ typedef struct {
 typedef struct {
     const char *bytes;
     size_t length;
-    Text owned;            // what was decoded or read; else the bytes are the GLB file's
+    Text owned;            // of what was decoded or read; empty where the bytes are the GLB file's
     uint64_t device, file; // of an external file
 } GltfBuffer;
 
 enum { UV_SETS_MAX = 255 };
 
-// How a material looks to primitives. Those with the texture coordinates that it asks for show its texture.
+// A material. Primitives that have its set of texture coordinates show its texture.
 typedef struct {
     Material look;
     bool is_read;
@@ -34,7 +34,7 @@ typedef struct {
     uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
 } GltfMaterial;
 
-// What glint does not show of a file: one warning for each, at the first place.
+// What glint does not show. Each gets one warning, which names the first place in the file.
 typedef enum {
     GLTF_SKIN,
     GLTF_MORPH,
@@ -52,6 +52,7 @@ typedef enum {
     GLTF_NORMAL_TEXTURE,
     GLTF_OCCLUSION_TEXTURE,
     GLTF_TEXTURE_ALPHA,
+    GLTF_TEXTURE_PLACE,
     GLTF_NEAREST,
     GLTF_ABSORPTION,
     GLTF_GLASS_COLOR,
@@ -69,34 +70,34 @@ typedef struct {
     uint32_t *images;                 // the texture of each image; DRAFT_NONE: not read yet
     bool *is_visited;                 // by node
     unsigned losses;                  // bits
-    bool is_optional;                 // what is read: errors are warnings, and it is not used
+    bool is_optional;                 // errors in what is read now are warnings
 } Gltf;
 
-// Reports an error at the item, a warning where that is optional; always false.
+// Reports an error at the item, or a warning while `is_optional` is set. Always returns false.
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Warns once of what is not shown.
+// Warns about a loss the first time that it occurs.
 void gltf_lose(Gltf *gltf, GltfLoss loss, const GltfItem *item);
 
-// A member of an object and an element of an array.
+// Return a member of an object and an element of an array.
 GltfItem gltf_member(const GltfItem *item, const char *key);
 GltfItem gltf_element(const GltfItem *item, size_t index);
-// An element of one of the file's arrays, such as "nodes".
+// Returns an element of one of the file's arrays, such as "nodes".
 GltfItem gltf_entry(const Gltf *gltf, const char *array, size_t index);
 size_t gltf_count(const Gltf *gltf, const char *array);
-// An extension of the item, NULL where that lacks it.
+// Returns an extension of the item.
 GltfItem gltf_extension(const GltfItem *item, const char *name);
 
-// Each leaves the value unchanged where the member is missing, and reports an error and returns false where
-// it is something else.
+// These read a member. A missing one leaves the value unchanged. Each returns false with an error where the
+// member is something else.
 bool gltf_integer(Gltf *gltf, const GltfItem *item, const char *key, size_t low, size_t high, size_t *value);
-// An index into one of the file's arrays.
+// Reads an index into one of the file's arrays.
 bool gltf_index(Gltf *gltf, const GltfItem *item, const char *key, const char *array, size_t *index);
-// An element of an array that is such an index; missing is an error.
+// Reads an element of an array that is an index into one of the file's arrays. A missing element is an error.
 bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const char *array, size_t *index);
-// One number where `count` is 1, else an array of so many; each is at most NUMBER_MAX.
+// Reads one number where `count` is 1, else an array of `count` numbers, each of at most NUMBER_MAX.
 bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t count, double *values);
 
 // gltf_accessor.c
@@ -107,25 +108,25 @@ typedef struct {
     size_t count, width;
 } GltfNumbers;
 
-// Reads the accessor that a member names, of scalars or vectors of `width` components. Without the member
-// there are no rows. False with an error; the rows must be freed in any case.
+// Reads the accessor that a member names, of scalars or vectors of `width` components. There are
+// no rows without the member. Returns false with an error. The caller frees the rows in either case.
 bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width,
                         GltfNumbers *numbers);
-// What a buffer view shows of its buffer. False with an error.
+// Finds the bytes of the buffer view that a member names. Returns false with an error.
 bool gltf_view_read(Gltf *gltf, const GltfItem *item, const char *key, Source *bytes, size_t *stride);
-// Bytes of a `data:` URI. False if it is another or damaged.
+// Decodes a `data:` URI. Returns false if the URI has another scheme or is damaged.
 bool gltf_data_decode(Text *bytes, const char *uri);
-// The file that a relative URI names; NULL: it names none.
+// Returns the path of the file that a relative URI names, or NULL if it names none. The caller frees it.
 char *gltf_path(const Gltf *gltf, const char *uri);
 
 // gltf_material.c
 
-// The material of a primitive, the default where it names none or one that is not there.
+// Returns the primitive's material, or the default where it names none or a missing one.
 GltfMaterial *gltf_material(Gltf *gltf, const GltfItem *primitive);
-// Its index in the scene.
+// Returns the material's index in the scene, to which it is added on its first use.
 uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_textured);
 
 // gltf_node.c
 
-// Adds what stands in the file's scene.
+// Adds the nodes of the file's scene to the draft. Returns false with an error.
 bool gltf_scene_read(Gltf *gltf);

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-// Of lengths and offsets that the file has: their sums fit.
+// The largest length and offset that a file may have. The sum of three fits a size_t.
 static const size_t size_max = SIZE_MAX >> 2;
 
 // Numbers that accessors may have beyond the bytes of the buffers: accessors may overlap, have no buffer, or
@@ -110,7 +110,7 @@ static bool buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bo
     return true;
 }
 
-// The bytes of a buffer, which stays without any where it cannot be read.
+// Returns the buffer, which is read on its first use, or NULL with an error.
 static const GltfBuffer *buffer_open(Gltf *gltf, size_t index)
 {
     GltfBuffer *buffer = &gltf->buffers[index], read = {0};
@@ -192,17 +192,17 @@ static double component_read(const char *bytes, size_t type, bool is_normalized)
     }
 }
 
-// How numbers lie in memory: `count` elements of `width` components.
+// The layout of numbers in memory: `count` elements of `width` components.
 typedef struct {
     size_t type, width, count, stride, offset;
     bool is_normalized;
 } Layout;
 
-// Finds the elements in a buffer view. False with an error if that is too short.
+// Finds the elements in a buffer view. Returns false with an error if the view is too short.
 static bool elements_find(Gltf *gltf, const GltfItem *item, const Layout *layout, const char **bytes,
                           size_t *stride)
 {
-    Source view;
+    Source view = {.bytes = ""};
     const size_t size = layout->width * component_size(layout->type);
     *stride = size;
     if (!gltf_view_read(gltf, item, "bufferView", &view, stride)) return false;
@@ -221,7 +221,7 @@ static void elements_read(const char *bytes, const Layout *layout, size_t stride
         values[i] = component_read(bytes + row * stride + i * size, layout->type, layout->is_normalized);
 }
 
-// Replaces some elements.
+// Replaces the elements that a sparse accessor names.
 static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Layout *layout, GltfNumbers *numbers)
 {
     const GltfItem sparse = gltf_member(accessor, "sparse");
@@ -238,13 +238,13 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Layout *layo
     if (of_indices.count == 0 || component_size(of_indices.type) == 0 ||
         !json_object_get(indices.json, "bufferView") || !json_object_get(values.json, "bufferView"))
         return gltf_fails(gltf, &sparse, "lacks 'count', 'indices' or 'values'");
-    const char *index_bytes, *value_bytes;
-    size_t index_stride, value_stride;
+    const char *index_bytes = "", *value_bytes = "";
+    size_t index_stride = 0, value_stride = 0;
     if (!elements_find(gltf, &indices, &of_indices, &index_bytes, &index_stride) ||
         !elements_find(gltf, &values, &of_values, &value_bytes, &value_stride))
         return false;
     for (size_t i = 0; i < of_indices.count; i++) {
-        double row;
+        double row = 0;
         elements_read(index_bytes, &of_indices, index_stride, i, &row);
         if (!(row >= 0 && row < (double)layout->count))
             return gltf_fails(gltf, &indices, "element %zu names %.0f; there are %zu", i, row, layout->count);

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// What a material has, before it becomes one of glint's.
+// The properties of a glTF material.
 typedef struct {
     double base[4], emissive[3], emissive_strength;
     double metal, roughness, transmission, ior, thickness, cutoff;
@@ -52,7 +52,7 @@ static bool surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
     return is_sound;
 }
 
-// Adds the image to the scene's textures. 0 with a warning where that cannot be.
+// Adds the image to the scene's textures. Returns 0 with a warning if it cannot be used.
 static uint32_t image_add(Gltf *gltf, const GltfItem *image)
 {
     MeshDraft *draft = gltf->draft;
@@ -114,7 +114,7 @@ static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfMaterial *ma
     memcpy(material->uv_rows, rows, sizeof rows);
 }
 
-// The texture that a material names, if it can be shown.
+// Sets the texture that a material names, unless it cannot be used.
 static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *material)
 {
     size_t index = SIZE_MAX, source = SIZE_MAX;
@@ -162,7 +162,8 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const Surface *surface, 
         gltf_lose(gltf, GLTF_METAL_COLOR, item);
 }
 
-// Emission needs a scene of its own, whose ambient light is then 1 and lights nothing else.
+// Emission is shown as the reflection of an ambient light of 1, which no other material of the scene
+// reflects.
 static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surface, GltfMaterial *material)
 {
     Material *look = &material->look;
@@ -189,7 +190,7 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surfac
         look->specular = look->reflection = 0;
         return;
     }
-    // an emissive texture is shown where it is the base color's too, or stands alone
+    // an emissive texture is shown if it is the only texture or gives the base color
     const json_t *own = json_object_get(surface->emissive_texture.json, "index"),
                  *other = json_object_get(surface->base_texture.json, "index");
     if (own && !other && mean_of(surface->base) == 0)
@@ -266,7 +267,7 @@ GltfMaterial *gltf_material(Gltf *gltf, const GltfItem *primitive)
     return material;
 }
 
-// The texture times the factors: the color, which is that of a surface without the texture.
+// The texture is multiplied by the factors, which are the color of a primitive that does not show it.
 uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_textured)
 {
     uint32_t *index = &material->scene_index[is_textured];

@@ -9,7 +9,7 @@
 
 enum { DEPTH_MAX = 1000 };
 
-// Translation, rotation by a quaternion, and scale; or a matrix by columns.
+// Reads the node's matrix, which lies by columns, or its translation, rotation (a quaternion) and scale.
 static bool transform_read(Gltf *gltf, const GltfItem *node, Affine *affine)
 {
     double m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -37,7 +37,7 @@ static bool transform_read(Gltf *gltf, const GltfItem *node, Affine *affine)
     return true;
 }
 
-// A primitive's vertices: its own numbers and where they stand in the draft.
+// A primitive's vertices, the first of which gets the index `first` in the draft.
 typedef struct {
     GltfNumbers positions, normals, uvs, indices;
     size_t first;
@@ -58,7 +58,7 @@ static Vector3 vector_at(const GltfNumbers *numbers, size_t row)
     return (Vector3){values[0], values[1], values[2]};
 }
 
-// An attribute that the positions need not have.
+// Reads an attribute that a primitive may lack. An invalid one is left out with a warning.
 static void attribute_read(Gltf *gltf, const GltfItem *attributes, const char *key, size_t width,
                            const GltfNumbers *positions, GltfNumbers *numbers)
 {
@@ -93,7 +93,7 @@ static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMater
            gltf_fails(gltf, primitive, "too many vertices");
 }
 
-// v runs downward in glTF.
+// Adds the vertices in the world. v runs downward in glTF and upward in glint.
 static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfMaterial *material,
                          const Affine *affine)
 {
@@ -157,9 +157,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     if (read && material) {
         const uint32_t index =
             gltf_material_index(gltf, material, material->texture > 0 && vertices.uvs.count > 0);
-        if (material->texture > 0 && vertices.uvs.count == 0)
-            gltf_warn(gltf, primitive,
-                      "has no texture coordinates for its material's texture: the color is used");
+        if (material->texture > 0 && vertices.uvs.count == 0) gltf_lose(gltf, GLTF_TEXTURE_PLACE, primitive);
         array_push(draft->materials, ((DraftMaterialRun){draft->face_start, index}));
     }
     if (read) {
@@ -171,7 +169,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     return read;
 }
 
-// An eye at the node looks along its -z, with +y up.
+// Sets the camera, which looks along the node's -z axis. +y is up.
 static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
 {
     MeshView *view = gltf->draft->import->view;
@@ -218,7 +216,7 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
              gltf_numbers(gltf, &cone, "outerConeAngle", 1, &outer)) {
         outer = fmin(fmax(outer, 1e-3), M_PI / 2);
         inner = fmin(fmax(inner, 0), outer);
-        // of lux and candela a white surface sends back a part of 1 / pi
+        // a white surface reflects 1 / pi of the illuminance
         const double part = fmax(intensity, 0) / M_PI;
         const MeshLight added = {
             .light = {.kind = is_sun    ? LIGHT_DIRECTIONAL
@@ -235,7 +233,7 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
     gltf->is_optional = false;
 }
 
-// The camera and the light at a node, which a mesh of another scene has no use for.
+// Adds the node's camera and light, or warns about them if the file is a mesh of another scene.
 static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
 {
     const GltfItem extension = gltf_extension(node, "KHR_lights_punctual"), root = {.json = gltf->root},
@@ -288,7 +286,7 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     return true;
 }
 
-// The nodes of a file without scenes that are no node's children.
+// Adds the roots of all nodes, in a file that has no scenes.
 static bool roots_add(Gltf *gltf, const Affine *affine)
 {
     const size_t count = gltf_count(gltf, "nodes");

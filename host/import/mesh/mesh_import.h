@@ -14,13 +14,13 @@ typedef struct {
 // Source of shading normals: the file if it has any; none; the file, else the triangles around each vertex.
 typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 
-// A light that fades: with 1 / (fading[0] + fading[1] d + fading[2] d^2) at the distance d.
+// A light whose strength is multiplied by 1 / (fading[0] + fading[1] d + fading[2] d^2) at the distance d.
 typedef struct {
     Light light;
     double fading[3];
 } MeshLight;
 
-// What a file shows besides its triangles.
+// The camera and the lights of a file.
 typedef struct {
     Camera camera;
     bool has_camera;
@@ -42,7 +42,7 @@ typedef struct {
     size_t offset;  // of the file's name in the scene, or MESSAGE_WHOLE_FILE where the file is the scene
 } MeshImport;
 
-// Whether the ending is that of a mesh that glint reads.
+// Returns whether glint reads meshes whose names end so.
 bool mesh_is_known(const char *path);
 
 // Adds the file's triangles to the scene as one mesh and sets *index to its index. Reports an error and

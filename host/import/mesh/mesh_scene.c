@@ -1,4 +1,4 @@
-// A mesh's file as a scene: what it shows, or else a camera that frames it and two lights.
+// Scenes of one mesh, with the file's camera and lights, or a camera that frames the mesh and two lights.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/mesh_import.h"
@@ -19,14 +19,14 @@ static Vector3 mesh_center(const Mesh *mesh)
     return vector_scale(vector_add(bounds.min, bounds.max), 0.5);
 }
 
-// STL's z points upward by custom, and everyone else's y.
+// z is up in STL by custom, and y in other formats.
 static Vector3 upward(const char *path)
 {
     const char *ending = strrchr(path, '.');
     return ending && strcasecmp(ending, ".stl") == 0 ? (Vector3){0, 0, 1} : (Vector3){0, 1, 0};
 }
 
-// From the front, the right and above, so that nine tenths of the image's height show the mesh.
+// Looks from the front, the right and above. The mesh takes up to nine tenths of the image's height.
 static Camera camera_around(const Mesh *mesh, Vector3 center, Vector3 up)
 {
     const double half_tangent = 0.36397023426620234, filled = 0.9; // tan 20 degrees
@@ -48,7 +48,7 @@ static Camera camera_around(const Mesh *mesh, Vector3 center, Vector3 up)
                     .half_tangent = half_tangent};
 }
 
-// From above at the camera's left, and a third as bright from its right.
+// Adds a light from above at the camera's left, and one a third as bright from its right.
 static void lights_around(Scene *scene)
 {
     const Camera *camera = &scene->camera;
@@ -78,7 +78,7 @@ static bool light_is_sound(const Light *light)
            (light->kind != LIGHT_SPOT || has_cone);
 }
 
-// The light as it is at the center: glint's do not fade.
+// Adds the light with its strength at the center, because lights do not fade with distance in glint.
 static void light_add(Scene *scene, const MeshLight *from, Vector3 center, bool *fades)
 {
     Light light = from->light;
@@ -91,7 +91,7 @@ static void light_add(Scene *scene, const MeshLight *from, Vector3 center, bool 
     if (light_is_sound(&light)) array_push(scene->lights, light);
 }
 
-// Lights so bright or dark that nothing but white or black would be seen are scaled.
+// Adds the lights. If they would make the image white or black, they are scaled.
 static void lights_add(Scene *scene, const MeshView *view, Vector3 center, Report *report)
 {
     const double brightest = 4, darkest = 0x1p-6;
@@ -103,15 +103,18 @@ static void lights_add(Scene *scene, const MeshView *view, Vector3 center, Repor
         sum += vector_largest(scene->lights.items[i].color);
     if (fades)
         report_warning(report, MESSAGE_WHOLE_FILE,
-                       "lights do not fade with distance: each is as bright as at the center");
+                       "lights do not fade with distance: each has its strength at the center of the mesh");
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
-    report_warning(report, MESSAGE_WHOLE_FILE,
-                   "lights of %.3g in total at the center, where 1 shows white as white: scaled to 1", sum);
+    report_warning(
+        report, MESSAGE_WHOLE_FILE,
+        "lights of %.3g in total at the center, which would show little but white or black: scaled to 1",
+        sum);
     for (size_t i = 0; i < scene->lights.count; i++)
         scene->lights.items[i].color = vector_scale(scene->lights.items[i].color, 1 / sum);
 }
 
-// A camera with the frame that an orthographic one has at the center.
+// Sets the file's camera. An orthographic one becomes one in perspective that has the same frame at the
+// center.
 static void camera_set(Scene *scene, const MeshView *view, Vector3 center, Report *report)
 {
     Camera *camera = &scene->camera;
