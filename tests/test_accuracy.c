@@ -305,6 +305,32 @@ static void test_judgement(void **state)
     assert_int_equal(scene.recommendations[1].variant, 2);
     assert_int_equal(scene.recommendations[2].variant, 4);
 
+    // one run tells nothing of the times
+    assert_true(accuracy_ties(&scene.recommendations[0], 2) && accuracy_ties(&scene.recommendations[0], 4));
+    assert_false(accuracy_ties(&scene.recommendations[0], 0) || accuracy_ties(&scene.recommendations[0], 1));
+    assert_false(accuracy_ties(&scene.recommendations[1], 1));
+    assert_true(scene.recommendations[0].times[2].low == 0 &&
+                fabs(scene.recommendations[0].times[2].ratio - 1.5) < 1e-12);
+
+    // 30 rounds, in which the load varies more than the times differ: the fifth takes 4.5 times as long, and
+    // the fourth half a percent more or less
+    for (size_t i = 0; i < VARIANTS; i++) {
+        rows[i].times.frame.count = 0;
+        for (size_t round = 0; round < 30; round++)
+            series_add(&rows[i].times.frame, (i == 3 ? 2.01 + 0.02 * (double)(round % 2) : given[i].seconds) *
+                                                 (double)(1 + round % 5));
+    }
+    accuracy_judge(&scene, &budgets);
+    assert_int_equal(scene.recommendations[0].variant, 1);
+    assert_true(accuracy_ties(&scene.recommendations[0], 3));
+    assert_false(accuracy_ties(&scene.recommendations[0], 2) || accuracy_ties(&scene.recommendations[0], 4));
+    const Comparison *far = &scene.recommendations[0].times[4];
+    assert_true(far->low > 4.3 && far->low < 4.5 && far->high > 4.5 && far->high < 4.7);
+    for (size_t i = 0; i < VARIANTS; i++) {
+        rows[i].times.frame.count = 1;
+        rows[i].times.frame.items[0] = given[i].seconds;
+    }
+
     // a reference that is faster than all leaves nothing to pick but itself
     rows[4].times.frame.items[0] = 0.5;
     accuracy_judge(&scene, &budgets);

@@ -112,6 +112,23 @@ static Verdict reports_simulate(Machine old_machine, Machine new_machine, double
     return comparison.verdict;
 }
 
+// Two rows of one process in turn, the second of which takes `slowdown` times as long.
+static Verdict rounds_simulate(Machine machine, double slowdown, int rounds)
+{
+    Series times[2] = {{0}, {0}};
+    const double place[2] = {exp(machine.placement * random_normal()),
+                             slowdown * exp(machine.placement * random_normal())};
+    for (int round = 0; round < rounds; round++)
+        for (int row = 0; row < 2; row++) {
+            machine_step(&machine);
+            series_add(&times[row], place[row] * run_seconds(&machine, machine.burst_slowdown));
+        }
+    const Comparison comparison = comparison_of_rounds(&times[1], &times[0], 1, 1);
+    series_free(&times[0]);
+    series_free(&times[1]);
+    return comparison.verdict;
+}
+
 typedef struct {
     int of[VERDICT_FASTER + 1];
 } Counts;
@@ -201,6 +218,36 @@ static void test_reports_of_a_slower_build(void **state)
     assert_true(counts.of[VERDICT_SLOWER] >= TRIES * 99 / 100);
 }
 
+// Rows of one process tie unless one is slower, and no few runs tell.
+static void test_rows_of_one_process(void **state)
+{
+    (void)state;
+    const struct {
+        const char *what;
+        const Machine *machine;
+        double slowdown;
+        int rounds;
+        int slower_min, slower_max; // of TRIES
+    } cases[] = {
+        {"rows: equal, quiet", &quiet, 1, 20, 0, TRIES / 100},
+        {"rows: equal, busy", &busy, 1, 20, 0, TRIES / 100},
+        {"rows: equal, busy, long", &busy, 1, 400, 0, TRIES / 100},
+        {"rows: 10 % slower, quiet", &quiet, 1.1, 20, TRIES * 99 / 100, TRIES},
+        {"rows: 20 % slower, busy, long", &busy, 1.2, 400, TRIES * 95 / 100, TRIES},
+        {"rows: twice as slow, 7 rounds", &quiet, 2, 7, 0, 0},
+        {"rows: twice as slow, 8 rounds", &quiet, 2, 8, TRIES * 99 / 100, TRIES},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Counts counts = {{0}};
+        generator.state = 1;
+        for (int k = 0; k < TRIES; k++)
+            counts.of[rounds_simulate(*cases[i].machine, cases[i].slowdown, cases[i].rounds)]++;
+        counts_print(cases[i].what, counts);
+        assert_in_range(counts.of[VERDICT_SLOWER], cases[i].slower_min, cases[i].slower_max);
+        assert_true(counts.of[VERDICT_FASTER] <= TRIES / 100);
+    }
+}
+
 // Worked out by hand: the ends are the order statistics that the binomial distribution gives.
 static void test_intervals(void **state)
 {
@@ -242,6 +289,7 @@ int main(void)
         cmocka_unit_test(test_intervals),
         cmocka_unit_test(test_same_build_against_itself),
         cmocka_unit_test(test_slower_build_is_found),
+        cmocka_unit_test(test_rows_of_one_process),
         cmocka_unit_test(test_reports_of_one_build),
         cmocka_unit_test(test_reports_of_a_slower_build),
     };

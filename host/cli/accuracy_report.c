@@ -4,6 +4,7 @@
 #include "host/cli/report_json.h"
 #include "host/cli/version.h"
 #include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
 static const char is_reference[] =
@@ -64,7 +65,35 @@ static double frame_ms(const AccuracyVariant *variant)
     return 1e3 * series_summarize(&variant->row->times.frame).median;
 }
 
-// "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06".
+// What is certain of the picked one's time: which others tie with it, or how much longer the next one takes.
+static void pick_certainty(Text *text, const AccuracyScene *scene, const AccuracyRecommendation *picked)
+{
+    Text ties = {0}, unknown = {0};
+    size_t next = SIZE_MAX;
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        const Comparison *time = &picked->times[i];
+        if (time->ratio == 0) continue;
+        if (next == SIZE_MAX || time->ratio < picked->times[next].ratio) next = i;
+        if (!accuracy_ties(picked, i)) continue;
+        Text *list = isfinite(time->high) ? &ties : &unknown;
+        if (list->count > 0) text_appendf(list, ", ");
+        accuracy_variant_name(list, scene, &scene->variants[i]);
+        if (isfinite(time->high)) text_appendf(list, " (%.3g to %.3g times as long)", time->low, time->high);
+    }
+    if (next == SIZE_MAX) text_appendf(text, "; no other is within it");
+    if (ties.count > 0) text_appendf(text, "; ties with %s", text_c(&ties));
+    if (unknown.count > 0) text_appendf(text, "; too few runs to compare it with %s", text_c(&unknown));
+    if (next != SIZE_MAX && ties.count + unknown.count == 0) {
+        text_appendf(text, "; ");
+        accuracy_variant_name(text, scene, &scene->variants[next]);
+        text_appendf(text, " takes %.3g to %.3g times as long", picked->times[next].low,
+                     picked->times[next].high);
+    }
+    text_free(&ties);
+    text_free(&unknown);
+}
+
+// "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06; double takes 1.8 to 2.1 times as long".
 static void pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
 {
     const AccuracyRecommendation *picked = &scene->recommendations[pick];
@@ -78,9 +107,11 @@ static void pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
     text_appendf(text, ", %.3g ms", frame_ms(variant));
     if (variant->status == ACCURACY_REFERENCE) {
         text_appendf(text, ", the reference itself");
+        pick_certainty(text, scene, picked);
         return;
     }
     text_appendf(text, ", %.2g", accuracy_figure(variant, picked->measure).value);
+    pick_certainty(text, scene, picked);
     size_t objects = variant->errors.object.edge, shadows = variant->errors.shadow.edge;
     if (objects > 0)
         text_appendf(text, "; %zu %s at silhouettes %s another object", objects,
@@ -192,10 +223,12 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
         for (size_t k = 0; k < scene->variant_count; k++)
             variant_print(&scene->variants[k], stream);
         kernels_print(scene, stream);
+        fprintf(stream, "  fastest rows, with intervals of %g %% confidence for all together:\n",
+                100 * comparison_confidence);
         for (size_t k = 0; k < scene->recommendation_count; k++) {
             Text sentence = {0};
             pick_sentence(&sentence, scene, k);
-            fprintf(stream, "  %s\n", text_c(&sentence));
+            fprintf(stream, "    %s\n", text_c(&sentence));
             text_free(&sentence);
         }
     }
@@ -412,6 +445,19 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
         else
             json_number(json, "error", error.value);
         json_number(json, "frame_ms", frame_ms(variant));
+        json_begin_array(json, "others");
+        for (size_t i = 0; i < scene->variant_count; i++) {
+            const Comparison *time = &pick->times[i];
+            if (time->ratio == 0) continue;
+            json_begin_object(json, NULL);
+            json_int64(json, "variant", (int64_t)i);
+            json_bool(json, "ties", accuracy_ties(pick, i));
+            json_number(json, "ratio", time->ratio);
+            json_number(json, "low", time->low);
+            json_number(json, "high", time->high);
+            json_end(json);
+        }
+        json_end(json);
     }
     Text sentence = {0};
     pick_sentence(&sentence, scene, index);
@@ -434,6 +480,7 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
     for (size_t i = 0; i < scene->variant_count; i++)
         variant_json(json, report, index, &scene->variants[i]);
     json_end(json);
+    json_number(json, "confidence", comparison_confidence);
     json_begin_array(json, "picks");
     for (size_t i = 0; i < scene->recommendation_count; i++)
         pick_json(json, scene, i);

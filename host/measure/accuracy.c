@@ -94,7 +94,7 @@ typedef struct {
     // pixels that are compared further
     double *expected, *found; // colors of shaded ones
     float *t_relative, *t_ulps, *normal;
-} Comparison;
+} FilmComparison;
 
 static double value_error(double reference, double variant)
 {
@@ -103,7 +103,7 @@ static double value_error(double reference, double variant)
 }
 
 // The channel in which a pixel's colors differ most.
-static size_t worst_channel(const Comparison *comparison, size_t pixel)
+static size_t worst_channel(const FilmComparison *comparison, size_t pixel)
 {
     const double *reference = comparison->reference->color + 3 * pixel;
     const double *variant = comparison->variant->color + 3 * pixel;
@@ -113,14 +113,14 @@ static size_t worst_channel(const Comparison *comparison, size_t pixel)
     return worst;
 }
 
-static double color_error(const Comparison *comparison, size_t pixel)
+static double color_error(const FilmComparison *comparison, size_t pixel)
 {
     size_t value = 3 * pixel + worst_channel(comparison, pixel);
     return value_error(comparison->reference->color[value], comparison->variant->color[value]);
 }
 
 // Keeps the error if it is the worst of its kind so far; one away from edges is worse than any at them.
-static void worst_offer(const Comparison *comparison, AccuracyKind kind, size_t pixel,
+static void worst_offer(const FilmComparison *comparison, AccuracyKind kind, size_t pixel,
                         const AccuracyWorst *offered)
 {
     AccuracyWorst *worst = &comparison->errors->worst[kind];
@@ -137,7 +137,7 @@ static void worst_offer(const Comparison *comparison, AccuracyKind kind, size_t 
     }
 }
 
-static void count_wrong(const Comparison *comparison, AccuracyKind kind, EdgeCount *count, size_t pixel,
+static void count_wrong(const FilmComparison *comparison, AccuracyKind kind, EdgeCount *count, size_t pixel,
                         bool edge, const uint32_t values[2], uint32_t light)
 {
     if (edge)
@@ -154,7 +154,7 @@ static void count_wrong(const Comparison *comparison, AccuracyKind kind, EdgeCou
 
 // Returns whether every light's bit is the reference's. Where two surfaces meet, a point of the one is a
 // rounding away from lying in the other's shadow: silhouettes are edges of every shadow.
-static bool shadows_compare(const Comparison *comparison, size_t pixel)
+static bool shadows_compare(const FilmComparison *comparison, size_t pixel)
 {
     const uint32_t lights = comparison->reference->light_count;
     bool equal = true;
@@ -169,7 +169,7 @@ static bool shadows_compare(const Comparison *comparison, size_t pixel)
     return equal;
 }
 
-static bool path_compare(const Comparison *comparison, size_t pixel)
+static bool path_compare(const FilmComparison *comparison, size_t pixel)
 {
     const uint32_t values[2] = {comparison->reference->path[pixel], comparison->variant->path[pixel]};
     if (values[0] == values[1]) return true;
@@ -195,7 +195,7 @@ static double vector_angle(const double a[3], const double b[3])
     return isfinite(angle) ? angle : INFINITY;
 }
 
-static void surface_compare(const Comparison *comparison, size_t pixel)
+static void surface_compare(const FilmComparison *comparison, size_t pixel)
 {
     AccuracyErrors *errors = comparison->errors;
     const size_t place = errors->surface_pixels++;
@@ -216,7 +216,7 @@ static void surface_compare(const Comparison *comparison, size_t pixel)
     if (angle > 0) worst_offer(comparison, ACCURACY_NORMAL, pixel, &(AccuracyWorst){.error = angle});
 }
 
-static void color_offer(const Comparison *comparison, AccuracyKind kind, size_t pixel)
+static void color_offer(const FilmComparison *comparison, AccuracyKind kind, size_t pixel)
 {
     const size_t value = 3 * pixel + worst_channel(comparison, pixel);
     AccuracyWorst offered = {.error = color_error(comparison, pixel),
@@ -225,7 +225,7 @@ static void color_offer(const Comparison *comparison, AccuracyKind kind, size_t 
     if (offered.error > 0) worst_offer(comparison, kind, pixel, &offered);
 }
 
-static void pixel_compare(const Comparison *comparison, size_t pixel)
+static void pixel_compare(const FilmComparison *comparison, size_t pixel)
 {
     AccuracyErrors *errors = comparison->errors;
     color_offer(comparison, ACCURACY_IMAGE, pixel);
@@ -271,7 +271,7 @@ void accuracy_compare(AccuracyErrors *errors, const Film *reference, const Accur
     if (!reference->object) errors->why_colors_only = "the reference has colors only";
     accuracy_count_unsound(variant, &errors->nonfinite, &errors->negative);
     const size_t pixels = film_pixel_count(reference);
-    Comparison comparison = {
+    FilmComparison comparison = {
         .reference = reference,
         .variant = variant,
         .edges = edges,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "host/measure/bench.h"
+#include "host/measure/comparison.h"
 #include "host/measure/image_metrics.h"
 #include "host/render/film.h"
 #include <stdbool.h>
@@ -105,14 +106,17 @@ typedef struct {
     AccuracyErrors errors;
     float *image;          // linear, 3 per pixel; NULL where unavailable
     unsigned disqualified; // set of DISQUALIFIED_…: why its speed does not count
-    unsigned pareto;       // set of 1 << AccuracyKind: no other is as good in less time
+    unsigned pareto;       // set of 1 << AccuracyKind: no other is as good in less time, by medians
 } AccuracyVariant;
 
 // An error that a user allows, and the fastest that keeps within it.
 typedef struct {
     double budget;
     AccuracyKind measure; // shading, or image where there are colors only
-    size_t variant;       // SIZE_MAX: none
+    size_t variant;       // with the least median time of a frame; SIZE_MAX: none
+    // for each variant, its time over the picked one's; a ratio of 0: it is the picked one, or is not within
+    // the budget
+    Comparison *times;
 } AccuracyRecommendation;
 
 enum { BUDGETS_MAX = 16 };
@@ -143,9 +147,12 @@ typedef struct {
 
 void accuracy_scene_free(AccuracyScene *scene); // with its images; and zeroes
 
+// Returns whether a variant is within the pick's budget and not certainly slower than the picked one.
+bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant);
 // The plotted figure of a kind, or why there is none.
 Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);
 // From its errors, what disqualifies a variant.
 unsigned accuracy_faults(const AccuracyErrors *errors);
 // From errors and times: sets each variant's disqualified and pareto, and a recommendation for each budget.
+// The runs of the variants must have been interleaved.
 void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets);

@@ -1,5 +1,7 @@
 // What follows from the variants' errors and times together.
 #include "host/measure/accuracy.h"
+
+#include "host/base/memory.h"
 #include <stdlib.h>
 
 const char *const accuracy_kind_names[ACCURACY_KIND_COUNT] = {"object", "shadow", "path",  "shading",
@@ -11,6 +13,8 @@ void accuracy_scene_free(AccuracyScene *scene)
 {
     for (size_t i = 0; i < scene->variant_count; i++)
         free(scene->variants[i].image);
+    for (size_t i = 0; i < scene->recommendation_count; i++)
+        free(scene->recommendations[i].times);
     free(scene->variants);
     free(scene->reference.image);
     accuracy_edges_free(&scene->edges);
@@ -93,21 +97,38 @@ static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant 
     return true;
 }
 
+static bool is_within(const AccuracyVariant *variant, double budget, AccuracyKind measure)
+{
+    if (!competes(variant)) return false;
+    if (variant->status == ACCURACY_REFERENCE) return true;
+    const Figure error = accuracy_figure(variant, measure);
+    return !error.why_not && error.value <= budget;
+}
+
+// The intervals of all pairs of the scene's variants hold together, and so whichever is picked by its times.
 static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, double budget,
                                                   AccuracyKind measure)
 {
-    AccuracyRecommendation pick = {budget, measure, SIZE_MAX};
-    for (size_t i = 0; i < scene->variant_count; i++) {
-        const AccuracyVariant *variant = &scene->variants[i];
-        if (!competes(variant)) continue;
-        if (variant->status == ACCURACY_MEASURED) {
-            Figure error = accuracy_figure(variant, measure);
-            if (error.why_not || !(error.value <= budget)) continue;
-        }
-        if (pick.variant == SIZE_MAX || frame_median(variant) < frame_median(&scene->variants[pick.variant]))
+    const size_t count = scene->variant_count, pair_count = count > 1 ? count * (count - 1) / 2 : 1;
+    AccuracyRecommendation pick = {budget, measure, SIZE_MAX, NULL};
+    for (size_t i = 0; i < count; i++) {
+        if (!is_within(&scene->variants[i], budget, measure)) continue;
+        if (pick.variant == SIZE_MAX ||
+            frame_median(&scene->variants[i]) < frame_median(&scene->variants[pick.variant]))
             pick.variant = i;
     }
+    pick.times = memory_allocate_zeroed(count, sizeof *pick.times);
+    for (size_t i = 0; i < count && pick.variant != SIZE_MAX; i++)
+        if (i != pick.variant && is_within(&scene->variants[i], budget, measure))
+            pick.times[i] =
+                comparison_of_rounds(&scene->variants[i].row->times.frame,
+                                     &scene->variants[pick.variant].row->times.frame, pair_count, 1);
     return pick;
+}
+
+bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant)
+{
+    return pick->times[variant].ratio > 0 && pick->times[variant].verdict != VERDICT_SLOWER;
 }
 
 void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets)
@@ -122,6 +143,8 @@ void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets)
         for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
             if (is_pareto_optimal(scene, variant, (AccuracyKind)kind)) variant->pareto |= 1u << kind;
     }
+    for (size_t i = 0; i < scene->recommendation_count; i++)
+        free(scene->recommendations[i].times);
     AccuracyKind measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
     scene->recommendation_count = budgets->count;
     for (size_t i = 0; i < budgets->count; i++)

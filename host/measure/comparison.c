@@ -95,20 +95,36 @@ double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds
     return median;
 }
 
-// Logarithms of frame / calibration^exponent: medians of blocks in order.
-static Series report_blocks(ReportTimes times, double exponent)
+// Logarithms of seconds / divisor^exponent: medians of `block_count` blocks in order.
+static Series ratio_blocks(const Series *seconds, const Series *divisors, double exponent, size_t block_count)
 {
-    size_t count = times.frame->count;
-    if (count > times.calibration->count) count = times.calibration->count;
+    const size_t count = seconds->count < divisors->count ? seconds->count : divisors->count;
     Series blocks = {0};
-    for (size_t block = 0; block < REPORT_BLOCKS && count >= REPORT_BLOCKS; block++) {
+    for (size_t block = 0; block < block_count && count >= block_count; block++) {
         Series part = {0};
-        for (size_t i = block * count / REPORT_BLOCKS; i < (block + 1) * count / REPORT_BLOCKS; i++)
-            series_add(&part, log(times.frame->items[i]) - exponent * log(times.calibration->items[i]));
+        for (size_t i = block * count / block_count; i < (block + 1) * count / block_count; i++)
+            series_add(&part, log(seconds->items[i]) - exponent * log(divisors->items[i]));
         series_add(&blocks, series_summarize(&part).median);
         series_free(&part);
     }
     return blocks;
+}
+
+static Interval interval_widen(Interval interval)
+{
+    return (Interval){interval.low - log(process_allowance), interval.high + log(process_allowance)};
+}
+
+Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_seconds, size_t comparison_count,
+                                double tolerance)
+{
+    const size_t blocks_max = REPORT_BLOCKS;
+    Series blocks = ratio_blocks(new_seconds, old_seconds, 1,
+                                 new_seconds->count < blocks_max ? new_seconds->count : blocks_max);
+    const Interval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
+    const double log_ratio = series_summarize(&blocks).median;
+    series_free(&blocks);
+    return comparison_judge(log_ratio, interval, tolerance);
 }
 
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
@@ -117,8 +133,9 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
     Interval covering = {INFINITY, -INFINITY};
     double log_ratio = 0;
     for (int i = 0; i < 2; i++) {
-        Series new_blocks = report_blocks(new_times, i * exponent_max),
-               old_blocks = report_blocks(old_times, i * exponent_max);
+        const double exponent = i * exponent_max;
+        Series new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent, REPORT_BLOCKS),
+               old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent, REPORT_BLOCKS);
         // one of the exponents between is right, and the error is shared by two medians
         Interval new_median = median_interval(&new_blocks, row_error(row_count) / 2),
                  old_median = median_interval(&old_blocks, row_error(row_count) / 2);
@@ -128,9 +145,7 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
         series_free(&new_blocks);
         series_free(&old_blocks);
     }
-    covering.low -= log(process_allowance);
-    covering.high += log(process_allowance);
-    return comparison_judge(log_ratio, covering, tolerance);
+    return comparison_judge(log_ratio, interval_widen(covering), tolerance);
 }
 
 Verdict verdict_of_row(Verdict frame, Verdict processor)

@@ -53,6 +53,12 @@ typedef struct {
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance);
 
+// Compares two rows that one process ran in turn, so that run i of both belongs to one round: the interval is
+// that of the median ratio within a round. It is wider by the same allowance. All `comparison_count`
+// intervals hold together; with too few rounds for that they are unbounded.
+Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_seconds, size_t comparison_count,
+                                double tolerance);
+
 // Returns a row's verdict from comparisons of frame times and of processor times: slower if either is, else
 // faster if either is, else that of the frame times, since waiting does not show in processor times.
 Verdict verdict_of_row(Verdict frame, Verdict processor);

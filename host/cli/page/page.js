@@ -21,11 +21,31 @@ function budgetText(budget) {
   return Math.abs(budget / 10 ** exponent - 1) < 1e-9 ? powerOfTen(exponent) : formatNumber(budget);
 }
 
+// The picked row and those that tie with it.
+function tiedRows({ variant, others }) {
+  return [variant, ...others.filter(({ ties }) => ties).map((other) => other.variant)];
+}
+
+// What is certain of the picked row's time, with the report's confidence.
+function drawCertainty(scene, { others }) {
+  if (!others.length) return ["; no other is within it"];
+  const range = ({ low, high }) => `${formatNumber(low)} to ${formatNumber(high)} times as long`;
+  const list = (rows, words) => rows.flatMap((row, i) => [i ? ", " : words, variantName(scene, row.variant),
+                                                          row.high === null ? "" : ` (${range(row)})`]);
+  const ties = others.filter((other) => other.ties);
+  const next = others.reduce((least, other) => (other.ratio < least.ratio ? other : least));
+  return [...list(ties.filter(({ high }) => high !== null), "; ties with "),
+          ...list(ties.filter(({ high }) => high === null), "; too few runs to compare it with "),
+          ...(ties.length ? [] : ["; ", variantName(scene, next.variant), ` takes ${range(next)}`])];
+}
+
 function drawOverview() {
   const row = (scene, index) => html("tr", {},
     html("th", { scope: "row" }, html("a", { href: `#scene-${index}` }, scene.scene)),
-    ...scene.picks.map(({ variant, frame_ms: time }) =>
-      (variant === null ? html("td", {}, "none") : html("td", {}, html("span", {}, variantName(scene, variant), ","), ` ${formatMs(time)}`))));
+    ...scene.picks.map((pick) =>
+      (pick.variant === null ? html("td", {}, "none") : html("td", {},
+        ...tiedRows(pick).flatMap((variant, i) => [i ? " or " : "", html("span", {}, variantName(scene, variant))]),
+        `, ${formatMs(pick.frame_ms)}`))));
   const headings = scenes[0].picks.map(({ budget }) => html("th", { scope: "col" }, `at most ${budgetText(budget)}`));
   return html("div", { class: "table", role: "region", "aria-label": "The fastest", tabindex: 0 },
               html("table", {}, html("thead", {}, html("tr", {}, html("th", { scope: "col" }, "Scene"), ...headings)),
@@ -58,7 +78,8 @@ function drawFacts({ size: [width, height], pixels, lights, bounces, reference, 
 function drawPicks(scene) {
   const groups = [];
   for (const pick of scene.picks) {
-    if (groups.at(-1)?.[0].variant === pick.variant) groups.at(-1).push(pick);
+    const last = groups.at(-1)?.[0];
+    if (last?.variant === pick.variant && last.others?.length === pick.others?.length) groups.at(-1).push(pick);
     else groups.push([pick]);
   }
   return groups.map((picks) => {
@@ -73,6 +94,7 @@ function drawPicks(scene) {
     const { edge: objects = 0 } = errors?.object ?? {}, { edge: shadows = 0 } = errors?.shadow ?? {};
     item.append(html("strong", {}, variantName(scene, index)), `, ${formatMs(time)} per frame, `,
                 status === "reference" ? "the reference itself" : `error ${formatNumber(error)}`,
+                ...drawCertainty(scene, picks[0]),
                 objects ? `; ${plural(objects, "pixel")} at silhouettes ${objects === 1 ? "shows" : "show"} another object` : "",
                 shadows ? `; ${plural(shadows, "shadow is wrong at its edge", "shadows are wrong at their edges")}` : "", ".");
     return item;
