@@ -3,18 +3,37 @@
 arrays, a reference from a file, and what is refused. Nothing is asked of the times themselves.
 
 run_tests: sanitize-long-only"""
+import contextlib
 import json
 import math
+import os
+import pty
 import tempfile
 from collections import namedtuple
 
-from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, run, skip_all, write
+from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, read, run, skip_all, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
 MISS = 0xFFFFFFFF
 SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
 GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
 Approx = namedtuple("Approx", "value relative absolute", defaults=(0, 0))
+
+
+def terminal_run(command):
+    """What `glint COMMAND`, whose report goes to a file, prints on the terminal."""
+    terminal, end = pty.openpty()
+    with open("report.json", "w", encoding="utf-8") as report:
+        process = run(command, stdout=report, stderr=end)
+    os.close(end)
+    shown = b""
+    with contextlib.suppress(OSError):  # all is read, and nobody writes
+        while part := os.read(terminal, 4096):
+            shown += part
+    os.close(terminal)
+    assert process.returncode == 0, shown
+    json.loads(read("report.json"))
+    return shown.decode()
 
 
 def arrays_load(prefix, light_count):
@@ -253,7 +272,31 @@ class Accuracy(TestCase):
     def test_table(self):
         table = self.glint(f"accuracy {self.spheres} {SMALL} --precision double").stdout
         self.assertRegex(table, "double .* the reference")
-        self.assertRegex(table, "(?m)^  .* error of at most 1e-06: double, .* ms, the reference")
+        self.assertRegex(table, "(?m)^    for an error of at most 1e-06: double, .* ms, the reference itself; no other is within it$")
+
+    def test_ties(self):
+        """Each pick lists the other rows within its budget; two runs tell nothing of their times, and a sentence says so."""
+        for scene in self.report["scenes"]:
+            for pick in scene["picks"]:
+                within = [i for i, v in enumerate(scene["variants"]) if i != pick["variant"] and
+                          (v["status"] == "reference" or plotted(v, pick["measure"]) <= pick["budget"])]
+                self.assertEqual([other["variant"] for other in pick["others"]], within)
+                for other in pick["others"]:
+                    self.assertEqual(other["ties"], other["low"] <= 1)
+                    self.assertLessEqual(other["low"], other["ratio"])
+        scene = self.json(f"accuracy {self.spheres} --size 1920x1200 --bounces 16 --seconds 0.01 --precision single,double --json")
+        (_, pick, _), (single, double) = scene["scenes"][0]["picks"], scene["scenes"][0]["variants"]
+        self.assertLess(single["frame_ms"]["runs"], 8)
+        self.assertEqual([(other["ties"], other["high"]) for other in pick["others"]], [(True, None)])
+        self.assertRegex(pick["text"], "; too few runs to compare it with (single|double)$")
+        self.assertEqual(scene["scenes"][0]["confidence"], 0.99)
+        self.assertEqual(double["frame_ms"]["runs"], single["frame_ms"]["runs"])
+
+    def test_progress(self):
+        """On a terminal alone, on standard error, even where a report is written to a file: rows, and the time left."""
+        errors = terminal_run(f"accuracy {self.spheres} --size 1280x800 --bounces 16 --seconds 2.6 --precision single,double --json")
+        for step in "measuring rows 1 to 2 of 2", r"measuring rows 1 to 2 of 2, \d+ seconds? left", "comparing row 2 of 2":
+            self.assertRegex(errors, rf"\r *\d+ % \x1b\[K {step}")
 
     def test_budgets(self):
         """Each of the list, in its order: none is kept by all that err, and the largest by the fastest."""

@@ -240,26 +240,49 @@ static int variant_compare(Accuracy *accuracy, size_t scene_index, AccuracyVaria
     return saved ? EXIT_DONE : EXIT_USER;
 }
 
-// Compares the variants of one scene, from `first` on, with its reference.
-static int scene_compare(Accuracy *accuracy, size_t scene_index, size_t first)
+// Compares the variants of one scene with its reference.
+static int scene_compare(Accuracy *accuracy, size_t scene_index, const VariantSet *part, Progress *progress)
 {
     AccuracyScene *scene = &accuracy->scenes[scene_index];
-    const Variant *variants = &accuracy->set.variants[first];
-    int status = scene->reference.file ? EXIT_DONE : reference_render(accuracy, scene, variants);
+    const Variant *variants = part->variants;
+    const double measured = variants_measured_fraction;
+    int status = EXIT_DONE;
+    if (!scene->reference.file) {
+        progress_step(progress, variant_set_fraction(part, measured),
+                      "rendering the reference for row %zu of %zu", part->rows_before + 1, part->row_count);
+        status = reference_render(accuracy, scene, variants);
+    }
     if (status != EXIT_DONE) return status;
     const Film *reference = &accuracy->reference;
     accuracy_count_unsound(reference, &scene->reference.nonfinite, &scene->reference.negative);
     accuracy_edges_find(&scene->edges, reference);
     scene->reference.image = film_narrow_color(reference);
     if (!film_keep(accuracy, scene_index, NULL, reference)) status = EXIT_USER;
-    for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++)
+    for (size_t i = 0; i < scene->variant_count && status == EXIT_DONE; i++) {
+        const double done = measured + (1 - measured) * (double)i / (double)part->count;
+        progress_step(progress, variant_set_fraction(part, done), "comparing row %zu of %zu",
+                      part->rows_before + i + 1, part->row_count);
         status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);
+    }
     film_free(&accuracy->reference);
     if (status == EXIT_DONE) accuracy_judge(scene, &accuracy->options.budgets);
     return status;
 }
 
-// Sorts the measured variants into scenes.
+// Measures and compares the variants of one scene, from `first` on. So a slow scene takes no runs from
+// others.
+static int scene_run(Accuracy *accuracy, size_t scene_index, size_t first, Progress *progress)
+{
+    VariantSet part = variant_set_part(&accuracy->set, first, accuracy->scenes[scene_index].variant_count);
+    const bool whole =
+        variant_set_measure(&part, &accuracy->options.variants, &accuracy->open.compute, false, progress);
+    const int status = whole ? scene_compare(accuracy, scene_index, &part, progress) : EXIT_INTERRUPTED;
+    for (size_t i = 0; i < part.count; i++)
+        variant_close(&part.variants[i]);
+    return status;
+}
+
+// Sorts the variants into scenes.
 static void scenes_prepare(Accuracy *accuracy)
 {
     const VariantSet *set = &accuracy->set;
@@ -325,13 +348,11 @@ static int accuracy_run(Accuracy *accuracy)
         (page_path && !output_open(&accuracy->page, page_path, &accuracy->messages)))
         return EXIT_USER;
     Progress progress;
-    progress_open(&progress, accuracy->options.as_json);
-    bool whole =
-        variant_set_measure(set, &accuracy->options.variants, &accuracy->open.compute, false, &progress);
+    progress_open(&progress, false);
     scenes_prepare(accuracy);
-    int status = whole ? EXIT_DONE : EXIT_INTERRUPTED;
+    int status = EXIT_DONE;
     for (size_t i = 0, first = 0; i < set->scene_count && status == EXIT_DONE; i++) {
-        status = scene_compare(accuracy, i, first);
+        status = scene_run(accuracy, i, first, &progress);
         first += accuracy->scenes[i].variant_count;
     }
     progress_close(&progress);

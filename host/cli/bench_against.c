@@ -24,7 +24,7 @@ static const char greeting[] = "glint bench worker 1: %zu rows\n";
 
 int bench_work(VariantSet *set, Compute *compute)
 {
-    if (!variant_set_start(set, compute, false)) return EXIT_INTERRUPTED;
+    if (!variant_set_start(set, compute, false, NULL)) return EXIT_INTERRUPTED;
     printf(greeting, set->count);
     fflush(stdout);
     for (int byte; (byte = getchar()) != EOF;) {

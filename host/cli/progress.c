@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include <signal.h>
+#include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <unistd.h>
@@ -69,15 +70,35 @@ double progress_seconds_left(Progress *progress, double fraction_done)
     return spent < SECONDS_MIN || done <= 0 ? -1 : spent * (1 - fraction_done) / done;
 }
 
+static const double SHOW_SECONDS = 0.25;
+
+static void line_show(Progress *progress, double fraction_done, double left)
+{
+    progress->shown_seconds = clock_seconds();
+    fprintf(stderr, "\r%3.0f %% \033[K", 100 * fraction_done);
+    if (progress->step[0] != '\0') fprintf(stderr, " %s", progress->step);
+    if (left >= 0)
+        fprintf(stderr, "%s %s left ", progress->step[0] != '\0' ? "," : "", text_duration(left).text);
+    fflush(stderr);
+}
+
 void progress_show(Progress *progress, double fraction_done)
 {
-    double now = clock_seconds(), left = progress_seconds_left(progress, fraction_done);
+    const double left = progress_seconds_left(progress, fraction_done);
     // no progress for short renders, a few updates per second for long ones
-    if (!progress->visible || now - progress->shown_seconds < 0.25) return;
-    progress->shown_seconds = now;
-    fprintf(stderr, "\r%3.0f %% \033[K", 100 * fraction_done);
-    if (left >= 0) fprintf(stderr, " %s left ", text_duration(left).text);
-    fflush(stderr);
+    if (progress->visible && clock_seconds() - progress->shown_seconds >= SHOW_SECONDS)
+        line_show(progress, fraction_done, left);
+}
+
+void progress_step(Progress *progress, double fraction_done, const char *format, ...)
+{
+    const double left = fraction_done > 0 ? progress_seconds_left(progress, fraction_done) : -1;
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(progress->step, sizeof progress->step, format, arguments);
+    va_end(arguments);
+    if (progress->visible && clock_seconds() - progress->opened_seconds >= SHOW_SECONDS)
+        line_show(progress, fraction_done, left);
 }
 
 void progress_close(Progress *progress)

@@ -1,4 +1,4 @@
-// Progress of a long render, on a terminal only, and the user's interrupts.
+// Progress of a long command, on a terminal only, and the user's interrupts.
 #pragma once
 
 #include <stdbool.h>
@@ -7,6 +7,7 @@ typedef struct {
     bool visible;
     double opened_seconds, shown_seconds;
     double start_seconds, start_fraction; // from where on the time is extrapolated
+    char step[96];
 } Progress;
 
 // Lets SIGINT, SIGTERM and SIGHUP end the process with EXIT_INTERRUPTED, but for those that its parent
@@ -18,6 +19,9 @@ void progress_open(Progress *progress, bool quiet);
 // yet. What is done in the first second does not count: a kernel's build, or a checkpoint's bands.
 double progress_seconds_left(Progress *progress, double fraction_done);
 void progress_show(Progress *progress, double fraction_done);
+// Shows the progress with what happens from now on, such as "building row 2 of 8".
+void progress_step(Progress *progress, double fraction_done, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 // From here on the signals set a flag, even where progress_end_at_once is called, until they are released.
 void progress_hold_signals(void);
 void progress_release_signals(void);

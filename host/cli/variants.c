@@ -11,6 +11,8 @@
 const VariantOptions variant_options_default = {
     .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO, .bounce_count = BOUNCES_DEFAULT};
 
+const double variants_opened_fraction = 0.4, variants_measured_fraction = 0.9;
+
 enum { WARM_UP_RUNS = 3, WARM_UP_SECONDS = 2, ENOUGH_RUNS = 20 };
 
 bool option_positive(const char *option, const char *value, double *result)
@@ -140,7 +142,22 @@ bool variant_set_open(VariantSet *set, const VariantOptions *options, char *cons
         if (!scene_open(&set->scenes[i], paths[i], &options->common)) return false;
         scene_add_variants(set, options, paths[i], i);
     }
+    set->row_count = set->count;
     return true;
+}
+
+VariantSet variant_set_part(const VariantSet *set, size_t first, size_t count)
+{
+    return (VariantSet){.variants = set->variants + first,
+                        .rows = set->rows + first,
+                        .count = count,
+                        .rows_before = first,
+                        .row_count = set->count};
+}
+
+double variant_set_fraction(const VariantSet *set, double fraction_done)
+{
+    return ((double)set->rows_before + fraction_done * (double)set->count) / (double)set->row_count;
 }
 
 static bool all_converged(const VariantSet *set)
@@ -159,10 +176,14 @@ bool variant_set_round(VariantSet *set, bool warm_up)
     return true;
 }
 
-bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds)
+bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress)
 {
     for (size_t i = 0; i < set->count; i++) {
         if (progress_interrupted()) return false;
+        const double done = variants_opened_fraction * (double)i / (double)set->count;
+        if (progress)
+            progress_step(progress, variant_set_fraction(set, done), "building row %zu of %zu",
+                          set->rows_before + i + 1, set->row_count);
         variant_open(compute, &set->variants[i], &set->rows[i], timing_builds);
         if (!compute_ok(compute)) return false;
     }
@@ -176,11 +197,19 @@ bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds)
 static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progress *progress)
 {
     double start = clock_seconds(), spent = 0;
+    const size_t first = set->rows_before + 1, last = set->rows_before + set->count;
+    const double opened = variants_opened_fraction, rest = variants_measured_fraction - opened;
+    if (first == last)
+        progress_step(progress, variant_set_fraction(set, opened), "measuring row %zu of %zu", first,
+                      set->row_count);
+    else
+        progress_step(progress, variant_set_fraction(set, opened), "measuring rows %zu to %zu of %zu", first,
+                      last, set->row_count);
     while (spent < seconds && ((is_benchmark && spent < seconds / 5) || !all_converged(set))) {
         if (is_benchmark) calibration_run(&set->calibration);
         if (!variant_set_round(set, false)) return false;
         spent = clock_seconds() - start;
-        progress_show(progress, fmin(spent / seconds, 1));
+        progress_show(progress, variant_set_fraction(set, opened + rest * fmin(spent / seconds, 1)));
     }
     return true;
 }
@@ -188,8 +217,9 @@ static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progr
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress)
 {
-    if (!variant_set_start(set, compute, is_benchmark)) return false;
-    double seconds = options->seconds > 0 ? options->seconds : 5 * (double)set->count;
+    if (!variant_set_start(set, compute, is_benchmark, progress)) return false;
+    const double row_seconds = options->seconds > 0 ? options->seconds / (double)set->row_count : 5;
+    const double seconds = row_seconds * (double)set->count;
     bool whole = rounds_run(set, seconds, is_benchmark, progress);
     for (size_t i = 0; i < set->count && whole; i++)
         if (set->variants[i].renderer)
@@ -200,7 +230,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
 bool variant_set_any_measured(const VariantSet *set)
 {
     for (size_t i = 0; i < set->count; i++)
-        if (set->variants[i].renderer) return true;
+        if (!set->rows[i].failure) return true;
     return false;
 }
 

@@ -63,18 +63,27 @@ typedef struct {
     BenchRow *rows;
     size_t *scene_indices;
     size_t count;
-    Calibration calibration; // before each round of a benchmark
+    size_t rows_before, row_count; // of the set that this one is a part of
+    Calibration calibration;       // before each round of a benchmark
 } VariantSet;
 
 // Reads the scenes. False with a message if one cannot be read; the set must still be closed.
 bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
-// Opens each variant and warms it up. False if the user interrupted or the device failed.
-bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds);
+// Returns the variants of one scene as a set that shares them, for variant_set_measure. It is not closed.
+VariantSet variant_set_part(const VariantSet *set, size_t first, size_t count);
+// Opens each variant and warms it up; progress may be NULL. False if the user interrupted or the device
+// failed.
+bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress);
 // Runs every variant once. False as above.
 bool variant_set_round(VariantSet *set, bool warm_up);
-// Measures them interleaved (A B C A B C …), so that drift affects all alike, until times converge or
-// options->seconds pass. `is_benchmark`: also times the builds, and calibrates each round. False as above.
+// Measures them interleaved (A B C A B C …), so that drift affects all alike, until times converge or a share
+// of options->seconds passes. `is_benchmark`: also times the builds, and calibrates each round. False as
+// above.
+extern const double variants_opened_fraction, variants_measured_fraction; // of a row's work
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
 bool variant_set_any_measured(const VariantSet *set);
+// The share that is done where opening, measuring and comparing rows follow each other: all rows before those
+// of the set, and of each of these the fraction.
+double variant_set_fraction(const VariantSet *set, double fraction_done);
 void variant_set_close(VariantSet *set);
