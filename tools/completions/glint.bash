@@ -6,6 +6,10 @@ _glint_options() {
     glint "$1" --help | sed -n 's/^ *\(-.*\)/\1/p' | sed 's/  .*//' | grep -oE -e '--?[a-zA-Z][a-z-]*'
 }
 
+_glint_precisions() {
+    glint "$1" --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'fast|single|strict|double|certified'
+}
+
 _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
@@ -16,7 +20,7 @@ _glint() {
     # bash splits --option=value into three words.
     if [ "$word" = = ]; then word=; elif [ "$before" = = ]; then before=${COMP_WORDS[COMP_CWORD - 2]}; fi
     case $before in
-    --precision) words="fast single strict double certified" ;;
+    --precision) words=$(_glint_precisions "$subcommand") ;;
     --lanes) words="1 4 8 16" ;;
     --bvh) words="auto on off" ;;
     --bits) words="8 16" ;;

@@ -4,6 +4,11 @@ function __glint_options
     glint (commandline -opc)[2] --help | string replace -rf '^ +(?:-\w, )?(--[a-z-]+)\S*(?: \S+)?(?:  +(.*))?$' '$1\t$2'
 end
 
+function __glint_precisions
+    glint (commandline -opc)[2] --help | string match -e -- --precision | string replace -r ' \(.*' '' |
+        string match -ar 'fast|single|strict|double|certified'
+end
+
 function __glint_aovs
     glint render --help | string replace -rf '^ {26}(\w+): .*' '$1'
 end
@@ -17,7 +22,7 @@ complete -c glint -f
 complete -c glint -n __fish_use_subcommand -a '(glint --help | string replace -rf "^  (\w+)  +(.*)" "\$1\t\$2")'
 complete -c glint -n 'not __fish_use_subcommand; and string match -q -- "-*" (commandline -ct)' -a '(__glint_options)'
 complete -c glint -n 'not __fish_use_subcommand; and not __glint_after --precision --lanes --bvh --bits --transfer --aov' -F
-complete -c glint -n '__glint_after --precision' -a 'fast single strict double certified'
+complete -c glint -n '__glint_after --precision' -a '(__glint_precisions)'
 complete -c glint -n '__glint_after --lanes' -a '1 4 8 16'
 complete -c glint -n '__glint_after --bvh' -a 'auto on off'
 complete -c glint -n '__glint_after --bits' -a '8 16'

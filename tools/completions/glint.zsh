@@ -11,7 +11,9 @@ _glint() {
     local option=$words[CURRENT-1]
     if compset -P '--*='; then option=${IPREFIX%=}; fi
     case $option in
-    --precision) compadd fast single strict double certified ;;
+    --precision)
+        compadd ${(f)"$(glint $words[2] --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'fast|single|strict|double|certified')"}
+        ;;
     --lanes) compadd 1 4 8 16 ;;
     --bvh) compadd auto on off ;;
     --bits) compadd 8 16 ;;
