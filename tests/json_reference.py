@@ -106,6 +106,7 @@ MEANINGS = {
     "pilot.metric": "text; `rmse`, `max` or `flip`",
     "pilot.confidence": "number; that all bounds hold",
     "pilot.pixels": "count; rendered at each precision",
+    "pilot.color_max": "number or null; the largest channel that lights and materials allow",
     "pilot.{total_ms,build_ms}": "number; building or loading kernels is part of it",
     "pilot.candidates[]": "object; one of each precision",
     "pilot.candidates[].status": "text; `measured`, `untried` (a cheaper one keeps the budget, or no sample can show that it does) or `unavailable`",

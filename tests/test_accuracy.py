@@ -318,7 +318,7 @@ class Accuracy(TestCase):
                 candidates = {candidate["precision"]: candidate for candidate in pilot["candidates"]}
                 self.assertTrue(candidates[chosen]["keeps"])
                 self.assertIn(only, (None, chosen))
-                self.assertEqual((pilot["limit"], pilot["metric"], pilot["pixels"]), (float(limit), metric or "rmse", 32 * 21))
+                self.assertEqual((pilot["limit"], pilot["metric"], pilot["pixels"]), (float(limit), metric or "rmse", 32 * 21 + 96))
                 texts = png_read("chosen.png")[2]
                 self.assertEqual(texts["Precision"], chosen)
                 self.assertEqual(texts["Budget"], f"{float(limit):g} {pilot['metric']}")
@@ -327,6 +327,8 @@ class Accuracy(TestCase):
                 error = {"rmse": np.sqrt(np.mean((image - reference) ** 2)), "max": np.abs(image - reference).max(),
                          "flip": flip(*(srgb_encode(np.clip(light, 0, 1)) for light in (reference, image)))[1]}[pilot["metric"]]
                 self.assertLessEqual(error, float(limit))
+                self.assertLessEqual(image.max(), pilot["color_max"])
+                self.assertLess(pilot["color_max"], 3 * image.max(), "no lazy bound")
 
     def test_max_error_refused(self):
         for wrong in "", "0", "-1", "nan", "inf", "0.1x", "0.1:", "0.1:psnr":

@@ -1,4 +1,5 @@
 // The sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it chooses.
+#include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/measure/pilot.h"
 #include "tests/film.h"
@@ -111,27 +112,79 @@ static void verdicts_of_a_sample(void **state)
     const double floor_of_none = sqrt(pow(0.05, -1.0 / COUNT) - 1);
     Film reference = film_of(colors, COUNT), equal = film_of(wrong, COUNT);
     ErrorBudget budget = {0.2, ERROR_RMSE};
-    SampleVerdict verdict = sample_judge(&budget, &reference, &equal, 0.05, false);
+    Sampling sampling = {.drawn = COUNT, .drawn_share = 1, .color_max = 3, .risk = 0.05};
+    assert_true(fabs(sample_rmse_floor(&sampling) - 3 * floor_of_none) < 1e-9);
+    SampleVerdict verdict = sample_judge(&budget, &reference, &equal, &sampling);
     assert_true(verdict.error == 0 && verdict.keeps);
-    assert_true(fabs(verdict.bound - 2 * floor_of_none) < 1e-9);
-    budget.limit = 0.1;
-    assert_false(sample_judge(&budget, &reference, &equal, 0.05, false).keeps);
+    assert_true(fabs(verdict.bound - 3 * floor_of_none) < 1e-9);
+    budget.limit = 0.15;
+    assert_false(sample_judge(&budget, &reference, &equal, &sampling).keeps);
     budget = (ErrorBudget){1e-9, ERROR_MAX};
-    verdict = sample_judge(&budget, &reference, &equal, 0.05, false);
+    verdict = sample_judge(&budget, &reference, &equal, &sampling);
     assert_true(verdict.keeps && fabs(verdict.bound - floor_of_none * floor_of_none) < 1e-9);
     wrong[0] += 0.5;
     Film off = film_of(wrong, COUNT);
-    verdict = sample_judge(&budget, &reference, &off, 0.05, false);
+    verdict = sample_judge(&budget, &reference, &off, &sampling);
     assert_true(!verdict.keeps && verdict.error == 0.5 && verdict.bound > 2 * floor_of_none * floor_of_none);
     budget = (ErrorBudget){0.5, ERROR_FLIP};
-    verdict = sample_judge(&budget, &reference, &off, 0.05, false);
+    verdict = sample_judge(&budget, &reference, &off, &sampling);
     assert_true(verdict.keeps && verdict.error > 0 && verdict.error < 1e-3 && verdict.bound > 0.07);
+
+    // what is no sample counts as it is: an error of 0.5 in a channel of a pixel that is all of the rest
+    Film turned = film_of(wrong + 3, COUNT - 1), turned_reference = film_of(colors + 3, COUNT - 1);
+    const Sampling most = {.drawn = COUNT - 1, .drawn_share = 0.999, .color_max = 3, .risk = 0.05};
+    const double drawn_bound =
+        sample_judge(&(ErrorBudget){1, ERROR_RMSE}, &turned_reference, &turned, &most).bound;
+    memmove(reference.color, reference.color + 3, 3 * (COUNT - 1) * sizeof *colors);
+    memmove(off.color, off.color + 3, 3 * (COUNT - 1) * sizeof *colors);
+    for (size_t i = 0; i < 3; i++) {
+        reference.color[3 * (COUNT - 1) + i] = colors[i];
+        off.color[3 * (COUNT - 1) + i] = wrong[i];
+    }
+    verdict = sample_judge(&(ErrorBudget){1, ERROR_RMSE}, &reference, &off, &most);
+    assert_true(fabs(verdict.bound * verdict.bound - drawn_bound * drawn_bound - 0.001 * 0.25 / 3) < 1e-9);
+
     off.color[5] = NAN;
-    assert_true(isinf(sample_judge(&budget, &reference, &off, 0.05, false).bound));
-    assert_false(sample_judge(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &off, 0.05, false).keeps);
+    assert_true(isinf(sample_judge(&budget, &reference, &off, &sampling).bound));
+    assert_false(sample_judge(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &off, &sampling).keeps);
+    sampling.color_max = INFINITY;
+    assert_false(sample_judge(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &equal, &sampling).keeps);
+    assert_true(sample_judge(&(ErrorBudget){10, ERROR_MAX}, &reference, &equal, &sampling).keeps);
     film_free(&reference);
     film_free(&equal);
     film_free(&off);
+    film_free(&turned);
+    film_free(&turned_reference);
+}
+
+// By hand, per channel: the larger square, in all lights, and half of that again in each of two mirrors.
+static void scene_bounds_its_colors(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 60}\n"
+        "background: [0, 9, 0]\n"
+        "ambient: [0.1, 0.1, 0.1]\n"
+        "lights:\n"
+        "  - point: {position: [3, 4, -5], intensity: 2}\n"
+        "  - directional: {direction: [0, -1, 0.3], color: [1, 0, 0]}\n"
+        "objects:\n"
+        "  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {checker: {colors: [[1, 0, 0], [0.5, 0, "
+        "0.5]], size: 1},\n"
+        "            specular: 100, diffuse: 0.5, reflection: 0.3, transmission: 0.2, shininess: 1.0e15}}\n";
+    Scene scene = scene_of_text("a.yaml", text);
+    MessageList messages = {0};
+    const double red = 0.1 + 3 * (0.5 + 100), blue = 0.05 + 2 * (0.25 + 100);
+    for (uint32_t bounces = 0; bounces < 3; bounces++) {
+        const CompileSettings settings = {
+            .width = 9, .height = 9, .sample_count = 1, .lanes = 4, .bounce_count = bounces};
+        CompiledScene compiled;
+        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+        const double halves = 2 - pow(0.5, bounces);
+        assert_true(blue < red && fabs(compiled.color_max / (1.01 * red * halves) - 1) < 1e-12);
+        compiled_scene_free(&compiled);
+    }
+    scene_free(&scene);
 }
 
 // No sample this small proves an RMSE of 1e-6, and every precision keeps one of a thousand.
@@ -146,7 +199,8 @@ static void pilot_chooses(void **state)
     assert_true(
         pilot_run(&pilot, &(ErrorBudget){1e-6, ERROR_RMSE}, &probe_compute, &scene, &settings, &messages));
     assert_int_equal(pilot.chosen, PRECISION_DOUBLE);
-    assert_int_equal(pilot.pixels, (WIDTH / 3) * (HEIGHT / 3));
+    // 2 columns and 2 rows fill no square
+    assert_int_equal(pilot.pixels, (WIDTH / 3) * (HEIGHT / 3) + WIDTH * HEIGHT - (WIDTH - 2) * (HEIGHT - 2));
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         const PilotCandidate *candidate = &pilot.candidates[i];
         assert_int_equal(candidate->status, i == PRECISION_DOUBLE ? PILOT_MEASURED : PILOT_UNTRIED);
@@ -159,6 +213,20 @@ static void pilot_chooses(void **state)
     assert_int_equal(pilot.candidates[PRECISION_SINGLE].status, PILOT_MEASURED);
     assert_true(pilot.candidates[PRECISION_SINGLE].verdict.error < 1e-3);
     assert_int_equal(pilot.candidates[PRECISION_STRICT].status, PILOT_UNTRIED);
+
+    // a highlight of less than a pixel may be anywhere: what is not sampled may be as bright as it
+    const ErrorBudget budget = {0.1, ERROR_RMSE};
+    settings = film_settings(320, 240, PRECISION_FAST);
+    assert_true(pilot_run(&pilot, &budget, &probe_compute, &scene, &settings, &messages));
+    assert_true(pilot.chosen != PRECISION_DOUBLE && pilot.candidates[pilot.chosen].verdict.bound <= 0.1);
+    for (size_t i = 0; i < scene.materials.count; i++) {
+        scene.materials.items[i].specular = 1000;
+        scene.materials.items[i].shininess = 1e15;
+    }
+    assert_true(pilot_run(&pilot, &budget, &probe_compute, &scene, &settings, &messages));
+    assert_int_equal(pilot.chosen, PRECISION_DOUBLE);
+    assert_int_equal(pilot.candidates[PRECISION_SINGLE].status, PILOT_UNTRIED);
+    assert_true(pilot.color_max > 1000);
     assert_int_equal(messages.count, 0);
     scene_free(&scene);
 }
@@ -166,11 +234,9 @@ static void pilot_chooses(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sample_has_a_pixel_of_each_cell),
-        cmocka_unit_test(bound_of_zeros_and_ones),
-        cmocka_unit_test(bound_covers_the_mean),
-        cmocka_unit_test(verdicts_of_a_sample),
-        cmocka_unit_test(pilot_chooses),
+        cmocka_unit_test(sample_has_a_pixel_of_each_cell), cmocka_unit_test(bound_of_zeros_and_ones),
+        cmocka_unit_test(bound_covers_the_mean),           cmocka_unit_test(verdicts_of_a_sample),
+        cmocka_unit_test(scene_bounds_its_colors),         cmocka_unit_test(pilot_chooses),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -249,6 +249,7 @@ static void pilot_json(Json *json, const Pilot *pilot)
     json_text(json, "metric", error_metric_names[pilot->budget.metric]);
     json_number(json, "confidence", pilot->confidence);
     json_int64(json, "pixels", (int64_t)pilot->pixels);
+    json_number(json, "color_max", pilot->color_max);
     json_number(json, "total_ms", 1e3 * pilot->seconds);
     json_number(json, "build_ms", 1e3 * pilot->build_seconds);
     json_begin_array(json, "candidates");

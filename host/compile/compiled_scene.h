@@ -28,9 +28,10 @@ typedef enum {
     FLAT_FIRST_SHAPE = FLAT_HEADER + 1
 } FlatKind;
 
-// A texture's full size, and its levels in FLAT_TEXTURE_LEVELS.
+// A texture's full size, its levels in FLAT_TEXTURE_LEVELS, and its largest channel.
 typedef struct CompiledTexture {
     uint32_t width, height, first_level, level_count;
+    float largest_texel;
 } CompiledTexture;
 
 typedef struct {
@@ -48,6 +49,7 @@ typedef struct {
     uint32_t cull_sphere_count;      // of each common origin
     Vector3 eye;                     // from which the arrays are seen; NAN: a move failed
     Vector3 eye_offset;              // of the camera's eye from there; 0 unless a preview
+    double color_max;                // the largest channel that a pixel can have
     Bounds contact;                  // where transparent and opaque primitives may touch
 } CompiledScene;
 

@@ -132,6 +132,15 @@ static bool texture_read(Image *image, const SceneTexture *texture, MessageList 
     return image_read_layer(image, texture->path, texture->layer, messages);
 }
 
+// A coarser level's texels are means.
+static float largest_texel(const Level *level)
+{
+    float largest = 0;
+    for (size_t i = 0; i < (size_t)level->width * level->height; i++)
+        largest = fmaxf(largest, fmaxf(level->colors[i][0], fmaxf(level->colors[i][1], level->colors[i][2])));
+    return largest;
+}
+
 static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
                         const SceneTexture *scene_texture, MessageList *messages)
 {
@@ -142,10 +151,12 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
     bool done = texture_read(&image, scene_texture, &problems);
     if (done) {
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
-        *texture = (CompiledTexture){image.width, image.height, first_level,
-                                     (uint32_t)list->levels.count - first_level};
-        image_free(&image);
         done = !problem;
+        if (done)
+            *texture = (CompiledTexture){image.width, image.height, first_level,
+                                         (uint32_t)list->levels.count - first_level,
+                                         largest_texel(&list->levels.items[first_level])};
+        image_free(&image);
         if (problem)
             message_add_at(messages, MESSAGE_ERROR, &source, scene_texture->offset, "cannot use '%s': %s",
                            scene_texture->path, problem);

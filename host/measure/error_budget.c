@@ -63,16 +63,13 @@ static double largest_error(const double reference[3], const double test[3])
                 fmax(fabs(test[1] - reference[1]), fabs(test[2] - reference[2])));
 }
 
-// Of the colors of both films; not finite if one of them is not.
-static double color_range(const Film *reference, const Film *sample)
+// Infinite if a color is not finite.
+static double largest_channel(const Film *film)
 {
-    double low = INFINITY, high = -INFINITY, sum = 0;
-    for (size_t i = 0; i < 3 * film_pixel_count(reference); i++) {
-        low = fmin(low, fmin(reference->color[i], sample->color[i]));
-        high = fmax(high, fmax(reference->color[i], sample->color[i]));
-        sum += reference->color[i] + sample->color[i]; // fmin and fmax ignore a NaN
-    }
-    return isfinite(sum) ? high - low : INFINITY;
+    double largest = 0;
+    for (size_t i = 0; i < 3 * film_pixel_count(film); i++)
+        largest = isfinite(film->color[i]) ? fmax(largest, fabs(film->color[i])) : INFINITY;
+    return largest;
 }
 
 // Of one pixel, within 0..1: what the bound is computed of.
@@ -92,19 +89,35 @@ static double pixel_share(const ErrorBudget *budget, const double reference[3], 
     }
 }
 
-SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample, double risk,
-                           bool display_values)
+double sample_rmse_floor(const Sampling *sampling)
 {
-    const size_t count = film_pixel_count(reference);
-    const double range = color_range(reference, sample);
-    if (!isfinite(range)) return (SampleVerdict){.error = INFINITY, .bound = INFINITY};
-    double *shares = memory_allocate(count, sizeof *shares), mean = 0;
-    for (size_t i = 0; i < count; i++) {
-        shares[i] =
-            pixel_share(budget, reference->color + 3 * i, sample->color + 3 * i, range, display_values);
-        mean += shares[i] / (double)count;
-    }
-    const double bound = mean_upper_bound(shares, count, risk);
+    const double share = sampling->drawn > 0 ? expm1(-log(sampling->risk) / (double)sampling->drawn) : 1;
+    return sampling->color_max * sqrt(sampling->drawn_share * fmin(share, 1));
+}
+
+static double mean_of(const double *values, size_t count)
+{
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += values[i];
+    return count > 0 ? sum / (double)count : 0;
+}
+
+SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample,
+                           const Sampling *sampling)
+{
+    const size_t count = film_pixel_count(reference), drawn = sampling->drawn;
+    const double seen = fmax(largest_channel(reference), largest_channel(sample));
+    const double range = fmax(sampling->color_max, seen);
+    if (!isfinite(seen) || (budget->metric == ERROR_RMSE && !isfinite(range)))
+        return (SampleVerdict){.error = INFINITY, .bound = INFINITY};
+    double *shares = memory_allocate(count, sizeof *shares);
+    for (size_t i = 0; i < count; i++)
+        shares[i] = pixel_share(budget, reference->color + 3 * i, sample->color + 3 * i, range,
+                                sampling->display_values);
+    const double part = sampling->drawn_share, rest = (1 - part) * mean_of(shares + drawn, count - drawn);
+    const double mean = part * mean_of(shares, drawn) + rest;
+    const double bound = rest + (drawn > 0 ? part * mean_upper_bound(shares, drawn, sampling->risk) : 0);
     const ErrorSummary summary = error_summarize(reference->color, sample->color, 3 * count);
     free(shares);
     switch (budget->metric) {

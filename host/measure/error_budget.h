@@ -31,7 +31,18 @@ typedef struct {
     bool keeps; // the bound is within the limit; of ERROR_MAX: no pixel of the sample is beyond it
 } SampleVerdict;
 
-// `reference` and `sample` are of the same pixels, independently drawn. Assumes that no pixel is off by more
-// than the range of the sample's colors. `display_values`: see accuracy_compare.
-SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample, double risk,
-                           bool display_values);
+// How an image was sampled.
+typedef struct {
+    size_t drawn;        // the first pixels of the sample: one each from equal parts of the image, at random
+    double drawn_share;  // of the image that these parts cover; the other pixels of the sample are the rest
+    double color_max;    // no channel of the image is larger, or below 0
+    double risk;         // of a bound that does not hold
+    bool display_values; // see accuracy_compare
+} Sampling;
+
+// Returns the bound of an image's RMSE if all pixels of the sample are alike: no sample shows a lower one.
+double sample_rmse_floor(const Sampling *sampling);
+
+// `reference` and `sample` are of the same pixels.
+SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample,
+                           const Sampling *sampling);

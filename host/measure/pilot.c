@@ -2,6 +2,7 @@
 
 #include "host/base/clock.h"
 #include <math.h>
+#include <string.h>
 
 // Enough pixels that a wrong one in 25,000 would be seen; few enough to cost a small part of the image.
 enum { PIXELS_WANTED = 100000, CELL_MIN = 3, CELL_MAX = 4096 };
@@ -9,12 +10,63 @@ static const double pilot_confidence = 0.95;
 // Times differ by as much from run to run: no reason for less precision.
 static const double time_tolerance = 1.1;
 
-static uint32_t cell_choose(const RenderSettings *settings)
+static uint32_t cell_for(const RenderSettings *settings, double pixels_wanted)
 {
     const double pixels = (double)settings->region_width * settings->region_height;
-    uint32_t cell = (uint32_t)fmin(fmax(floor(sqrt(pixels / PIXELS_WANTED)), CELL_MIN), CELL_MAX);
+    uint32_t cell = (uint32_t)fmin(fmax(floor(sqrt(pixels / pixels_wanted)), CELL_MIN), CELL_MAX);
     while (cell > 1 && (cell > settings->region_width || cell > settings->region_height))
         cell--;
+    return cell;
+}
+
+// The squares of the image, of which one pixel each is rendered.
+static RenderSettings squares_of(const RenderSettings *settings, uint32_t cell)
+{
+    RenderSettings squares = *settings;
+    squares.cell = cell;
+    squares.region_width /= cell;
+    squares.region_height /= cell;
+    return squares;
+}
+
+enum { REST_COUNT = 2 };
+
+// What the squares leave: columns at the right, and rows at the bottom.
+static void rest_of(const RenderSettings *settings, uint32_t cell, RenderSettings rest[REST_COUNT])
+{
+    const uint32_t columns = settings->region_width % cell, rows = settings->region_height % cell;
+    RenderSettings *right = &rest[0], *bottom = &rest[1];
+    *right = *bottom = *settings;
+    right->region_x += settings->region_width - columns;
+    right->region_width = columns;
+    bottom->region_y += settings->region_height - rows;
+    bottom->region_width -= columns;
+    bottom->region_height = rows;
+}
+
+static Sampling sampling_of(const Pilot *pilot, const RenderSettings *settings, uint32_t cell)
+{
+    const RenderSettings squares = squares_of(settings, cell);
+    const size_t drawn = (size_t)squares.region_width * squares.region_height;
+    return (Sampling){.drawn = drawn,
+                      .drawn_share = (double)drawn * cell * cell / (double)pilot->image_pixels,
+                      .color_max = pilot->color_max,
+                      // all bounds hold together
+                      .risk = (1 - pilot->confidence) / (ARITHMETIC_COUNT - 1)};
+}
+
+// Where more pixels than usual can show that an RMSE is kept, as many as show it even if some of them err.
+static uint32_t cell_choose(const Pilot *pilot, const RenderSettings *settings)
+{
+    static const double margin = 0.7;
+    const uint32_t usual = cell_for(settings, PIXELS_WANTED), least = cell_for(settings, INFINITY);
+    const Sampling most = sampling_of(pilot, settings, least);
+    if (pilot->budget.metric != ERROR_RMSE || sample_rmse_floor(&most) > pilot->budget.limit) return usual;
+    uint32_t cell = usual;
+    for (; cell > least; cell--) {
+        const Sampling sampling = sampling_of(pilot, settings, cell);
+        if (sample_rmse_floor(&sampling) <= margin * pilot->budget.limit) break;
+    }
     return cell;
 }
 
@@ -45,27 +97,63 @@ static double pixel_seconds(const SampleFilm *sample)
     return (sample->last_seconds - sample->first_seconds) / (double)(sample->pixels - sample->first_pixels);
 }
 
-// Renders the sample. False as pilot_run; there is nothing to free then.
-static bool sample_render(Pilot *pilot, Precision precision, SampleFilm *sample, Compute *compute,
-                          const Scene *scene, RenderSettings settings, MessageList *messages)
+// Renders what the squares leave, behind the pixels drawn from them.
+static bool rest_render(Renderer *renderer, Film *film, size_t drawn, const Scene *scene,
+                        const RenderSettings *settings, uint32_t cell, MessageList *messages)
+{
+    RenderSettings rest[REST_COUNT];
+    rest_of(settings, cell, rest);
+    double *colors = film->color + 3 * drawn;
+    for (int i = 0; i < REST_COUNT; i++) {
+        Film part;
+        if (rest[i].region_width == 0 || rest[i].region_height == 0) continue;
+        if (!renderer_move(renderer, scene, &rest[i], messages) || !renderer_render_film(renderer, 0, &part))
+            return false;
+        const size_t count = 3 * film_pixel_count(&part);
+        memcpy(colors, part.color, count * sizeof *colors);
+        colors += count;
+        film_free(&part);
+    }
+    return true;
+}
+
+// Renders the sample into a film of one row. False as pilot_run; there is nothing to free then.
+static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute *compute, const Scene *scene,
+                          RenderSettings settings, MessageList *messages)
 {
     PilotCandidate *candidate = &pilot->candidates[precision];
     candidate->status = PILOT_UNAVAILABLE;
     settings.precision = precision;
     if (precision == PRECISION_DOUBLE) settings.perturb_seed = settings.perturb_scale = 0;
-    Renderer *renderer = renderer_open(compute, scene, &settings, messages);
+    uint32_t cell = pilot->cell > 0 ? pilot->cell : cell_for(&settings, PIXELS_WANTED);
+    RenderSettings squares = squares_of(&settings, cell);
+    Renderer *renderer = renderer_open(compute, scene, &squares, messages);
     if (!renderer) return false;
-    *sample =
-        (SampleFilm){.film = film_allocate(settings.region_width, settings.region_height, 0, AOV_COLOR)};
-    bool whole = renderer_render(renderer, 0, sample_take, sample);
-    if (whole && sample->pixels == sample->first_pixels)
-        whole = renderer_render(renderer, 0, sample_take, sample);
+    bool whole = true;
+    if (pilot->cell == 0) {
+        pilot->color_max = renderer_color_max(renderer);
+        pilot->cell = cell_choose(pilot, &settings);
+        squares = squares_of(&settings, pilot->cell);
+        whole = pilot->cell == cell || renderer_move(renderer, scene, &squares, messages);
+        cell = pilot->cell;
+    }
+    SampleFilm sample = {.film = film_allocate(squares.region_width, squares.region_height, 0, AOV_COLOR)};
+    whole = whole && renderer_render(renderer, 0, sample_take, &sample);
+    if (whole && sample.pixels == sample.first_pixels)
+        whole = renderer_render(renderer, 0, sample_take, &sample);
+    const size_t drawn = film_pixel_count(&sample.film);
+    const size_t rest = pilot->image_pixels - drawn * cell * cell;
+    *film = film_allocate((uint32_t)(drawn + rest), 1, 0, AOV_COLOR);
+    memcpy(film->color, sample.film.color, 3 * drawn * sizeof *film->color);
+    film_free(&sample.film);
+    whole = whole && rest_render(renderer, film, drawn, scene, &settings, cell, messages);
     if (whole) {
         candidate->status = PILOT_MEASURED;
-        candidate->pixel_seconds = pixel_seconds(sample);
+        candidate->pixel_seconds = pixel_seconds(&sample);
+        pilot->pixels = drawn + rest;
         pilot->build_seconds += renderer_report(renderer)->build_seconds;
     } else {
-        film_free(&sample->film);
+        film_free(film);
     }
     renderer_close(renderer);
     return whole;
@@ -90,16 +178,15 @@ static Precision fastest_choose(const Pilot *pilot)
 static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *compute, const Scene *scene,
                                const RenderSettings *settings)
 {
-    // all bounds hold together
-    const double risk = (1 - pilot->confidence) / (ARITHMETIC_COUNT - 1);
-    const bool is_display = scene->color_meaning == COLORS_DISPLAY;
-    if (!sample_judge(&pilot->budget, reference, reference, risk, is_display).keeps) return true;
+    Sampling sampling = sampling_of(pilot, settings, pilot->cell);
+    sampling.display_values = scene->color_meaning == COLORS_DISPLAY;
+    if (!sample_judge(&pilot->budget, reference, reference, &sampling).keeps) return true;
     bool is_kept = false;
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         if (i == PRECISION_DOUBLE) continue;
         // those beyond single do more work than it, and build another kernel
         if (i > PRECISION_SINGLE && is_kept) break;
-        SampleFilm sample;
+        Film sample;
         MessageList unfit = {0};
         const bool whole = sample_render(pilot, (Precision)i, &sample, compute, scene, *settings, &unfit);
         const bool is_unfit = unfit.count > 0;
@@ -107,9 +194,9 @@ static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *com
         if (!whole && is_unfit) continue;
         if (!whole) return false;
         PilotCandidate *candidate = &pilot->candidates[i];
-        candidate->verdict = sample_judge(&pilot->budget, reference, &sample.film, risk, is_display);
+        candidate->verdict = sample_judge(&pilot->budget, reference, &sample, &sampling);
         is_kept = is_kept || candidate->verdict.keeps;
-        film_free(&sample.film);
+        film_free(&sample);
     }
     return true;
 }
@@ -118,22 +205,19 @@ bool pilot_run(Pilot *pilot, const ErrorBudget *budget, Compute *compute, const 
                const RenderSettings *settings, MessageList *messages)
 {
     const double start = clock_seconds();
-    RenderSettings sparse = *settings;
-    sparse.cell = cell_choose(settings);
-    sparse.region_width /= sparse.cell;
-    sparse.region_height /= sparse.cell;
-    sparse.hashes_scene = false;
+    RenderSettings own = *settings;
+    own.hashes_scene = false;
+    own.moves = true;
     *pilot = (Pilot){
         .budget = *budget,
         .confidence = pilot_confidence,
-        .pixels = (size_t)sparse.region_width * sparse.region_height,
         .image_pixels = (size_t)settings->region_width * settings->region_height,
     };
-    SampleFilm reference;
-    if (!sample_render(pilot, PRECISION_DOUBLE, &reference, compute, scene, sparse, messages)) return false;
+    Film reference;
+    if (!sample_render(pilot, PRECISION_DOUBLE, &reference, compute, scene, own, messages)) return false;
     pilot->candidates[PRECISION_DOUBLE].verdict.keeps = true;
-    const bool whole = candidates_measure(pilot, &reference.film, compute, scene, &sparse);
-    film_free(&reference.film);
+    const bool whole = candidates_measure(pilot, &reference, compute, scene, &own);
+    film_free(&reference);
     pilot->chosen = fastest_choose(pilot);
     pilot->seconds = clock_seconds() - start;
     return whole;
@@ -159,8 +243,9 @@ void pilot_describe(Text *text, const Pilot *pilot)
             "largest error in the sample %.2g; with %g %% confidence at most %.2g %% of pixels exceed %g",
             verdict->error, percent, 100 * verdict->bound, budget->limit);
     } else {
-        text_appendf(text, "%s at most %.2g with %g %% confidence", error_metric_names[budget->metric],
-                     verdict->bound, percent);
+        text_appendf(text, "%s %sat most %.2g with %g %% confidence", error_metric_names[budget->metric],
+                     budget->metric == ERROR_FLIP ? "estimated as " : "", verdict->bound, percent);
     }
     text_appendf(text, "; %zu of %zu pixels", pilot->pixels, pilot->image_pixels);
+    if (budget->metric == ERROR_RMSE) text_appendf(text, ", colors up to %.3g", pilot->color_max);
 }

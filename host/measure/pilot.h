@@ -2,8 +2,8 @@
 // of the image's pixels at the precisions, on the device and scene at hand, and compares them with `double`.
 //
 // The sample is stratified: one pixel of each square of pixels, at a place that a hash chooses
-// (kernels/film.h); squares that do not fit whole at the right and bottom are left out. docs/accuracy.md has
-// the statistics.
+// (kernels/film.h), and every pixel of the columns and rows at the right and bottom that fill no square.
+// docs/accuracy.md has the statistics.
 #pragma once
 
 #include "host/measure/error_budget.h"
@@ -26,6 +26,8 @@ typedef struct {
     double confidence; // that every candidate's bound holds
     PilotCandidate candidates[ARITHMETIC_COUNT];
     Precision chosen;
+    uint32_t cell;               // side of the squares
+    double color_max;            // the largest channel that the scene's lights and materials allow
     size_t pixels, image_pixels; // rendered at each precision; in the region
     double seconds, build_seconds;
 } Pilot;

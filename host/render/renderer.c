@@ -441,6 +441,11 @@ void renderer_close(Renderer *renderer)
     free(renderer);
 }
 
+double renderer_color_max(const Renderer *renderer)
+{
+    return renderer->compiled.color_max;
+}
+
 size_t renderer_scalar_size(const Renderer *renderer)
 {
     return renderer->report.is_double ? sizeof(double) : sizeof(float);

@@ -1,0 +1,42 @@
+#include "host/compile/stages.h"
+
+// What the rounding of shading may add to a color that is bounded in exact arithmetic.
+static const double shading_slack = 1.01;
+
+static Color color_product(Color a, Color b)
+{
+    return (Color){a.x * b.x, a.y * b.y, a.z * b.z};
+}
+
+// Returns what a material reflects at most: of the ambient light, and of all lights at once.
+static Color material_color_max(const CompiledScene *compiled, const Scene *scene, const Material *material,
+                                Color light_sum)
+{
+    Color color = material->color;
+    if (material->checker) color = vector_max(material->checker_colors[0], material->checker_colors[1]);
+    if (material->texture > 0) color = vector_all(compiled->textures[material->texture - 1].largest_texel);
+    const Color ambient = vector_scale(color_product(scene->ambient, color), material->ambient);
+    const Color factor = vector_add(color_product(material->diffuse, color), vector_all(material->specular));
+    return vector_add(ambient, color_product(light_sum, factor));
+}
+
+double color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces)
+{
+    Color light_sum = {0}, seen = {0};
+    for (size_t i = 0; i < scene->lights.count; i++)
+        light_sum = vector_add(light_sum, scene->lights.items[i].color);
+    // by rays with ever more bounces before them: the background, or a material's color and, reflected and
+    // refracted, what rays with one bounce less see
+    for (uint32_t left = 0; left <= bounces; left++) {
+        const Color before = seen;
+        seen = vector_max(seen, scene->background);
+        for (size_t i = 0; i < scene->materials.count; i++) {
+            const Material *material = &scene->materials.items[i];
+            const Color passed = vector_scale(before, material->reflection + material->transmission);
+            seen = vector_max(seen,
+                              vector_add(material_color_max(compiled, scene, material, light_sum), passed));
+        }
+        if (left > 0 && vectors_equal(seen, before)) break;
+    }
+    return shading_slack * vector_largest(seen);
+}
