@@ -8,10 +8,10 @@ static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile
                                             global int *doubts)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
-    ShadedHit hit;
+    ShadedHit hits[1];
     unsigned_integer signature;
     mask doubt;
-    ray_tree_color(scene, ray, false, &hit, &signature, &doubt);
+    ray_tree_color(scene, ray, false, hits, &signature, &doubt);
     if (IS_CERTIFIED) film_note_doubts(doubts, tile, doubt, true);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }

@@ -97,10 +97,11 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
-// Traces a ray tree depth first, reflected before refracted. *shaded holds the hit of the ray that is
-// followed; with `is_shaded` at first the camera ray's, which rays_shade has traced with other packets. If
-// COMPUTE_SIGNATURE, *path is the tree's signature (types.h), which in each lane is independent of the other
-// lanes, and the color is undefined. At `certified` *doubt are the lanes with any decision in doubt.
+// Traces a ray tree depth first, reflected before refracted. *shaded, an element of an array, holds the hit
+// of the ray that is followed; with `is_shaded` at first the camera ray's, which rays_shade has traced with
+// other packets. If COMPUTE_SIGNATURE, *path is the tree's signature (types.h), which in each lane is
+// independent of the other lanes, and the color is undefined. At `certified` *doubt are the lanes with any
+// decision in doubt.
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
                                     unsigned_integer *path, mask *doubt)
 {
@@ -108,32 +109,33 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     *path = (unsigned_integer)(PATH_START);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 color = black, weight = white;
+    Ray rays[1] = {ray};         // an array, or Mesa 22.3 crashes in compiling rays_shade's loops
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
     for (;;) {
-        if (depth > 0 || !is_shaded) rays_shade(scene, &ray, 1, shaded);
-        if (IS_CERTIFIED) *doubt = *doubt | (ray.active & shaded->doubt);
+        if (depth > 0 || !is_shaded) rays_shade(scene, rays, 1, shaded);
+        if (IS_CERTIFIED) *doubt = *doubt | (rays[0].active & shaded->doubt);
         if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, surface_found(&shaded->surface));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE)
-                *path = path_signature_add(*path, &ray, shaded->surface.object, mask_none(), mask_none(),
+                *path = path_signature_add(*path, rays, shaded->surface.object, mask_none(), mask_none(),
                                            mask_none());
             return shaded->color;
         }
-        color = color_add_weighted(color, weight, vector_select(ray.active, shaded->color, black));
+        color = color_add_weighted(color, weight, vector_select(rays[0].active, shaded->color, black));
 
-        Bounce reflected = {ray.origin, ray.direction, black, depth + 1};
+        Bounce reflected = {rays[0].origin, rays[0].direction, black, depth + 1};
         Bounce refracted = reflected;
         mask total = mask_none();
         if (lanes_any(surface_found(&shaded->surface)) && depth < scene->header->bounces.x) {
-            total = surface_bounce(&shaded->surface, vector_renormalize(ray.direction), weight, false,
+            total = surface_bounce(&shaded->surface, vector_renormalize(rays[0].direction), weight, false,
                                    &reflected, &refracted);
             if (IS_CERTIFIED)
-                bounces_set_errors(&shaded->surface, &ray, total, &reflected, &refracted, doubt);
+                bounces_set_errors(&shaded->surface, rays, total, &reflected, &refracted, doubt);
         }
         if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, &ray, shaded->surface.object, bounce_is_active(&reflected),
+            *path = path_signature_add(*path, rays, shaded->surface.object, bounce_is_active(&reflected),
                                        bounce_is_active(&refracted), total);
         ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&reflected));
         ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&refracted));
@@ -146,7 +148,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
             if (pending_count == 0) return color;
             next = pending[--pending_count];
         }
-        ray = bounce_ray(&next);
+        rays[0] = bounce_ray(&next);
         weight = next.weight;
         depth = next.depth;
     }
