@@ -189,7 +189,7 @@ static void faults_name_line_and_row(void **state)
          "15:1: error: 2.5 is no length of a list"},
         {ASCII "element vertex 4\n" XYZ "element face 1\nproperty list uchar float texcoord\n"
                "property list uchar int vertex_index\n" END CORNERS "6 0 0 1 0 0 1 1 0\n",
-         "15:18: error: face 0 (from 0) has 1 corners, but 3 texture coordinates"},
+         "15:18: error: face 0 (from 0) has 1 corner, but 3 texture coordinates"},
         {ASCII "element vertex 4\nproperty int64 x\n" END, "4:10: error: 'int64' is no type of PLY"},
         {ASCII "element vertex 4\nproperty list uchar half x\n" END, "4:21: error: 'half' is no type of PLY"},
         {ASCII "element vertex 4\nproperty float\n" END, "4:15: error: a property without a name"},
