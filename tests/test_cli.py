@@ -8,6 +8,7 @@ import os
 import re
 import resource
 import signal
+import struct
 import subprocess
 import time
 import unittest
@@ -349,6 +350,26 @@ class Images(CliTestCase):
             self.glint(f"render sphere.yaml {SMALL} {arguments}")
             data = Path(arguments.split()[1]).read_bytes()
             self.assertEqual((data[: len(head)], len(data)), (head, size or len(data)))
+
+    def test_exr_of_a_region_with_aovs(self):
+        """One file, whose windows place the region in the image, with the values of the NPY files as layers."""
+        whole = "render sphere.yaml --size 40x30 --aov t,object,normal,shadow -o"
+        region = whole.replace("-o", "--region 8,4,24,16 -o")
+        self.assertRegex(self.glint(f"{region} a.exr").stderr, r"glint: wrote a\.exr\n$")
+        self.assertEqual([path.name for path in Path().glob("a.*")], ["a.exr"])
+        data = Path("a.exr").read_bytes()
+        windows = [struct.unpack("<4i", data.split(name + b"\0box2i\0\x10\0\0\0")[1][:16]) for name in (b"dataWindow", b"displayWindow")]
+        self.assertEqual(windows, [(8, 4, 31, 19), (0, 0, 39, 29)])
+        self.assertIn(b"glint.Transfer\0string\0\4\0\0\0none", data)
+        channels = data.split(b"channels\0chlist\0")[1][4:]
+        names = [name.decode() for name in re.findall(rb"([\w.]+)\0[\0\2]\0\0\0.{12}", channels[:500], re.DOTALL)]
+        self.assertEqual(names[:10], ["A", "B", "G", "R", "depth.Z", "normal.X", "normal.Y", "normal.Z", "object.id", "shadow.0"])
+        self.glint(f"{whole} b.exr")
+        self.assertRegex(self.glint(f"{whole} b.npy").stderr, r"glint: wrote b\.npy, b\.t\.npy, b\.normal\.npy, b\.object\.npy, b\.shadow\.npy\n$")
+        for name, layer in ("t", "depth"), ("object", "object"):
+            self.assertIn("equal, bit for bit", self.glint(f"diff b.{name}.npy b.exr --layer {layer}").stdout)
+        self.assertEqual(self.json("diff b.exr a.exr --json", status=3)["size"], [40, 30])
+        self.refuses("diff b.exr a.exr --layer position", "no layer 'position'; its channels are A, B, G, R, depth.Z")
 
     def test_precisions_and_lanes(self):
         images = {}

@@ -371,6 +371,66 @@ static void check_warning(const char *path, const char *expected)
     message_list_free(&messages);
 }
 
+static void check_layer(const char *layer, const void *expected, uint32_t channels, bool is_integer)
+{
+    MessageList messages = {0};
+    Image image;
+    assert_true(image_read_layer(&image, "layers.exr", layer, &messages));
+    check_no_messages(&messages);
+    assert_int_equal(image.width, 4);
+    assert_int_equal(image.height, 33);
+    assert_int_equal(image.channels, channels);
+    assert_int_equal(image.integers, is_integer);
+    for (size_t i = 0; i < (size_t)4 * 33 * channels; i++) {
+        const uint32_t *integers = expected;
+        const float *floats = expected;
+        assert_true(image_value(&image, i) == (is_integer ? integers[i] : (double)floats[i]));
+    }
+    image_free(&image);
+}
+
+static void test_exr_layers(void **state)
+{
+    (void)state;
+    enum { PIXELS = 4 * 33 };
+    float *color = values_make(3 * PIXELS), *vectors = values_make(3 * PIXELS), *alpha = values_make(PIXELS);
+    uint32_t numbers[PIXELS], masks[2 * PIXELS];
+    for (uint32_t i = 0; i < PIXELS; i++) {
+        numbers[i] = UINT32_MAX - i * i * i;
+        masks[2 * i] = i;
+        masks[2 * i + 1] = 1000 + i;
+        vectors[3 * i] += 7;
+    }
+    numbers[0] = 0x7F800001; // the bits of a signaling NaN
+    const ImageLayer layers[] = {{"vector.X,vector.Y,vector.Z", 3, 'f'},
+                                 {"A", 1, 'f'},
+                                 {"number.id", 1, 'u'},
+                                 {"mask.0,mask.1", 2, 'u'}};
+    ImageHeader header = {IMAGE_EXR, 4, 33, 3, TRANSFER_NONE, 8, 'f', NULL};
+    header.layers = layers;
+    header.layer_count = sizeof layers / sizeof *layers;
+    MessageList messages = {0};
+    ImageWriter *writer = image_writer_open("layers.exr", &header, &messages);
+    assert_non_null(writer);
+    for (uint32_t row = 0; row < 33; row += 11) { // blocks have 16 rows
+        const size_t first = (size_t)4 * row;
+        const void *const arrays[] = {color + 3 * first, vectors + 3 * first, alpha + first, numbers + first,
+                                      masks + 2 * first};
+        assert_true(image_writer_layer_rows(writer, arrays, 11, &messages));
+    }
+    assert_true(image_writer_commit(writer, &messages));
+    check_no_messages(&messages);
+    check_layer(NULL, color, 3, false);
+    check_layer("vector", vectors, 3, false);
+    check_layer("number", numbers, 1, true);
+    Image image;
+    assert_false(image_read_layer(&image, "layers.exr", "mask", &messages));
+    message_list_free(&messages);
+    free(color);
+    free(vectors);
+    free(alpha);
+}
+
 static void test_png_of_other_colors(void **state)
 {
     (void)state;
@@ -612,6 +672,7 @@ int main(void)
         cmocka_unit_test(test_abandoned_leaves_the_old_file),
         cmocka_unit_test(test_finished_is_yet_to_be_renamed),
         cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_exr_layers),
         cmocka_unit_test(test_png_of_other_colors),
         cmocka_unit_test(test_jpeg_is_turned_upright),
         cmocka_unit_test(test_jpeg_of_other_colors),

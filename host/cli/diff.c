@@ -48,7 +48,7 @@ static const char help_text[] =
     "      --max-off N       allow N differing 8-bit sRGB values; a color pixel has three\n"
     "      --max-ulp N       allow N units in the last place of any value of EXR or NPY, such as distances\n"
     "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n"
-    "      --layer NAME      compare this layer of two EXR files, not the default or only "
+    "      --layer NAME      compare this layer of EXR files, not the default or only "
     "one\n" HELP_MAX_PIXELS HELP_JSON HELP_HELP;
 
 typedef struct {
@@ -265,10 +265,17 @@ static bool heatmap_make(const DiffOptions *options, const Comparison *compariso
     return written;
 }
 
+// --layer is that of EXR files; the other file may be a NPY.
+static bool side_read(Image *image, const DiffOptions *options, const char *path, MessageList *messages)
+{
+    const bool has_layers = image_format_of(path) == IMAGE_EXR;
+    return image_read_layer(image, path, has_layers ? options->layer : NULL, messages);
+}
+
 static bool images_compare(const DiffOptions *options, Comparison *comparison, MessageList *messages)
 {
-    if (!image_read_layer(&comparison->reference, options->reference_path, options->layer, messages) ||
-        !image_read_layer(&comparison->test, options->test_path, options->layer, messages) ||
+    if (!side_read(&comparison->reference, options, options->reference_path, messages) ||
+        !side_read(&comparison->test, options, options->test_path, messages) ||
         !image_comparable(&comparison->reference, &comparison->test, messages))
         return false;
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);

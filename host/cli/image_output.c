@@ -7,6 +7,7 @@
 #include "host/base/text.h"
 #include "host/cli/options.h"
 #include "host/cli/version.h"
+#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +29,9 @@ struct ImageOutput {
     const Ranks *ranks; // or NULL
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
-    Scratch converted; // a band's values in another type
-    double bytes;      // of all files, before compression
+    Scratch converted[LAYER_COUNT]; // a band's values in other types
+    Scratch positions, alpha;
+    double bytes; // of all files, before compression
 
     // A band is written by a thread of its own while the next is rendered; until it has ended, all from here
     // on is that thread's, and so are the writers and messages.
@@ -123,11 +125,22 @@ static void certified_describe(Text *text, const ImageOutput *output)
                  (unsigned long long)output->repeats.undecided);
 }
 
+static bool is_exr(const ImageOutput *output)
+{
+    return image_format_of(output->options->path) == IMAGE_EXR;
+}
+
+// Whether the format holds linear floats.
+static bool holds_floats(const char *path)
+{
+    const ImageFormat format = image_format_of(path);
+    return format == IMAGE_EXR || format == IMAGE_NPY;
+}
+
 // At `certified` EXR's notes, which stand before its pixels, report all of them.
 static bool keeps_bands(const ImageOutput *output)
 {
-    return output->settings->precision == PRECISION_CERTIFIED &&
-           image_format_of(output->options->path) == IMAGE_EXR;
+    return output->settings->precision == PRECISION_CERTIFIED && is_exr(output);
 }
 
 // The settings that made the image: enough to make it again.
@@ -174,7 +187,9 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     NOTE("Size", "%ux%u", settings->width, settings->height);
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
-    NOTE("Transfer", "%s", output->options->transfer == TRANSFER_SRGB ? "srgb" : "none");
+    const bool is_display =
+        output->options->transfer == TRANSFER_SRGB && !holds_floats(output->options->path);
+    NOTE("Transfer", "%s", is_display ? "srgb" : "none");
     NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
     if (output->ranks) NOTE("Ranks", "%zu", output->ranks->count + 1);
     if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
@@ -209,13 +224,79 @@ bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scen
                                    const char *scene_path)
 {
     bool overwrites = output_overwrites_scene(options->path, scene, scene_path);
-    for (Layer layer = 0; layer < LAYER_COUNT && !overwrites; layer++) {
+    const bool is_one_file = image_format_of(options->path) == IMAGE_EXR;
+    for (Layer layer = 0; layer < LAYER_COUNT && !overwrites && !is_one_file; layer++) {
         if (!(options->aovs >> layer & 1)) continue;
         char *path = aov_path(options, layer_names[layer]);
         overwrites = output_overwrites_scene(path, scene, scene_path);
         free(path);
     }
     return overwrites;
+}
+
+// Whether the AOV is written: the shadow masks of a scene without lights are not.
+static bool is_written(const ImageOutput *output, const Film *film, Layer layer)
+{
+    return (output->options->aovs >> layer & 1) && film_components(film, layer) > 0;
+}
+
+// Whether the AOV is a layer of the EXR, whose R, G and B are the color.
+static bool is_exr_layer(const ImageOutput *output, const Film *film, Layer layer)
+{
+    return is_exr(output) && layer != LAYER_COLOR && is_written(output, film, layer);
+}
+
+// An EXR has alpha where an AOV tells what was hit.
+static bool has_alpha(const ImageOutput *output)
+{
+    return is_exr(output) && (output->options->aovs & (AOV_T | AOV_OBJECT));
+}
+
+// Appends the names of a layer's channels: depth.Z, X, Y and Z of a vector, a number for each light.
+static void channel_names_append(Text *names, const Film *film, Layer layer)
+{
+    const char *name = layer_names[layer];
+    const uint32_t count = film_components(film, layer);
+    if (layer == LAYER_T)
+        text_appendf(names, "depth.Z");
+    else if (layer == LAYER_SHADOW)
+        for (uint32_t i = 0; i < count; i++)
+            text_appendf(names, "%s%s.%u", i > 0 ? "," : "", name, i);
+    else if (count == 3)
+        text_appendf(names, "%s.X,%s.Y,%s.Z", name, name, name);
+    else
+        text_appendf(names, "%s.id", name);
+}
+
+static bool image_open(ImageOutput *output, const Film *film, const ImageNote *notes, MessageList *messages)
+{
+    const RenderSettings *settings = output->settings;
+    ImageHeader header = layer_header(film, LAYER_COLOR);
+    header.format = image_format_of(output->options->path);
+    header.transfer = output->options->transfer;
+    header.bits = output->options->bits;
+    header.notes = notes;
+    if (header.format != IMAGE_NPY) header.npy_type = 'f';
+    header.full_width = settings->width;
+    header.full_height = settings->height;
+    header.left = settings->region_x;
+    header.top = settings->region_y;
+    ImageLayer layers[LAYER_COUNT + 1];
+    Text names[LAYER_COUNT + 1] = {0};
+    header.layers = layers;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
+        if (!is_exr_layer(output, film, layer)) continue;
+        Text *text = &names[header.layer_count];
+        channel_names_append(text, film, layer);
+        const char type = layer_types[layer] == LAYER_TYPE_INTEGER ? 'u' : 'f';
+        layers[header.layer_count++] = (ImageLayer){text_c(text), film_components(film, layer), type};
+    }
+    if (has_alpha(output)) layers[header.layer_count++] = (ImageLayer){"A", 1, 'f'};
+    output->image = image_writer_open(output->options->path, &header, messages);
+    output->bytes = (double)image_bytes(&header);
+    for (size_t i = 0; i < header.layer_count; i++)
+        text_free(&names[i]);
+    return output->image != NULL;
 }
 
 static bool files_open(ImageOutput *output, const Film *band, MessageList *messages)
@@ -225,34 +306,23 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
     ImageNote list[NOTE_COUNT_MAX + 1] = {0};
     for (size_t i = 0; i < notes.count; i++)
         list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
-
     Film film = *band;
     film.height = output->settings->region_height;
-    ImageHeader header = layer_header(&film, LAYER_COLOR);
-    header.format = image_format_of(output->options->path);
-    header.transfer = output->options->transfer;
-    header.bits = output->options->bits;
-    header.notes = list;
-    if (header.format != IMAGE_NPY) header.npy_type = 'f';
-    output->image = image_writer_open(output->options->path, &header, messages);
-    bool opened = output->image != NULL;
-    output->bytes = (double)image_bytes(&header);
+    bool opened = image_open(output, &film, list, messages);
+    text_free(&notes.text);
 
+    if (opened && (output->options->aovs & AOV_SHADOW) && !is_written(output, &film, LAYER_SHADOW))
+        message_warning(messages, "no shadow masks are written: the scene has no lights");
     for (Layer layer = 0; layer < LAYER_COUNT && opened; layer++) {
-        if (!(output->options->aovs >> layer & 1)) continue;
-        header = layer_header(&film, layer);
+        if (!is_written(output, &film, layer) || is_exr(output)) continue;
+        ImageHeader header = layer_header(&film, layer);
         if (layer == LAYER_POSITION) header.npy_type = 'd';
-        if (header.channels == 0) {
-            message_warning(messages, "no shadow masks are written: the scene has no lights");
-            continue;
-        }
         char *path = aov_path(output->options, layer_names[layer]);
         output->aovs[layer] = image_writer_open(path, &header, messages);
         opened = output->aovs[layer] != NULL;
         output->bytes += (double)image_bytes(&header);
         free(path);
     }
-    text_free(&notes.text);
     return opened;
 }
 
@@ -265,18 +335,11 @@ static void *scratch_reserve(Scratch *scratch, size_t size)
     return scratch->items;
 }
 
-static const float *color_narrowed(ImageOutput *output, const Film *band)
-{
-    float *narrow = scratch_reserve(&output->converted, 3 * film_pixel_count(band) * sizeof *narrow);
-    numbers_narrow(narrow, band->color, 3 * film_pixel_count(band));
-    return narrow;
-}
-
 // Positions come relative to the eye; the file has them in the world, in double so that no bit is lost.
 static const double *positions_in_world(ImageOutput *output, const Film *band)
 {
     size_t count = 3 * film_pixel_count(band);
-    double *world = scratch_reserve(&output->converted, count * sizeof *world);
+    double *world = scratch_reserve(&output->positions, count * sizeof *world);
     numbers_widen(world, band->layers[LAYER_POSITION], count, band->is_double);
     Vector3 eye = output->scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
@@ -285,18 +348,52 @@ static const double *positions_in_world(ImageOutput *output, const Film *band)
     return world;
 }
 
+// A layer's values as NPY files have them.
+static const void *layer_values(ImageOutput *output, const Film *band, Layer layer)
+{
+    return layer == LAYER_POSITION ? positions_in_world(output, band) : band->layers[layer];
+}
+
+// A layer's values as other formats have them, in 32 bits.
+static const void *layer_narrowed(ImageOutput *output, const Film *band, Layer layer)
+{
+    const void *values = layer_values(output, band, layer);
+    if (layer_types[layer] == LAYER_TYPE_INTEGER || (!band->is_double && layer != LAYER_POSITION))
+        return values;
+    const size_t count = film_pixel_count(band) * film_components(band, layer);
+    float *narrow = scratch_reserve(&output->converted[layer], count * sizeof *narrow);
+    numbers_narrow(narrow, values, count);
+    return narrow;
+}
+
+// 1 where the ray through the pixel's center hits an object, else 0.
+static const float *alpha_of(ImageOutput *output, const Film *band)
+{
+    const size_t count = film_pixel_count(band);
+    float *alpha = scratch_reserve(&output->alpha, count * sizeof *alpha);
+    const uint32_t *objects = band->layers[LAYER_OBJECT];
+    const float *distances = objects ? NULL : layer_narrowed(output, band, LAYER_T);
+    for (size_t i = 0; i < count; i++)
+        alpha[i] = (objects ? objects[i] != UINT32_MAX : isfinite(distances[i])) ? 1 : 0;
+    return alpha;
+}
+
 static bool band_write(ImageOutput *output)
 {
     const Film *band = &output->band;
     MessageList *messages = output->messages;
-    bool narrows = band->is_double && image_format_of(output->options->path) != IMAGE_NPY;
-    const void *color = narrows ? color_narrowed(output, band) : band->layers[LAYER_COLOR];
-    if (!image_writer_rows(output->image, color, band->height, messages)) return false;
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
-        if (!output->aovs[layer]) continue;
-        const void *values = layer == LAYER_POSITION ? positions_in_world(output, band) : band->layers[layer];
-        if (!image_writer_rows(output->aovs[layer], values, band->height, messages)) return false;
-    }
+    const bool is_npy = image_format_of(output->options->path) == IMAGE_NPY;
+    const void *arrays[LAYER_COUNT + 2];
+    size_t count = 0;
+    arrays[count++] = is_npy ? band->layers[LAYER_COLOR] : layer_narrowed(output, band, LAYER_COLOR);
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (is_exr_layer(output, band, layer)) arrays[count++] = layer_narrowed(output, band, layer);
+    if (has_alpha(output)) arrays[count++] = alpha_of(output, band);
+    if (!image_writer_layer_rows(output->image, arrays, band->height, messages)) return false;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (output->aovs[layer] && !image_writer_rows(output->aovs[layer], layer_values(output, band, layer),
+                                                      band->height, messages))
+            return false;
     return true;
 }
 
@@ -386,10 +483,25 @@ static void image_output_free(ImageOutput *output)
     for (size_t i = 0; i < output->kept.count; i++)
         film_free(&output->kept.items[i]);
     free(output->kept.items);
-    free(output->converted.items);
-    for (Layer i = 0; i < LAYER_COUNT; i++)
+    free(output->positions.items);
+    free(output->alpha.items);
+    for (Layer i = 0; i < LAYER_COUNT; i++) {
+        free(output->converted[i].items);
         free(output->layers[i].items);
+    }
     free(output);
+}
+
+static void names_print(const ImageOutput *output)
+{
+    fprintf(stderr, "glint: wrote %s", output->options->path);
+    for (Layer i = 0; i < LAYER_COUNT; i++) {
+        if (!output->aovs[i]) continue;
+        char *path = aov_path(output->options, layer_names[i]);
+        fprintf(stderr, ", %s", path);
+        free(path);
+    }
+    fprintf(stderr, "\n");
 }
 
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
@@ -415,6 +527,7 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
             image_writer_abandon(output->aovs[i]);
     }
     *seconds = output->seconds + (clock_seconds() - start);
+    if (whole && output->options->prints_names) names_print(output);
     image_output_free(output);
     return whole;
 }

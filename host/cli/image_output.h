@@ -1,4 +1,5 @@
-// The files of one image: the image itself, and a .npy beside it for each AOV asked for.
+// The files of one image: the image itself, and a .npy for each requested AOV. An EXR holds its AOVs as
+// layers.
 #pragma once
 
 #include "host/cli/ranks.h"
@@ -13,6 +14,7 @@ typedef struct {
     Transfer transfer;
     unsigned bits;
     const Pilot *pilot; // that chose the precision, or NULL
+    bool prints_names;  // of the files, once they are written
     bool synchronous;   // a band is encoded before the next one is rendered: neither takes the other's time
 } ImageOutputOptions;
 

@@ -112,11 +112,11 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     bool whole = render_job_run(&job);
     times->render_seconds = clock_seconds() - start;
     times->repeats = image_output_repeats(output);
+    progress_close(&progress);
     if (whole)
         whole = image_output_commit(output, messages, &times->encode_seconds);
     else
         image_output_abandon(output);
-    progress_close(&progress);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
     if (whole && times->repeats.undecided > 0)
         message_warning(messages, "%llu sample%s undecided, as at precision double",
@@ -176,6 +176,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, RenderDevice
     }
     if (!options->has_transfer)
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    options->output.prints_names = !options->quiet;
     options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Checkpoint *checkpoint = NULL;

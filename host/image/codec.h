@@ -17,7 +17,8 @@ struct ImageWriter {
 // A function that fails adds a message and returns false; only `free` is called after that.
 typedef struct Encoder {
     bool (*begin)(ImageWriter *writer, MessageList *messages);
-    bool (*rows)(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
+    // arrays[0]: the pixels; those of the header's layers follow
+    bool (*rows)(ImageWriter *writer, const void *const *arrays, uint32_t row_count, MessageList *messages);
     bool (*end)(ImageWriter *writer, MessageList *messages); // after the last row; may be NULL
     void (*free)(ImageWriter *writer); // frees `state`, which may be incomplete or NULL; may be NULL
     // after any row; NULL: notes are lost

@@ -1,4 +1,5 @@
-// OpenEXR input through the C core: one layer at full resolution, scan lines or tiles, halves or floats.
+// OpenEXR input through the C core: one layer at full resolution, scan lines or tiles, halves or floats, or
+// integers of a single channel.
 #include "host/image/codec.h"
 #include "host/image/exr_layers.h"
 
@@ -15,6 +16,7 @@ typedef struct {
     float *values;
     uint32_t width, height;
     uint32_t across, down; // pixels per sample
+    bool is_integer;       // the bits are of uint32
 } Plane;
 
 typedef struct {
@@ -87,7 +89,8 @@ static bool planes_allocate(ExrReader *reader, Image *store)
     for (uint32_t i = 0; i < layer->channel_count; i++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[layer->channels[i]];
         const bool is_full = entry->x_sampling == 1 && entry->y_sampling == 1;
-        if (entry->pixel_type == EXR_PIXEL_UINT || !(is_full || layer->form == EXR_CHROMA))
+        const bool is_integer = entry->pixel_type == EXR_PIXEL_UINT;
+        if ((is_integer && layer->form != EXR_NUMBERS) || !(is_full || layer->form == EXR_CHROMA))
             return image_refuse(reader->file, "EXR: channel %s is not of floats or not of full resolution",
                                 entry->name.str);
         reader->planes[i] = (Plane){layer->channels[i],
@@ -95,7 +98,8 @@ static bool planes_allocate(ExrReader *reader, Image *store)
                                     sample_count(store->width, entry->x_sampling),
                                     sample_count(store->height, entry->y_sampling),
                                     (uint32_t)entry->x_sampling,
-                                    (uint32_t)entry->y_sampling};
+                                    (uint32_t)entry->y_sampling,
+                                    is_integer};
     }
     return true;
 }
@@ -124,7 +128,7 @@ static bool channels_place(const ExrReader *reader, exr_decode_pipeline_t *pipel
             return false;
         channel_place(channel, plane->values + (size_t)row * plane->width + column, plane->width);
         channel->user_bytes_per_element = sizeof *plane->values;
-        channel->user_data_type = EXR_PIXEL_FLOAT;
+        channel->user_data_type = plane->is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
     }
     return true;
 }
@@ -179,18 +183,22 @@ static exr_result_t exr_tiles(const ExrReader *reader, uint32_t width, uint32_t 
     return code;
 }
 
-// The value at a pixel of the data; between samples, on the line between them in each direction.
-static float plane_value(const Plane *plane, uint32_t x, uint32_t y)
+// Copies the value at a pixel of the data; between samples it lies on the line between them in each
+// direction.
+static void plane_sample(const Plane *plane, uint32_t x, uint32_t y, float *pixel)
 {
     const uint32_t column = x / plane->across, row = y / plane->down;
     const float *value = plane->values + (size_t)row * plane->width + column;
-    if (plane->across == 1 && plane->down == 1) return *value;
+    if (plane->across == 1 && plane->down == 1) {
+        memcpy(pixel, value, sizeof *pixel); // perhaps of an integer, whose bits x87 would change
+        return;
+    }
     const size_t right = column + 1 < plane->width ? 1 : 0,
                  below = row + 1 < plane->height ? plane->width : 0;
     const float along = (float)(x % plane->across) / (float)plane->across;
     const float down = (float)(y % plane->down) / (float)plane->down;
     const float upper = value[0] + along * (value[right] - value[0]);
-    return upper + down * (value[below] + along * (value[below + right] - value[below]) - upper);
+    *pixel = upper + down * (value[below] + along * (value[below + right] - value[below]) - upper);
 }
 
 // Luminance and chroma as in OpenEXR's "Technical Introduction" (2013), "Luminance/chroma images", with the
@@ -203,6 +211,20 @@ static void chroma_convert(float *pixel)
     pixel[1] = (luminance - 0.2126F * pixel[0] - 0.0722F * pixel[2]) / 0.7152F;
 }
 
+// Also keeps integers as doubles, which hold each of them.
+static void integers_widen(Image *image)
+{
+    const size_t count = (size_t)image->width * image->height;
+    image->integers = true;
+    image->doubles = memory_allocate(count, sizeof *image->doubles);
+    for (size_t i = 0; i < count; i++) {
+        uint32_t value;
+        memcpy(&value, &image->values[i], sizeof value);
+        image->doubles[i] = value;
+        image->values[i] = (float)value;
+    }
+}
+
 // Fills the image, which is the display window; where the file has no data it stays 0.
 static void image_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
@@ -213,7 +235,7 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
             if (x + left < 0 || x + left >= width || y + top < 0 || y + top >= height) continue;
             float *pixel = image->values + ((size_t)y * image->width + x) * image->channels;
             for (uint32_t i = 0; i < image->channels; i++)
-                pixel[i] = plane_value(&reader->planes[i], (uint32_t)(x + left), (uint32_t)(y + top));
+                plane_sample(&reader->planes[i], (uint32_t)(x + left), (uint32_t)(y + top), &pixel[i]);
             if (reader->layer.form == EXR_CHROMA) chroma_convert(pixel);
         }
     }
@@ -265,6 +287,7 @@ static bool exr_pixels(ExrReader *reader, Image *image)
     if (done) {
         image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
         image_fill(reader, image, store.width, store.height);
+        if (reader->planes[0].is_integer) integers_widen(image);
         if (!image->data) primaries_check(reader);
     }
     image_free(&store);

@@ -1,5 +1,5 @@
-// OpenEXR output through the C core (Technical Introduction to OpenEXR, 2013): 32-bit floats, ZIP in blocks
-// of 16 rows.
+// OpenEXR output through the C core (Technical Introduction to OpenEXR, 2013): 32-bit floats and integers,
+// ZIP in blocks of 16 rows.
 #include "host/image/codec.h"
 
 #include "host/base/fault.h"
@@ -11,12 +11,31 @@
 #include <stdlib.h>
 #include <string.h>
 
+// The color or a further layer.
+typedef struct {
+    char *channels; // names, each ended by a null
+    size_t channel_count;
+    bool is_integer;
+    void *block; // rows of the incomplete block
+} ExrLayer;
+
+// A channel of the file and where its values are: the number of the layer and of the value in each pixel.
+typedef struct {
+    const char *name;
+    size_t layer, value;
+} ExrChannel;
+
+enum { VALUE_BYTES = 4 };
+
 typedef struct {
     exr_context_t context;
     exr_encode_pipeline_t pipeline;
     bool has_pipeline;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
-    float *block;                                              // rows of the incomplete block
+    ExrLayer layers[1 + IMAGE_LAYERS_MAX];
+    size_t layer_count;
+    ExrChannel *channels; // of all layers, by name, as in the file
+    size_t channel_count;
     uint32_t block_rows, rows_held, block_start;
     int write_error; // errno of a failed write
 } ExrWriter;
@@ -50,6 +69,62 @@ static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList
 // The first failure of a sequence of calls.
 #define EXR_STEP(code, call) ((code) = (code) ? (code) : (call))
 
+static void layer_add(ExrWriter *state, const ImageLayer *layer)
+{
+    ExrLayer *added = &state->layers[state->layer_count++];
+    *added = (ExrLayer){.channels = memory_copy_text(layer->channels),
+                        .channel_count = layer->channel_count,
+                        .is_integer = layer->type == 'u'};
+    for (char *at = added->channels; (at = strchr(at, ','));)
+        *at++ = '\0';
+}
+
+static int channels_compare(const void *a, const void *b)
+{
+    return strcmp(((const ExrChannel *)a)->name, ((const ExrChannel *)b)->name);
+}
+
+static void channels_list(ExrWriter *state)
+{
+    for (size_t i = 0; i < state->layer_count; i++)
+        state->channel_count += state->layers[i].channel_count;
+    ExrChannel *channel = state->channels = memory_allocate(state->channel_count, sizeof *channel);
+    for (size_t i = 0; i < state->layer_count; i++) {
+        const char *name = state->layers[i].channels;
+        for (size_t k = 0; k < state->layers[i].channel_count; k++, name += strlen(name) + 1)
+            *channel++ = (ExrChannel){name, i, k};
+    }
+    qsort(state->channels, state->channel_count, sizeof *state->channels, channels_compare);
+}
+
+static exr_result_t channels_declare(const ExrWriter *state)
+{
+    exr_result_t code = EXR_ERR_SUCCESS;
+    for (size_t i = 0; i < state->channel_count; i++) {
+        const ExrChannel *channel = &state->channels[i];
+        const exr_pixel_type_t type =
+            state->layers[channel->layer].is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
+        EXR_STEP(code,
+                 exr_add_channel(state->context, 0, channel->name, type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+    }
+    return code;
+}
+
+static exr_result_t exr_declare_size(const ImageWriter *writer)
+{
+    const ImageHeader *header = &writer->header;
+    const bool is_whole = header->full_width == 0;
+    const int32_t left = (int32_t)header->left, top = (int32_t)header->top;
+    const int32_t width = (int32_t)header->width, height = (int32_t)header->height;
+    const int32_t full_width = is_whole ? width : (int32_t)header->full_width;
+    const int32_t full_height = is_whole ? height : (int32_t)header->full_height;
+    const exr_attr_box2i_t display = {.min = {{{0, 0}}}, .max = {{{full_width - 1, full_height - 1}}}};
+    const exr_attr_box2i_t data = {.min = {{{left, top}}}, .max = {{{left + width - 1, top + height - 1}}}};
+    return exr_initialize_required_attr(((const ExrWriter *)writer->state)->context, 0, &display, &data, 1,
+                                        &(exr_attr_v2f_t){{{0, 0}}}, 1, EXR_LINEORDER_INCREASING_Y,
+                                        EXR_COMPRESSION_ZIP);
+}
+
 static exr_result_t exr_header(ImageWriter *writer)
 {
     const ImageHeader *header = &writer->header;
@@ -65,12 +140,12 @@ static exr_result_t exr_header(ImageWriter *writer)
     int part;
     EXR_STEP(code, exr_set_longname_support(state->context, 1));
     EXR_STEP(code, exr_add_part(state->context, "", EXR_STORAGE_SCANLINE, &part));
-    EXR_STEP(code, exr_initialize_required_attr_simple(state->context, 0, (int32_t)header->width,
-                                                       (int32_t)header->height, EXR_COMPRESSION_ZIP));
-    const char *names = header->channels == 1 ? "Y" : "BGR";
-    for (const char *name = names; *name; name++)
-        EXR_STEP(code, exr_add_channel(state->context, 0, (char[]){*name, '\0'}, EXR_PIXEL_FLOAT,
-                                       EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+    EXR_STEP(code, exr_declare_size(writer));
+    layer_add(state, &(ImageLayer){header->channels == 1 ? "Y" : "R,G,B", header->channels, 'f'});
+    for (size_t i = 0; i < header->layer_count; i++)
+        layer_add(state, &header->layers[i]);
+    channels_list(state);
+    EXR_STEP(code, channels_declare(state));
     for (const ImageNote *note = header->notes; note && note->key; note++) {
         // The prefix separates keys such as `version` from the format's own.
         Text key = {0};
@@ -89,23 +164,33 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
 {
     const ImageHeader *header = &writer->header;
     ExrWriter *state = writer->state = memory_allocate_zeroed(1, sizeof *state);
-    if (header->channels != 1 && header->channels != 3)
-        fault("EXR is written with 1 or 3 channels, not %u", header->channels);
+    if ((header->channels != 1 && header->channels != 3) || header->layer_count > IMAGE_LAYERS_MAX)
+        fault("EXR is written with 1 or 3 channels and few layers, not %u and %zu", header->channels,
+              header->layer_count);
     // The block offset table precedes the blocks and is written last.
     if (fseeko(writer->output.file, 0, SEEK_SET) != 0)
         return message_error(messages, "cannot write '%s': EXR needs a file, not a pipe",
                              writer->output.target);
     exr_result_t code = exr_header(writer);
     if (code != EXR_ERR_SUCCESS) return exr_write_failed(writer, code, messages);
-    state->block =
-        memory_allocate((size_t)state->block_rows * header->width * header->channels, sizeof(float));
+    for (size_t i = 0; i < state->layer_count; i++)
+        state->layers[i].block = memory_allocate(
+            (size_t)state->block_rows * header->width * state->layers[i].channel_count, VALUE_BYTES);
     return true;
 }
 
-// EXR orders its channels by name: B, G, R.
-static size_t channel_place(const char *name)
+// Points a channel of the file at its values in the incomplete block.
+static void channel_place(const ExrWriter *state, int index, uint32_t width)
 {
-    return *name == 'B' ? 2 : *name == 'G' ? 1 : 0;
+    const ExrChannel *from = &state->channels[index];
+    const ExrLayer *layer = &state->layers[from->layer];
+    exr_coding_channel_info_t *channel = &state->pipeline.channels[index];
+    const size_t pixel_bytes = layer->channel_count * VALUE_BYTES;
+    channel->encode_from_ptr = (const uint8_t *)layer->block + from->value * VALUE_BYTES;
+    channel->user_pixel_stride = (int32_t)pixel_bytes;
+    channel->user_line_stride = (int32_t)(pixel_bytes * width);
+    channel->user_bytes_per_element = VALUE_BYTES;
+    channel->user_data_type = layer->is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
 }
 
 // A block of its uncompressed size is read as uncompressed. OpenEXR 3.1 and 3.4.7 store compressed bytes of
@@ -125,22 +210,16 @@ static exr_result_t exr_block(ImageWriter *writer)
     ExrWriter *state = writer->state;
     exr_chunk_info_t chunk;
     exr_encode_pipeline_t *pipeline = &state->pipeline;
-    exr_result_t code = exr_write_scanline_chunk_info(state->context, 0, (int)state->block_start, &chunk);
+    exr_result_t code = exr_write_scanline_chunk_info(state->context, 0,
+                                                      (int)(writer->header.top + state->block_start), &chunk);
     if (code != EXR_ERR_SUCCESS) return code;
     bool is_first = !state->has_pipeline;
     code = is_first ? exr_encoding_initialize(state->context, 0, &chunk, pipeline)
                     : exr_encoding_update(state->context, 0, &chunk, pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
     state->has_pipeline = true;
-    uint32_t pixel_size = writer->header.channels * (uint32_t)sizeof(float);
-    for (int i = 0; i < pipeline->channel_count; i++) {
-        exr_coding_channel_info_t *channel = &pipeline->channels[i];
-        channel->encode_from_ptr = (const uint8_t *)(state->block + channel_place(channel->channel_name));
-        channel->user_pixel_stride = (int32_t)pixel_size;
-        channel->user_line_stride = (int32_t)(pixel_size * writer->header.width);
-        channel->user_bytes_per_element = sizeof(float);
-        channel->user_data_type = EXR_PIXEL_FLOAT;
-    }
+    for (int i = 0; i < pipeline->channel_count; i++)
+        channel_place(state, i, writer->header.width);
     if (is_first) {
         code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
         state->compress = pipeline->compress_fn;
@@ -153,14 +232,17 @@ static exr_result_t exr_block(ImageWriter *writer)
     return code;
 }
 
-static bool exr_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+static bool exr_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
+                     MessageList *messages)
 {
     const ImageHeader *header = &writer->header;
     ExrWriter *state = writer->state;
-    size_t row_values = (size_t)header->width * header->channels;
     for (uint32_t row = 0; row < row_count; row++) {
-        memcpy(state->block + state->rows_held * row_values, (const float *)pixels + row * row_values,
-               row_values * sizeof(float));
+        for (size_t i = 0; i < state->layer_count; i++) {
+            const size_t row_bytes = header->width * state->layers[i].channel_count * VALUE_BYTES;
+            memcpy((char *)state->layers[i].block + state->rows_held * row_bytes,
+                   (const char *)arrays[i] + row * row_bytes, row_bytes);
+        }
         state->rows_held++;
         if (state->rows_held < state->block_rows && state->block_start + state->rows_held < header->height)
             continue;
@@ -188,7 +270,11 @@ static void exr_free(ImageWriter *writer)
     ExrWriter *state = writer->state;
     if (!state) return;
     exr_close(state);
-    free(state->block);
+    for (size_t i = 0; i < state->layer_count; i++) {
+        free(state->layers[i].channels);
+        free(state->layers[i].block);
+    }
+    free(state->channels);
     free(state);
 }
 

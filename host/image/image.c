@@ -39,7 +39,10 @@ static const Encoder *encoder_of(ImageFormat format)
 
 uint64_t image_bytes(const ImageHeader *header)
 {
-    const uint64_t values = (uint64_t)header->width * header->height * header->channels;
+    size_t channel_count = header->channels;
+    for (size_t i = 0; i < header->layer_count; i++)
+        channel_count += header->layers[i].channel_count;
+    const uint64_t values = (uint64_t)header->width * header->height * channel_count;
     if (header->format == IMAGE_PNG || header->format == IMAGE_PPM) return values * (header->bits / 8);
     return values * (header->npy_type == 'd' ? sizeof(double) : sizeof(float));
 }
@@ -79,9 +82,15 @@ ImageWriter *image_writer_open(const char *path, const ImageHeader *header, Mess
 
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
 {
+    return image_writer_layer_rows(writer, &pixels, row_count, messages);
+}
+
+bool image_writer_layer_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
+                             MessageList *messages)
+{
     if (row_count > writer->header.height - writer->rows_written)
         fault("more rows than the image has: %s", writer->output.target);
-    if (writer->failed || !writer->encoder->rows(writer, pixels, row_count, messages)) {
+    if (writer->failed || !writer->encoder->rows(writer, arrays, row_count, messages)) {
         writer->failed = true;
         return false;
     }

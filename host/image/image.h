@@ -13,6 +13,13 @@ typedef struct {
     const char *key, *value;
 } ImageNote; // written into PNG text chunks and EXR string attributes
 
+// Further values of each pixel, in an EXR only.
+typedef struct {
+    const char *channels; // their names in turn, separated by commas, such as "normal.X,normal.Y,normal.Z"
+    size_t channel_count;
+    char type; // 'f': float32, 'u': uint32
+} ImageLayer;
+
 typedef struct {
     ImageFormat format;
     uint32_t width, height, channels; // channels: 3 (color), 1 for other arrays of NPY
@@ -20,21 +27,32 @@ typedef struct {
     unsigned bits;                    // 8 or 16: PNG, PPM
     char npy_type;                    // 'f': float32, 'd': float64, 'u': uint32
     const ImageNote *notes;           // ended by a NULL key
+    // EXR: the image's place in a larger one, whose size is 0 if there is none
+    uint32_t full_width, full_height, left, top;
+    const ImageLayer *layers; // EXR: after the color
+    size_t layer_count;       // at most IMAGE_LAYERS_MAX
 } ImageHeader;
 
+enum { IMAGE_LAYERS_MAX = 16 };
+
 ImageFormat image_format_of(const char *path); // by its ending, in any case
+
+uint64_t image_bytes(const ImageHeader *header); // of its pixels, uncompressed
 
 // Writes row by row, so that a large image needs memory for a band only. Nothing is at the target path until
 // image_writer_commit renames the file.
 typedef struct ImageWriter ImageWriter;
 // NULL with an error message if the file cannot be written, or cannot fit on its disk. Reads the header's
-// notes; they need not outlive it.
-uint64_t image_bytes(const ImageHeader *header); // of its pixels, uncompressed
+// notes and layers; they need not outlive it.
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages);
 // `pixels`: row_count x width x channels values of npy_type ('f' for PNG, PPM, EXR), from the top. Returns
 // false with an error message if they cannot be written; the writer must still be committed, which then fails
 // silently, or abandoned. More rows than the image has are a bug.
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
+// The same for an image with layers: `arrays` are the pixels and then the values of each layer, row_count x
+// width x its channels.
+bool image_writer_layer_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
+                             MessageList *messages);
 // Adds a note that is known only once rows are written: to a PNG alone, whose text chunks may follow its
 // rows. False as image_writer_rows.
 bool image_writer_note(ImageWriter *writer, const ImageNote *note, MessageList *messages);

@@ -44,8 +44,10 @@ static bool npy_begin(ImageWriter *writer, MessageList *messages)
     return done;
 }
 
-static bool npy_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+static bool npy_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
+                     MessageList *messages)
 {
+    const void *pixels = arrays[0];
     const ImageHeader *header = &writer->header;
     size_t row_size =
         (size_t)header->width * header->channels * npy_types[npy_type_of(header->npy_type)].size;

@@ -90,8 +90,10 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
     return true;
 }
 
-static bool png_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+static bool png_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
+                     MessageList *messages)
 {
+    const void *pixels = arrays[0];
     const ImageHeader *header = &writer->header;
     PngState *state = writer->state;
     size_t row_values = (size_t)header->width * header->channels;

@@ -17,8 +17,10 @@ static bool ppm_begin(ImageWriter *writer, MessageList *messages)
     return output_write(&writer->output, start, (size_t)length, messages);
 }
 
-static bool ppm_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages)
+static bool ppm_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
+                     MessageList *messages)
 {
+    const void *pixels = arrays[0];
     const ImageHeader *header = &writer->header;
     size_t row_values = (size_t)header->width * header->channels;
     const float *values = pixels;
