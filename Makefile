@@ -134,10 +134,11 @@ ladder: $(BUILD)/tools/numerics/ladder
 $(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/random_ray.o) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
-# Every reader under libFuzzer, for tools/fuzz: make fuzz builds $(BUILD)-fuzz/fuzz with Debian's clang.
-CLANG ?= clang-15
+# Every reader under libFuzzer, for tools/fuzz: make fuzz builds $(BUILD)-fuzz/fuzz with Debian's newest clang.
+CLANG ?= $(or $(lastword $(sort $(wildcard /usr/bin/clang-[1-9][0-9]))),clang)
 fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/import/*/*.c host/scene/*.c) \
-                $(addprefix host/,measure/baseline.c measure/calibration.c measure/series.c opencl/cache.c render/checkpoint.c render/film.c) tests/fuzz/readers.c
+                $(addprefix host/,measure/baseline.c measure/calibration.c measure/series.c opencl/cache.c render/checkpoint.c render/film.c) \
+                tests/fuzz/readers.c
 fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
 
 fuzz:
