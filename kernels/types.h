@@ -226,6 +226,10 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define PATH_START  0x811c9dc5u
 #define PATH_FACTOR 0x01000193u
 
+// At `certified` a sample's color is within this part of its largest channel, or of 1 if that is more, of the
+// exact one, unless a texture is on its path.
+#define CERTIFIED_COLOR_ERROR 0x1p-8
+
 // The tile of pixels that a packet of 1, 4, 8 or 16 lanes covers.
 #define TILE_WIDTH_OF(lanes)  ((lanes) >= 8 ? 4 : (lanes) == 4 ? 2 : 1)
 #define TILE_HEIGHT_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)

@@ -10,7 +10,9 @@
 typedef struct {
     Surface surface; // if no lane hit any, only surface.object
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
-    mask doubt;      // at `certified`: lanes in doubt about any of this
+    // at `certified`: lanes in doubt about any of this; a bound on the error of any channel
+    mask doubt;
+    real color_error;
 } ShadedHit;
 
 // The surface that a packet's rays hit, in ambient light.
@@ -19,7 +21,10 @@ static inline void hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
     if (IS_CERTIFIED) traversal_judge(traversal);
     hit->surface.object = traversal->hit.object;
     hit->color = vector_of(scene->header->background);
-    if (IS_CERTIFIED) hit->doubt = traversal->hit.doubt;
+    if (IS_CERTIFIED) {
+        hit->doubt = traversal->hit.doubt;
+        hit->color_error = (real)(0);
+    }
     mask found = surface_found(&hit->surface);
     if (!lanes_any(found)) return;
     hit->surface = visible_surface(scene, ray, &traversal->hit);
@@ -33,6 +38,10 @@ static inline void shadow_rays_make(const Scene *scene, const ShadedHit *hit, ui
 {
     shadow_ray->active = light->lit = mask_none();
     shadow_ray->tmax = (real)(0);
+    if (IS_CERTIFIED) {
+        light->facing_doubt = mask_none();
+        light->color_error = (real)(0);
+    }
     if (lanes_any(surface_found(&hit->surface)))
         *light = light_reach(scene, &hit->surface, index, shadow_ray);
 }
@@ -48,8 +57,10 @@ static inline void hit_light(const Scene *scene, uint index, LightVisibility *li
         mask matters = glossy | !light->facing_doubt;
         hit->doubt = hit->doubt | (light->doubt & matters) | (light->facing_doubt & glossy);
     }
-    if (!lanes_any(light->lit)) return;
-    light_occlude(light, traversal_transmittance(traversal));
+    if (lanes_any(light->lit)) light_occlude(light, traversal_transmittance(traversal));
+    if (IS_CERTIFIED)
+        hit->color_error =
+            hit->color_error + lanes_select(light->lit | light->facing_doubt, light->color_error, (real)(0));
     if (!lanes_any(light->lit)) return;
     Color3 reflected = phong_shade(scene, &hit->surface, light, index);
     hit->color = vector_add(hit->color, reflected);
@@ -97,6 +108,14 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
+// The lanes whose color may be off by more than CERTIFIED_COLOR_ERROR. The 16th left out is for the roundings
+// of the sum.
+static inline mask color_is_doubtful(Color3 color, real error)
+{
+    real largest = real_max(real_max(color.x, color.y), real_max(color.z, (real)(1)));
+    return !(error <= (real)((1 - 0x1p-4f) * CERTIFIED_COLOR_ERROR) * largest);
+}
+
 // Traces a ray tree depth first, reflected before refracted. *shaded, an element of an array, holds the hit
 // of the ray that is followed; with `is_shaded` at first the camera ray's, which rays_shade has traced with
 // other packets. If COMPUTE_SIGNATURE, *path is the tree's signature (types.h), which in each lane is
@@ -107,6 +126,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
 {
     *doubt = mask_none();
     *path = (unsigned_integer)(PATH_START);
+    real color_error = (real)(0);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 color = black, weight = white;
     Ray rays[1] = {ray};         // an array, or Mesa 22.3 crashes in compiling rays_shade's loops
@@ -121,8 +141,13 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
             if (COMPUTE_SIGNATURE)
                 *path = path_signature_add(*path, rays, shaded->surface.object, mask_none(), mask_none(),
                                            mask_none());
+            if (IS_CERTIFIED & !COMPUTE_SIGNATURE)
+                *doubt = *doubt | (rays[0].active & color_is_doubtful(shaded->color, shaded->color_error));
             return shaded->color;
         }
+        if (IS_CERTIFIED)
+            color_error =
+                real_fma(weight.x, lanes_select(rays[0].active, shaded->color_error, (real)(0)), color_error);
         color = color_add_weighted(color, weight, vector_select(rays[0].active, shaded->color, black));
 
         Bounce reflected = {rays[0].origin, rays[0].direction, black, depth + 1};
@@ -145,13 +170,15 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         else if (HAS_TRANSMISSION && lanes_any(bounce_is_active(&refracted)))
             pending[pending_count++] = refracted;
         if (!lanes_any(bounce_is_active(&next))) {
-            if (pending_count == 0) return color;
+            if (pending_count == 0) break;
             next = pending[--pending_count];
         }
         rays[0] = bounce_ray(&next);
         weight = next.weight;
         depth = next.depth;
     }
+    if (IS_CERTIFIED & !COMPUTE_SIGNATURE) *doubt = *doubt | color_is_doubtful(color, color_error);
+    return color;
 }
 
 #endif

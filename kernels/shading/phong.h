@@ -46,19 +46,23 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     return to_light;
 }
 
-// max(0, cos)^shininess of the angle between two unit vectors, for the lanes in `wanted`. Near the
-// highlight's center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has. A
-// shininess of 0 gives 1.
-static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
+// max(0, 1 - s)^shininess for the lanes in `wanted`; a shininess of 0 gives 1.
+static inline real highlight_power(mask wanted, real s, real shininess)
 {
-    Vector difference = vector_subtract(reflected, to_eye);
-    real s = (real)(0.5f) * vector_dot(difference, difference);
     mask nonzero = real_complement_power_is_nonzero(s, shininess);
     real highlight = (real)(0);
     if (lanes_any(wanted & nonzero))
         highlight = lanes_select(
             nonzero, real_complement_power(lanes_select(nonzero, s, (real)(0.5f)), shininess), highlight);
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
+}
+
+// max(0, cos)^shininess of the angle between two unit vectors, for the lanes in `wanted`. Near the
+// highlight's center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has.
+static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
+{
+    Vector difference = vector_subtract(reflected, to_eye);
+    return highlight_power(wanted, (real)(0.5f) * vector_dot(difference, difference), shininess);
 }
 
 // How a light reaches the surface.
@@ -70,6 +74,7 @@ typedef struct {
     // At `certified`: lanes where the shadow is in doubt, and others that may or may not face the light,
     // which matters to highlights and masks of shadows alone: the rest fades to 0.
     mask doubt, facing_doubt;
+    real color_error; // at `certified`: of what the light adds, a bound for every channel
 } LightVisibility;
 
 // The largest error of a shadow ray's origin, in u of its length, that cull spheres allow: rays with a larger
@@ -81,6 +86,57 @@ enum { SHADOW_ERROR_MAX = 1 << 9 };
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
 // The least fourth power of a light's distance for which cull_slack does not underflow.
 #define CULLED_DISTANCE_MIN ((real)(SMALLEST_RATIO * 0x1p30f))
+
+// Of a light's color and of what it adds, in parts of them: roundings, up to those of the power.
+#define COLOR_ROUNDING ((real)(128 * UNIT_ROUNDOFF))
+
+// The light's direction mirrored by the shading normal.
+static inline Vector light_reflected(const Surface *surface, const LightVisibility *light)
+{
+    return vector_fma(surface->shading_normal, light->facing + light->facing,
+                      vector_negate(light->direction));
+}
+
+// Of a highlight's color: a bound above it is tightened.
+#define HIGHLIGHT_ERROR_FAINT ((real)(CERTIFIED_COLOR_ERROR * 0x1p-4f))
+
+// How far a highlight of this brightness may be off where the vectors that it compares are off by `error`. As
+// a function of their distance d it falls, and is (1 - d^2 / 2)^n: its slope for n >= 1 is at most 0.61
+// sqrt(n) + 0.81, for smaller n at most n over 1 - d^2 / 2. Nor is the error more than the highlight at d -
+// error.
+static inline real highlight_error(const Surface *surface, const LightVisibility *light, real brightness,
+                                   real error)
+{
+    const real zero = (real)(0), one = (real)(1), one_half = (real)(0.5f), n = surface->shininess;
+    real bound = error * real_fma((real)(0.61f), real_sqrt(n), (real)(0.81f));
+    mask is_root = (n > zero) & (n < one), wide = is_root | (brightness * bound > HIGHLIGHT_ERROR_FAINT);
+    wide = wide & (brightness > zero);
+    if (lanes_any(wide)) {
+        Vector difference = vector_subtract(light_reflected(surface, light), surface->to_eye);
+        real distance = vector_norm(difference), nearest = real_max(distance - error, zero),
+             farthest = distance + error;
+        real least = real_max(real_fma(-one_half * farthest, farthest, one), zero);
+        bound = lanes_select(is_root, error * divide_or(n + n, least, NEVER), bound);
+        real highest = (real)(1.01f) * highlight_power(wide, one_half * nearest * nearest, n);
+        bound = lanes_select(wide, real_min(bound, highest), bound);
+    }
+    return brightness * real_min(bound, one);
+}
+
+// A bound on the error of what a light adds where it shines in full. `angle_error`: of its direction,
+// `strength_error`: of a spotlight's falloff.
+static inline real light_color_error(const Light *light, const Surface *surface,
+                                     const LightVisibility *visibility, real angle_error, real facing_error,
+                                     real strength_error)
+{
+    Color3 diffuse = surface->diffuse;
+    real largest = real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
+    real brightest = (real)(light->color.w), shiny = brightest * surface->specular;
+    real compared = real_fma((real)(2), surface->normal_error, angle_error + surface->eye_error);
+    real highlight = highlight_error(surface, visibility, shiny, compared);
+    real error = real_fma(brightest * largest, facing_error, highlight);
+    return real_fma(real_fma(brightest, largest, shiny), strength_error + COLOR_ROUNDING, error);
+}
 
 // Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes whose
 // errors are too large for cull spheres.
@@ -124,6 +180,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
     mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
     self_doubt = self_doubt | (open & !faint);
+    real strength_error = (real)(0);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {
         Vector difference =
@@ -133,10 +190,16 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
         mask at_edge = !turned & (fabs(s - edge) <= s_error);
         mask fades = s_error * (real)(light->cone.z) * brightness <= FACING_ERROR_MAX;
-        if (light->cone.z == 0) fades = mask_none();
+        if (light->cone.z == 0)
+            fades = mask_none();
+        else // the smooth step's slope is at most 1.5
+            strength_error = real_min((real)(1.5f * light->cone.z) * s_error, (real)(1));
         self_doubt = self_doubt | (at_edge & !fades);
         visibility->facing_doubt = visibility->facing_doubt | (at_edge & fades);
     }
+    real color_error =
+        light_color_error(light, surface, visibility, angle_error, facing_error, strength_error);
+    visibility->color_error = lanes_select(turned, (real)(0), color_error);
     visibility->lit = visibility->lit & !behind;
     visibility->doubt = self_doubt | (visibility->lit & far_off);
     shadow_ray->active = shadow_ray->active & !visibility->doubt;
@@ -173,6 +236,8 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
 
 static inline void light_occlude(LightVisibility *visibility, real passing)
 {
+    if (IS_CERTIFIED)
+        visibility->color_error = visibility->color_error * lanes_select(visibility->lit, passing, (real)(1));
     visibility->lit = visibility->lit & (passing > (real)(0));
     visibility->fraction = visibility->fraction * passing;
 }
@@ -201,10 +266,8 @@ static inline Color3 phong_shade(const Scene *scene, const Surface *surface, con
     Color3 color = vector_scale(surface->diffuse, light->facing);
     mask glossy = light->lit & (surface->specular > (real)(0));
     if (lanes_any(glossy)) {
-        Vector reflected = vector_fma(surface->shading_normal, light->facing + light->facing,
-                                      vector_negate(light->direction));
-        real highlight =
-            surface->specular * phong_highlight(glossy, reflected, surface->to_eye, surface->shininess);
+        real highlight = surface->specular * phong_highlight(glossy, light_reflected(surface, light),
+                                                             surface->to_eye, surface->shininess);
         color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
     }
     return vector_select(light->lit, color_multiply(color, arriving), black);

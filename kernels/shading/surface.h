@@ -36,8 +36,8 @@ typedef struct {
     mask entering;  // the ray runs into the solid, against its outward normal
     real travelled; // distance from the eye along the path
     // At `certified`: bounds on the distance of the position from the exact one and of the shading normal
-    // and, with HAS_TRIANGLES, of the geometric normal from the exact ones; what is in doubt.
-    real place_error, normal_error, geometric_error;
+    // and, with HAS_TRIANGLES, of the geometric normal from the exact ones, and of to_eye; what is in doubt.
+    real place_error, normal_error, geometric_error, eye_error;
     mask doubt;
     ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
@@ -300,7 +300,10 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         surface.ior = (real)(1);
     }
     if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
-    if (IS_CERTIFIED) surface.place_error = hit_place_error(ray, hit);
+    if (IS_CERTIFIED) {
+        surface.place_error = hit_place_error(ray, hit);
+        surface.eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+    }
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
     if (IS_CERTIFIED) {
