@@ -126,8 +126,8 @@ $(BUILD)/tests/test_bench: private LDFLAGS += -Wl,--wrap=malloc
 # A file is removed before it is locked, or cannot be removed.
 $(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock -Wl,--wrap=unlink
 
-# An image is wrong.
-$(BUILD)/tests/test_certify_status: private LDFLAGS += -Wl,--wrap=renderer_render_film
+# An image is wrong, or is that of another scene.
+$(BUILD)/tests/test_certify_status: private LDFLAGS += -Wl,--wrap=renderer_render_film -Wl,--wrap=renderer_open
 
 ladder: $(BUILD)/tools/numerics/ladder
 

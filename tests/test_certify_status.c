@@ -1,4 +1,5 @@
-// The exit status of glint certify where an image is wrong: one object is changed in what was rendered.
+// The exit status of glint certify where an image is wrong: one pixel of what was rendered is changed, or a
+// scene is rendered that differs from the one that is certified in what only a mirror shows.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
@@ -14,10 +15,12 @@
 
 enum { COLUMN = 7, ROW = 5 };
 
+typedef enum { NOTHING, AN_OBJECT, A_COLOR, THE_CHECKER, A_SHADOW } Change;
+
 typedef struct {
     const char *precision;
-    uint32_t doubt; // of the wrong pixel
-    bool is_right;
+    Change change;
+    uint32_t doubt; // of the pixel
 } Case;
 
 static Case wrong;
@@ -27,18 +30,40 @@ bool __wrap_renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 bool __wrap_renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
 {
     const bool rendered = __real_renderer_render_film(renderer, aovs, film);
-    if (!rendered || wrong.is_right) return rendered;
     const size_t pixel = (size_t)ROW * film->width + COLUMN;
-    film->object[pixel]++;
+    if (!rendered || (wrong.change != AN_OBJECT && wrong.change != A_COLOR)) return rendered;
+    film->object[pixel] += wrong.change == AN_OBJECT;
+    if (wrong.change == A_COLOR) film->color[3 * pixel + 1] += 0x1p-7;
     film->doubt[pixel] = wrong.doubt;
     return true;
+}
+
+Renderer *__real_renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                               MessageList *messages);
+Renderer *__wrap_renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                               MessageList *messages);
+Renderer *__wrap_renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                               MessageList *messages)
+{
+    static Scene changed; // which the renderer may refer to
+    free(changed.materials.items);
+    changed = *scene;
+    const size_t count = scene->materials.count;
+    changed.materials.items = memory_allocate(count, sizeof *changed.materials.items);
+    memcpy(changed.materials.items, scene->materials.items, count * sizeof *changed.materials.items);
+    for (size_t i = 0; i < count && wrong.change == THE_CHECKER; i++)
+        changed.materials.items[i].checker_size *= 1.5;
+    changed.objects.count -= wrong.change == A_SHADOW; // the last is the disc
+    return __real_renderer_open(compute, &changed, settings, messages);
 }
 
 static void certify(void *context)
 {
     wrong = *(const Case *)context;
-    const char *const texts[] = {"certify", "scenes/spheres16.yaml", "--size",        "12x8",  "--pixels",
-                                 "96",      "--precision",           wrong.precision, "--json"};
+    const char *const scene =
+        wrong.change < THE_CHECKER ? "scenes/spheres16.yaml" : "tests/scenes/mirrored-floor.yaml";
+    const char *const texts[] = {"certify", scene,         "--size",        "12x8",  "--pixels",
+                                 "96",      "--precision", wrong.precision, "--json"};
     enum { COUNT = sizeof texts / sizeof *texts };
     char *arguments[COUNT + 1] = {NULL};
     for (int i = 0; i < COUNT; i++)
@@ -52,17 +77,27 @@ static void certify(void *context)
 static void test_status(void **state)
 {
     (void)state;
-    const Case fails = {"single,certified", 0, false};
-    const Case passing[] = {{"certified", DOUBT_UNDECIDED, false}, // it says so itself
-                            {"single", 0, false},                  // which promises nothing
-                            {"certified", 0, true}};
-    Case one = {"certified", 0, true};
+    const Case fails[] = {{"single,certified", AN_OBJECT, 0}, {"certified", A_COLOR, 0}};
+    const Case mirrored[] = {{"certified", THE_CHECKER, 0}, {"certified", A_SHADOW, 0}};
+    const Case passing[] = {{"certified", AN_OBJECT, DOUBT_UNDECIDED}, // it says so itself
+                            {"certified", A_COLOR, DOUBT_UNDECIDED},
+                            {"single", AN_OBJECT, 0}, // which promises nothing
+                            {"certified", NOTHING, 0}};
+    Case one = {"certified", NOTHING, 0};
     if (child_run(certify, &one, sizeof one).status == EXIT_USER) skip(); // no fp64
-    one = fails;
-    const ChildEnd end = child_run(certify, &one, sizeof one);
-    assert_int_equal(end.status, EXIT_CHECK);
-    assert_non_null(strstr(end.errors, "glint certify: certified is wrong at 1 "));
-    assert_non_null(strstr(end.errors, " at 7,5:"));
+    for (size_t i = 0; i < sizeof fails / sizeof *fails; i++) {
+        one = fails[i];
+        const ChildEnd end = child_run(certify, &one, sizeof one);
+        assert_int_equal(end.status, EXIT_CHECK);
+        assert_non_null(strstr(end.errors, "glint certify: certified is wrong at 1 "));
+        assert_non_null(strstr(end.errors, " at 7,5:"));
+    }
+    for (size_t i = 0; i < sizeof mirrored / sizeof *mirrored; i++) {
+        one = mirrored[i];
+        const ChildEnd end = child_run(certify, &one, sizeof one);
+        assert_int_equal(end.status, EXIT_CHECK);
+        assert_non_null(strstr(end.errors, "glint certify: certified is wrong at "));
+    }
     for (size_t i = 0; i < sizeof passing / sizeof *passing; i++) {
         one = passing[i];
         assert_int_equal(child_run(certify, &one, sizeof one).status, EXIT_DONE);

@@ -1,4 +1,5 @@
 // The reference itself, against roots known by hand or from certified interval arithmetic.
+#include "host/compile/camera_basis.h"
 #include "host/verify/certify.h"
 #include "host/verify/reference_color.h"
 #include "tests/random_ray.h"
@@ -330,6 +331,27 @@ static void aims_cameras(void **state)
     assert_true(ray.direction.x == (Quad)0.5 && ray.direction.y == 0);
 }
 
+// The camera's vectors in double are those of quadruple precision but for rounding.
+static void rounds_cameras(void **state)
+{
+    (void)state;
+    Random random = {7};
+    for (int i = 0; i < 50; i++) {
+        const Camera camera = {.position = vector_scale(random_unit_vector(&random), 5),
+                               .look_at = random_unit_vector(&random),
+                               .up = random_unit_vector(&random),
+                               .half_tangent = 4};
+        const CameraBasis basis = camera_basis(&camera, 8, 8);
+        const Quad3 forward = quad3_unit(quad3_subtract(quad3(camera.look_at), quad3(camera.position)));
+        const Quad3 across = quad3_cross(forward, quad3(camera.up)), right = quad3_unit(across);
+        const double steepness = (double)(1 / quad3_length(across));
+        assert_true(reference_distance(basis.forward, forward) < 4 * DBL_EPSILON);
+        assert_true(reference_distance(vector_scale(basis.right, 2), right) < 4 * DBL_EPSILON * steepness);
+        assert_true(reference_distance(vector_scale(basis.up, 2), quad3_cross(right, forward)) <
+                    4 * DBL_EPSILON * steepness);
+    }
+}
+
 static void rounds_every_number(void **state)
 {
     (void)state;
@@ -429,14 +451,14 @@ static void nonfinite_colors_are_errors(void **state)
     CertifySample sample = {.width = 3, .height = 1, .count = 1, .places = places, .pixels = pixels};
     const Film film = {
         .width = 3, .height = 1, .object = objects, .path = paths, .color = colors, .doubt = doubts};
-    assert_true(certify_compare(&sample, &film).color == 0.125);
+    assert_true(certify_compare(&sample, &film).wrong_color == 0.125);
     sample.count = 3;
     for (size_t channel = 0; channel < 3; channel++) {
         double *faulty = colors + 3 + channel;
         const double right = *faulty;
         *faulty = channel == 1 ? -INFINITY : NAN;
         const CertifyErrors errors = certify_compare(&sample, &film);
-        assert_true(isinf(errors.color) && errors.wrong_color == 0);
+        assert_true(isinf(errors.wrong_color) && errors.right_color == 0);
         assert_int_equal(errors.worst[0], 1);
         paths[1] = 1;
         assert_true(isinf(certify_compare(&sample, &film).wrong_color));
@@ -448,21 +470,14 @@ static void nonfinite_colors_are_errors(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(knows_spheres),
-        cmocka_unit_test(sees_only_insides),
-        cmocka_unit_test(knows_flat_shapes),
-        cmocka_unit_test(knows_cylinders),
-        cmocka_unit_test(knows_cones),
-        cmocka_unit_test(knows_tori),
-        cmocka_unit_test(shades_as_phong),
-        cmocka_unit_test(casts_shadows),
-        cmocka_unit_test(lays_checkers),
-        cmocka_unit_test(aims_cameras),
-        cmocka_unit_test(rounds_every_number),
-        cmocka_unit_test(finds_the_nearest),
-        cmocka_unit_test(measures_distances),
-        cmocka_unit_test(knows_highlights),
-        cmocka_unit_test(nonfinite_colors_are_errors),
+        cmocka_unit_test(knows_spheres),     cmocka_unit_test(sees_only_insides),
+        cmocka_unit_test(knows_flat_shapes), cmocka_unit_test(knows_cylinders),
+        cmocka_unit_test(knows_cones),       cmocka_unit_test(knows_tori),
+        cmocka_unit_test(shades_as_phong),   cmocka_unit_test(casts_shadows),
+        cmocka_unit_test(lays_checkers),     cmocka_unit_test(aims_cameras),
+        cmocka_unit_test(rounds_cameras),    cmocka_unit_test(rounds_every_number),
+        cmocka_unit_test(finds_the_nearest), cmocka_unit_test(measures_distances),
+        cmocka_unit_test(knows_highlights),  cmocka_unit_test(nonfinite_colors_are_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

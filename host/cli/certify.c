@@ -34,7 +34,8 @@ static const char help_text[] =
     "usage: glint certify SCENE [OPTIONS]\n\n"
     "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
     "pixels: "
-    "objects, shadows, paths, colors.\nExit status 3: one is wrong that certified says it decides.\n\n"
+    "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not list as "
+    "undecided.\n\n"
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of fast, single, strict, double, certified (default: all that fit)\n" //
@@ -97,8 +98,13 @@ typedef struct {
     } rows[PRECISION_COUNT];
 } Certification;
 
-static void doubts_print(const CertifyDoubts *doubts)
+static void certified_print(const CertifyErrors *errors, const CertifyDoubts *doubts)
 {
+    printf("             colors are certified to %.2g of their largest channel, or of 1 if that is more\n",
+           CERTIFIED_COLOR_ERROR);
+    if (errors->unconfirmed > 0)
+        printf("             %zu pixels decided that the reference leaves undecided; %zu differ from it\n",
+               errors->unconfirmed, errors->contradicted);
     if (doubts->count == 0) return;
     printf("             %zu pixel%s undecided; examined: %zu, of which %zu change with errors of 2^-50, %zu "
            "are "
@@ -121,22 +127,22 @@ static void text_print(const Certification *certification)
     printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
            sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
            certification->reference_seconds);
-    if (undecided > 0) printf("; %zu undecided in it are left out", undecided);
+    if (undecided > 0) printf("; %zu undecided in it are not counted as right or wrong", undecided);
     if (textured > 0) printf("; of %zu with a texture no color is compared", textured);
-    puts("\n                     wrong             largest error of color        largest margin\n"
-         "  precision   object  shadow    path   right     wrong     at         of a wrong pixel");
+    puts("\n                         wrong                 largest error of color        largest margin\n"
+         "  precision   object  shadow    path   color   right     wrong     at         of a wrong pixel");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         const char *failure = certification->rows[i].failure;
         if (failure) printf("  %-9s  unavailable: %s\n", precision_names[i], failure);
         if (!certification->rows[i].measured) continue;
         const CertifyErrors *errors = &certification->rows[i].errors;
-        printf("  %-9s  %7zu %7zu %7zu   %-9.2g %-9.2g %u,%u", precision_names[i], errors->object,
-               errors->shadow, errors->path, errors->color, errors->wrong_color, errors->worst[0],
-               errors->worst[1]);
-        if (errors->object + errors->shadow + errors->path > 0)
+        printf("  %-9s  %7zu %7zu %7zu %7zu   %-9.2g %-9.2g %u,%u", precision_names[i], errors->object,
+               errors->shadow, errors->path, errors->color, errors->right_color, errors->wrong_color,
+               errors->worst[0], errors->worst[1]);
+        if (errors->object + errors->shadow + errors->path + errors->color > 0)
             printf("    %.2g of the distance", errors->margin);
         putchar('\n');
-        if (i == PRECISION_CERTIFIED) doubts_print(&certification->rows[i].doubts);
+        if (i == PRECISION_CERTIFIED) certified_print(errors, &certification->rows[i].doubts);
     }
 }
 
@@ -150,17 +156,21 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_int64(json, "object", (int64_t)errors->object);
     json_int64(json, "shadow", (int64_t)errors->shadow);
     json_int64(json, "path", (int64_t)errors->path);
+    json_int64(json, "color", (int64_t)errors->color);
     json_number(json, "margin", errors->margin);
     json_end(json);
     json_begin_object(json, "color");
     json_int64(json, "pixels", (int64_t)errors->colors);
-    json_number(json, "max_right", errors->color);
+    json_number(json, "bound", CERTIFIED_COLOR_ERROR);
+    json_number(json, "max_right", errors->right_color);
     json_number(json, "max_wrong", errors->wrong_color);
     json_int64(json, "x", errors->worst[0]);
     json_int64(json, "y", errors->worst[1]);
     json_end(json);
     if (precision == PRECISION_CERTIFIED) {
         json_int64(json, "wrong_decided", (int64_t)errors->wrong_decided);
+        json_int64(json, "unconfirmed", (int64_t)errors->unconfirmed);
+        json_int64(json, "contradicted", (int64_t)errors->contradicted);
         json_begin_object(json, "undecided");
         json_int64(json, "pixels", (int64_t)doubts->count);
         json_int64(json, "examined", (int64_t)doubts->examined);

@@ -85,23 +85,21 @@ static double color_error(const double color[3], const Color *expected)
     return largest;
 }
 
-// Adds to the first of the counts whose decision is not the reference's; false if all are.
-static bool is_wrong(const CertifySample *sample, size_t index, const Film *film, size_t pixel,
-                     CertifyErrors *errors)
+// The first way in which a pixel is wrong.
+typedef enum { RIGHT, WRONG_OBJECT, WRONG_SHADOW, WRONG_PATH, WRONG_COLOR } Fault;
+
+static Fault fault_of(const CertifySample *sample, size_t index, const Film *film, size_t pixel)
 {
     const ReferencePixel *expected = &sample->pixels[index];
-    if (film->object[pixel] != expected->object) {
-        errors->object++;
-        return true;
-    }
+    if (film->object[pixel] != expected->object) return WRONG_OBJECT;
     for (size_t i = 0; i < sample->light_count && expected->object != UINT32_MAX; i++)
         if ((film->shadow[pixel * sample->light_count + i] != 0) !=
-            sample->shadows[index * sample->light_count + i]) {
-            errors->shadow++;
-            return true;
-        }
-    errors->path += film->path[pixel] != expected->path;
-    return film->path[pixel] != expected->path;
+            sample->shadows[index * sample->light_count + i])
+            return WRONG_SHADOW;
+    if (film->path[pixel] != expected->path) return WRONG_PATH;
+    if (expected->has_texture) return RIGHT;
+    const double bound = CERTIFIED_COLOR_ERROR * fmax(1, vector_largest(expected->color));
+    return color_error(film->color + 3 * pixel, &expected->color) <= bound ? RIGHT : WRONG_COLOR;
 }
 
 static void wrong_decided_add(CertifyErrors *errors, const uint32_t place[2], double margin)
@@ -112,25 +110,40 @@ static void wrong_decided_add(CertifyErrors *errors, const uint32_t place[2], do
     memcpy(errors->wrong_decided_place, place, sizeof errors->wrong_decided_place);
 }
 
+static void color_compare(CertifyErrors *errors, const double color[3], const Color *expected,
+                          const uint32_t place[2], bool is_wrong)
+{
+    errors->colors++;
+    const double error = color_error(color, expected);
+    if (error > fmax(errors->right_color, errors->wrong_color))
+        memcpy(errors->worst, place, sizeof errors->worst);
+    double *largest = is_wrong ? &errors->wrong_color : &errors->right_color;
+    *largest = fmax(*largest, error);
+}
+
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
 {
     CertifyErrors errors = {0};
+    size_t *const counts[] = {NULL, &errors.object, &errors.shadow, &errors.path, &errors.color};
     for (size_t i = 0; i < sample->count; i++) {
         const ReferencePixel *expected = &sample->pixels[i];
-        if (reference_is_undecided(expected)) continue;
+        const uint32_t *place = sample->places[i];
+        const size_t pixel = (size_t)place[1] * film->width + place[0];
+        const Fault fault = fault_of(sample, i, film, pixel);
+        const bool claimed = film->doubt[pixel] != DOUBT_UNDECIDED;
+        if (fault && claimed) wrong_decided_add(&errors, place, expected->margin);
+        if (reference_is_undecided(expected)) {
+            errors.unconfirmed += claimed;
+            errors.contradicted += claimed && fault;
+            continue;
+        }
         errors.compared++;
-        const size_t pixel = (size_t)sample->places[i][1] * film->width + sample->places[i][0];
-        const bool wrong = is_wrong(sample, i, film, pixel, &errors);
-        if (wrong) errors.margin = fmax(errors.margin, expected->margin);
-        if (wrong && film->doubt[pixel] != DOUBT_UNDECIDED)
-            wrong_decided_add(&errors, sample->places[i], expected->margin);
-        if (expected->has_texture) continue;
-        errors.colors++;
-        const double error = color_error(film->color + 3 * pixel, &expected->color);
-        if (error > fmax(errors.color, errors.wrong_color))
-            errors.worst[0] = sample->places[i][0], errors.worst[1] = sample->places[i][1];
-        double *largest = wrong ? &errors.wrong_color : &errors.color;
-        *largest = fmax(*largest, error);
+        if (fault) {
+            ++*counts[fault];
+            errors.margin = fmax(errors.margin, expected->margin);
+        }
+        if (!expected->has_texture)
+            color_compare(&errors, film->color + 3 * pixel, &expected->color, place, fault);
     }
     return errors;
 }

@@ -20,18 +20,28 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
                          size_t count, unsigned bounce_count, bool (*stop)(void));
 void certify_sample_close(CertifySample *sample);
 
-// Of an image, all numbers of pixels. A pixel is wrong in one way at most, the first of these.
+// What `certified` claims of a pixel that AOV_DOUBT does not list as undecided: the object, which lights
+// reach it and the path are those of exact arithmetic on the scene's numbers and the camera's vectors in
+// double, and the color, unless a texture is on the path, is within CERTIFIED_COLOR_ERROR of its largest
+// channel, or of 1 if that is more. So a checker's cell or a shadow that is seen in a mirror is claimed by
+// the color.
+//
+// The counts of pixels where an image differs from that. A pixel is wrong in one way at most, the first of
+// these.
 typedef struct {
-    size_t compared;
-    size_t object, shadow, path;
+    size_t compared; // the reference decides them
+    size_t object, shadow, path, color;
     size_t colors;      // of pixels without a texture, right or wrong
-    double color;       // the largest error of a channel where nothing is wrong
+    double right_color; // the largest error of a channel where nothing is wrong
     double wrong_color; // and where something is
     uint32_t worst[2];  // where the larger of these is
     // Of wrong pixels: how far the exact ray is from the curve at which its answer changes, the most, in
     // parts of the distance. What single may see wrong is at most some units of roundoff from it.
     double margin;
-    // Wrong pixels that AOV_DOUBT does not list as undecided, and which of them has the largest margin.
+    // Pixels that the reference leaves undecided, and AOV_DOUBT does not; how many of these differ from it.
+    size_t unconfirmed, contradicted;
+    // Pixels that contradict the claim: wrong or contradicted, and not undecided; and which of them has the
+    // largest margin.
     size_t wrong_decided;
     uint32_t wrong_decided_place[2];
     double wrong_decided_margin;

@@ -1,27 +1,21 @@
 #include "host/verify/reference_color.h"
 
+#include "host/compile/camera_basis.h"
 #include "host/compile/random_shape.h"
 #include <math.h>
 
-// A shadow ray leaves out this fraction of its length at either end: far over the rounding of quadruple
-// precision, far under any gap that a scene's doubles can express at its own scale.
-#define SHADOW_MARGIN ((Quad)1e-12L)
+// How far a point of a surface may be off it, in parts of the numbers that it was computed from: far over the
+// rounding of quadruple precision, far under that of double.
+#define START_PART ((Quad)0x1p-90L)
 
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
                                   unsigned row)
 {
-    Quad3 forward = quad3_unit(quad3_subtract(quad3(camera->look_at), quad3(camera->position)));
-    Quad3 right = quad3_cross(forward, quad3_unit(quad3(camera->up)));
-    if (quad3_length(right) < (Quad)1e-12L) right = quad3_cross(forward, quad3_least_axis(forward));
-    right = quad3_unit(right);
-    Quad3 up = quad3_cross(right, forward);
-
-    Quad side = camera->field_axis == FIELD_VERTICAL ? height : width;
-    Quad half_pixel = camera->half_tangent / side;
-    Quad x = ((Quad)2 * column + 1 - width) * half_pixel;
-    Quad y = -((Quad)2 * row + 1 - height) * half_pixel;
-    Quad3 sideways = quad3_add(quad3_scale(right, x), quad3_scale(up, y));
-    return (ReferenceRay){quad3(camera->position), quad3_add(forward, sideways), 0, (Quad)FLT_MAX};
+    const CameraBasis basis = camera_basis(camera, width, height);
+    const Quad x = (Quad)2 * column + 1 - width, y = height - 1 - (Quad)2 * row;
+    const Quad3 sideways = quad3_add(quad3_scale(quad3(basis.right), x), quad3_scale(quad3(basis.up), y));
+    const Quad3 direction = quad3_add(quad3(basis.forward), sideways);
+    return (ReferenceRay){quad3(camera->position), direction, 0, (Quad)FLT_MAX};
 }
 
 // A point of a surface, the unit normals that face the eye, of shading and of the geometry, and the unit
@@ -29,8 +23,9 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
 typedef struct {
     Quad3 point, normal, geometric, to_eye;
     Quad scale; // how far the point is from the ray's origin
-    Quad start; // rays that leave it have gone this far before they meet anything
+    Quad start; // the surface is no farther than this from the point
     bool entering;
+    uint32_t index; // of the object
     const Object *object;
     const Material *material;
     Color base;
@@ -96,8 +91,7 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     if (facing <= 0) return false;
 
     Quad start = surface->start / quad3_length(to_light_unnormalized);
-    ReferenceRay shadow = {surface->point, to_light_unnormalized, start,
-                           directional ? (Quad)LDBL_MAX : 1 - SHADOW_MARGIN};
+    ReferenceRay shadow = {surface->point, to_light_unnormalized, start, directional ? (Quad)LDBL_MAX : 1};
     Quad strength =
         light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
     // a light before the shading normal but behind the surface
@@ -107,9 +101,8 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Material *medium = &scene->materials.items[object->material];
-        ReferenceHit blocker = reference_scene_hit_object(world, i, &shadow);
-        // The surface itself always has margin 0; `facing` says where it shadows itself.
-        if (object != surface->object) sum->margin = fmin(sum->margin, (double)blocker.margin);
+        ReferenceHit blocker = reference_scene_hit_object(world, i, &shadow, surface->index);
+        sum->margin = fmin(sum->margin, (double)blocker.margin);
         if (blocker.found) strength *= medium->full_shadow ? 0 : medium->transmission;
     }
     double diffuse = (double)(strength * facing);
@@ -127,10 +120,20 @@ static Quad3 random_offset(Random *random, double size)
     return quad3(vector_scale(random_in_sphere(random), size));
 }
 
-// What a ray met; moved along the surface and turned by up to `blur`.
-static Surface surface_at(const Scene *scene, const ReferenceRay *ray, ReferenceHit *hit, double blur,
-                          Random *random)
+// The magnitude of the numbers that decide whether a hit's point is on its surface.
+static Quad hit_magnitude(const ReferenceScene *world, const ReferenceHit *hit, Quad3 point, Quad distance)
 {
+    const double radius = world->spheres ? world->spheres[hit->object].radius : INFINITY;
+    Quad magnitude = distance + quad3_length(point);
+    if (hit->curvature_radius < LDBL_MAX) magnitude += hit->curvature_radius;
+    return isfinite(radius) ? magnitude + radius : magnitude;
+}
+
+// What a ray met; moved along the surface and turned by up to `blur`.
+static Surface surface_at(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit,
+                          double blur, Random *random)
+{
+    const Scene *scene = &world->scene;
     const Object *object = &scene->objects.items[hit->object];
     const Material *material = &scene->materials.items[object->material];
     Quad length = quad3_length(ray->direction);
@@ -140,10 +143,11 @@ static Surface surface_at(const Scene *scene, const ReferenceRay *ray, Reference
                        .to_eye = quad3_scale(ray->direction, -1 / length),
                        .scale = hit->t * length,
                        .entering = hit->entering,
+                       .index = hit->object,
                        .object = object,
                        .material = material,
                        .base = material->color};
-    surface.start = SHADOW_MARGIN * surface.scale;
+    surface.start = START_PART * hit_magnitude(world, hit, surface.point, surface.scale);
     if (blur > 0) {
         Quad size =
             surface.scale + quad3_length(quad3_subtract(surface.point, quad3(scene->camera.position)));
@@ -176,8 +180,9 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_hit(scene, ray);
     if (!hit.found) return (ReferenceColor){scene->background, (double)hit.margin};
-    Surface surface = surface_at(scene, ray, &hit, 0, NULL);
-    return surface_color(&(ReferenceScene){*scene, NULL}, &surface, (double)hit.margin, NULL);
+    const ReferenceScene world = {*scene, NULL};
+    Surface surface = surface_at(&world, ray, &hit, 0, NULL);
+    return surface_color(&world, &surface, (double)hit.margin, NULL);
 }
 
 // Snell's law: with the sine behind the surface eta times that before it. False where that is more than 1.
@@ -206,13 +211,11 @@ static bool is_on_side(Quad3 direction, Quad3 normal, int side, double *margin)
     return height > 0;
 }
 
-// Tie rule: an opaque surface within CONTACT_PART * distance of a transparent one is the visible one.
-#define CONTACT_PART ((Quad)1e-9L)
-
+// Of an opaque surface that coincides with a transparent one the opaque one is visible.
 static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit)
 {
     const Scene *scene = &world->scene;
-    Quad length = quad3_length(ray->direction), reach = CONTACT_PART * hit->t * length;
+    Quad length = quad3_length(ray->direction), reach = START_PART * hit->t * length;
     const ReferenceHit transparent = *hit;
     const ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
     ReferenceRay around = *ray;
@@ -221,9 +224,10 @@ static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (scene->materials.items[object->material].transmission > 0) continue;
-        if (!reference_scene_hit_object(world, i, &inward).found) continue;
-        ReferenceHit opaque = reference_scene_hit_object(world, i, &around);
+        if (!reference_scene_hit_object(world, i, &inward, UINT32_MAX).found) continue;
+        ReferenceHit opaque = reference_scene_hit_object(world, i, &around, UINT32_MAX);
         if (!opaque.found || (hit->object != transparent.object && opaque.t >= hit->t)) continue;
+        opaque.margin = quad_minimum(opaque.margin, hit->margin);
         *hit = opaque;
         hit->object = (uint32_t)i;
     }
@@ -267,7 +271,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
         tree->distance = (double)(hit.t * quad3_length(ray->direction));
     }
     tree->has_first = true;
-    Surface surface = surface_at(scene, ray, &hit, tree->blur, &tree->random);
+    Surface surface = surface_at(tree->world, ray, &hit, tree->blur, &tree->random);
     const Material *material = surface.material;
     const ReferenceColor own = surface_color(tree->world, &surface, (double)hit.margin, tree->shadows);
     tree->shadows = NULL;

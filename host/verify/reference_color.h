@@ -5,7 +5,8 @@
 #include "host/verify/reference_scene.h"
 #include <stdbool.h>
 
-// The ray through the center of a pixel, row 0 at the top (docs/scene-format.md).
+// The ray through the center of a pixel, row 0 at the top (docs/scene-format.md), exactly that of the
+// camera's vectors in double.
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
                                   unsigned row);
 

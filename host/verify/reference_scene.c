@@ -71,20 +71,29 @@ static bool sphere_is_missed(const BoundingSphere *sphere, const ReferenceRay *r
            along + radius < (double)ray->tmin * length || along - radius > (double)ray->tmax * length;
 }
 
-ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray)
+ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray,
+                                        uint32_t left)
 {
     if (scene->spheres && sphere_is_missed(&scene->spheres[index], ray)) return reference_miss();
-    return reference_hit_object(&scene->scene.objects.items[index], ray);
+    const Object *object = &scene->scene.objects.items[index];
+    const bool is_flat =
+        object->kind == SHAPE_PLANE || object->kind == SHAPE_DISC || object->kind == SHAPE_TRIANGLE;
+    if (index == left && is_flat) return reference_miss();
+    ReferenceRay whole = *ray;
+    if (left != UINT32_MAX) whole.tmin = 0;
+    ReferenceHit hit = reference_hit_object(object, &whole);
+    while (left != UINT32_MAX && hit.found && hit.t * hit.cosine <= ray->tmin) {
+        whole.tmin = hit.t;
+        hit = reference_hit_object(object, &whole);
+    }
+    if (index == left) hit.margin = reference_miss().margin;
+    return hit;
 }
 
 ReferenceHit reference_scene_hit(const ReferenceScene *scene, const ReferenceRay *ray, uint32_t left)
 {
     ReferenceHit nearest = reference_miss();
-    const Quad unbounded = nearest.margin;
-    for (size_t i = 0; i < scene->scene.objects.count; i++) {
-        ReferenceHit hit = reference_scene_hit_object(scene, i, ray);
-        if (i == left) hit.margin = unbounded;
-        reference_hit_take(&nearest, hit, (uint32_t)i, ray);
-    }
+    for (size_t i = 0; i < scene->scene.objects.count; i++)
+        reference_hit_take(&nearest, reference_scene_hit_object(scene, i, ray, left), (uint32_t)i, ray);
     return nearest;
 }

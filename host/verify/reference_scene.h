@@ -13,8 +13,11 @@ typedef struct {
 ReferenceScene reference_scene_open(const Scene *scene); // which must outlive it
 void reference_scene_close(ReferenceScene *scene);
 
-// Of one object; a miss where its bounding sphere is missed.
-ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray);
-// The nearest. `left`: the object that the ray leaves, UINT32_MAX for the eye. On its surface a margin is 0
-// although nothing is open, so that its own does not count.
+// Returns the hit of one object, a miss where its bounding sphere is missed. `left`: the object on whose
+// surface the ray starts, UINT32_MAX for the eye. A start on a surface does not hit it, nor another one that
+// coincides: the start's height over a hit's tangent plane must exceed ray->tmin times the direction's
+// length. The margin of the object that is left, 0 although nothing is open, does not count.
+ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray,
+                                        uint32_t left);
+// Returns the nearest hit of all objects.
 ReferenceHit reference_scene_hit(const ReferenceScene *scene, const ReferenceRay *ray, uint32_t left);
