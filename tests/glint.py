@@ -4,11 +4,13 @@ Tests are the executable tests/test_*.py; other Python files are helpers. A test
 folder in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG_CACHE_HOME, shared by the tests of a run.
 """
 import ast
+import contextlib
 import csv
 import importlib.util
 import json
 import math
 import os
+import pty
 import re
 import shlex
 import signal
@@ -69,6 +71,22 @@ def run(command, wrapper=(), env=None, **options):
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
     environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"} | {"LC_ALL": "C"}
     return subprocess.run([*wrapper, PROGRAM, *shlex.split(command)], env=environment | (env or {}), **options)
+
+
+def terminal_run(command):
+    """What `glint COMMAND`, whose report goes to a file, prints on the terminal."""
+    terminal, end = pty.openpty()
+    with open("report.json", "w", encoding="utf-8") as report:
+        process = run(command, stdout=report, stderr=end)
+    os.close(end)
+    shown = b""
+    with contextlib.suppress(OSError):  # all is read, and nobody writes
+        while part := os.read(terminal, 4096):
+            shown += part
+    os.close(terminal)
+    assert process.returncode == 0, shown
+    json.loads(read("report.json"))
+    return shown.decode()
 
 
 def shim_build(name, source, *flags):

@@ -34,7 +34,8 @@ NOTES = {
                       "HTML report embeds the same object.",
     "glint certify": "[accuracy.md](accuracy.md#the-exact-image) says what is compared. A precision that does not fit the device "
                      "or scene has only `precision`, `status` and `reason`; one that `--precision` names is an error.",
-    "glint verify": "[verify.md](verify.md) lists the cases.",
+    "glint verify": "[verify.md](verify.md) lists the cases. One in which the driver crashed has `crash`, a text that names the call and the "
+                    "kernel, and only `name`, `title`, `passed` and `seconds` otherwise.",
 }
 # A path that begins so has no row, since the introduction, a note or a row names the section that has it.
 ELSEWHERE = {

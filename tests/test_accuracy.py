@@ -3,37 +3,18 @@
 arrays, a reference from a file, and what is refused. Nothing is asked of the times themselves.
 
 run_tests: sanitize-long-only"""
-import contextlib
 import json
 import math
-import os
-import pty
 import tempfile
 from collections import namedtuple
 
-from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, read, run, skip_all, write
+from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, run, skip_all, terminal_run, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
 MISS = 0xFFFFFFFF
 SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
 GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
 Approx = namedtuple("Approx", "value relative absolute", defaults=(0, 0))
-
-
-def terminal_run(command):
-    """What `glint COMMAND`, whose report goes to a file, prints on the terminal."""
-    terminal, end = pty.openpty()
-    with open("report.json", "w", encoding="utf-8") as report:
-        process = run(command, stdout=report, stderr=end)
-    os.close(end)
-    shown = b""
-    with contextlib.suppress(OSError):  # all is read, and nobody writes
-        while part := os.read(terminal, 4096):
-            shown += part
-    os.close(terminal)
-    assert process.returncode == 0, shown
-    json.loads(read("report.json"))
-    return shown.decode()
 
 
 def arrays_load(prefix, light_count):

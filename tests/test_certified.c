@@ -406,7 +406,8 @@ static void hard_cases_are_decided(void **state)
     Pictures pictures = {0};
     const VerifySettings settings = {
         .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
-    verify_run(&probe_compute, &settings, NULL, case_print, NULL);
+    VerifyKernels kernels = {0};
+    verify_run(&probe_compute, &settings, NULL, &(VerifySink){.take = case_print}, &kernels);
     print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not undecided\n",
                   pictures.images, pictures.compared, pictures.wrong, pictures.wrong_decided);
     assert_true(pictures.images > 100);

@@ -5,16 +5,47 @@ away, and M6, a million rays through 10,300 objects one by one, as test_bvh does
 every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few.
 
 run_tests: first"""
+import json
 import re
 import unittest
 
-from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, csv_rows, main, need_device, npy_read, read, run, write
+from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, csv_rows, main, need_device, npy_read, read, run, shim_build, terminal_run, write
 
 DEVICE = need_device()
 TIERS = {"fast": "A", "single": "B", "strict": "C", "double": "D"}
 PRECISIONS = [precision for precision in TIERS if precision != "double" or DEVICE["fp64"]]
 ALL_CASES = re.findall(r"\b[A-Z][1-9]\b", run("verify NONE").stderr)
 CASES = [case for case in ALL_CASES if IS_LONG or case not in ("M1", "M6")]
+# The driver crashes in CRASHING_CALL for the kernel `path`.
+CRASHING = """
+#define _GNU_SOURCE
+#include <CL/cl.h>
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void crash_if(const char *call, const char *name)
+{
+    if (strcmp(getenv("CRASHING_CALL"), call) == 0 && strcmp(name, "path") == 0) *(volatile int *)NULL = 0;
+}
+
+cl_kernel clCreateKernel(cl_program program, const char *name, cl_int *status)
+{
+    crash_if("clCreateKernel", name);
+    return ((cl_kernel (*)(cl_program, const char *, cl_int *))dlsym(RTLD_NEXT, "clCreateKernel"))(program, name, status);
+}
+
+cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, const size_t *first,
+                              const size_t *items, const size_t *group, cl_uint count, const cl_event *events, cl_event *event)
+{
+    char name[64] = "";
+    clGetKernelInfo(kernel, CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
+    crash_if("clEnqueueNDRangeKernel", name);
+    return ((cl_int (*)(cl_command_queue, cl_kernel, cl_uint, const size_t *, const size_t *, const size_t *, cl_uint,
+                        const cl_event *, cl_event *))dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(
+        queue, kernel, dimensions, first, items, group, count, events, event);
+}
+"""
 DEVICE_FUNCTIONS = (
     "sqrt|rsqrt|pow|powr|pown|exp|exp2|log|log2|native_[a-z0-9]*|half_[a-z]+|normalize|length|distance|sin|cos|tan|acos|"
     "atan2?|hypot|mad|mix|smoothstep|dot|cross|fmod"
@@ -63,8 +94,36 @@ class Verify(VerifyTestCase):
         report = self.json("verify P4 --precision single --perturb 1:1000 --json")
         self.assertEqual(report["perturb"], {"seed": 1, "scale": 1000})
         text = self.glint("verify P4 --precision single").stdout
-        self.assertIn("tier B: 1 of 1 cases passed", text)
+        self.assertIn("tier B: 1 of 1 case passed", text)
         self.assertIn(f"; reference of {report['reference_bits']} bits\n", text)
+
+    @unittest.skipIf(IS_SANITIZED, "sanitizers handle crashes themselves")
+    def test_a_crash_fails_its_case_alone(self):
+        """Of the driver, in building or running one kernel; the other cases keep their bits."""
+        cases = ["S2", "S5", "P4"]
+        whole = self.verify(cases, "--precision single")["cases"]
+        env = {"LD_PRELOAD": shim_build("crashing.so", CRASHING, "-ldl")}
+        for call in "clCreateKernel", "clEnqueueNDRangeKernel":
+            env["CRASHING_CALL"] = call
+            with self.subTest(call):
+                process = run(f"verify {' '.join(cases)} --precision single --json", env=env)
+                self.assertEqual((process.returncode, process.stderr), (3, ""))
+                (report,) = json.loads(process.stdout)["precisions"]
+                crash, *others = report["cases"]
+                self.assertEqual((crash["name"], crash["passed"], "wrong" in crash), ("S2", False, False))
+                self.assertEqual(crash["crash"], f"{call}: the OpenCL driver crashed at the kernel path")
+                self.assertEqual([(case["name"], case["hash"]) for case in others],
+                                 [(case["name"], case["hash"]) for case in whole[1:]])
+                self.assertEqual((report["passed"], report["failed"]), (2, 1))
+        process = run(f"verify {' '.join(cases)} --precision single", env=env)
+        self.assertEqual(process.returncode, 3)
+        self.assertRegex(process.stdout, r"\A.*; reference of .*\nsingle\n  S2 .* FAIL  clEnqueue.* at the kernel path\n"
+                                         r"  S5 .* ok\n  P4 .* ok\n  tier B: 2 of 3 cases passed")
+
+    def test_progress(self):
+        """On a terminal, the case and how many there are."""
+        errors = terminal_run("verify S5 S6 P4 P5 C7 T2 M3 --precision single --json")
+        self.assertRegex(errors, r"\r *\d+ % \x1b\[K [A-Z]\d at single, case \d of 7")
 
     def test_unknown_case(self):
         self.refuses("verify S1 S99", 'no case "S99".* S1, S2, ')

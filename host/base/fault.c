@@ -14,9 +14,11 @@
 // The call of this thread, and the last of any, which stands for those of a driver's own threads.
 static _Thread_local const char *volatile noted_call;
 static const char *_Atomic last_call;
+static const char *_Atomic noted_kernel;
 static _Atomic int calling_threads;
 static volatile sig_atomic_t is_complete, complete_status;
 static char limits[128];
+static char *crash_record;
 
 _Noreturn void fault(const char *format, ...)
 {
@@ -34,6 +36,16 @@ void fault_note_call(const char *call)
     calling_threads += (call != NULL) - (noted_call != NULL);
     noted_call = call;
     if (call) last_call = call;
+}
+
+void fault_note_kernel(const char *name)
+{
+    noted_kernel = name;
+}
+
+void fault_record_crashes(char text[CRASH_TEXT_SIZE])
+{
+    crash_record = text;
 }
 
 void fault_output_is_complete(int status)
@@ -67,31 +79,57 @@ void fault_catch_crashes(void)
 
 #else
 
-static void error_write(const char *text, size_t length)
+typedef struct {
+    char text[2 * CRASH_TEXT_SIZE];
+    size_t length;
+} CrashText;
+
+static void crash_append(CrashText *crash, const char *text, size_t length)
 {
-    ssize_t ignored = write(STDERR_FILENO, text, length);
-    (void)ignored;
+    const size_t room = sizeof crash->text - 1 - crash->length;
+    if (length > room) length = room;
+    memcpy(crash->text + crash->length, text, length);
+    crash->length += length;
+    crash->text[crash->length] = '\0';
+}
+
+static void crash_describe(CrashText *crash, const char *call, int signal_number)
+{
+    static const char how[2][32] = {": the OpenCL driver crashed", ": the OpenCL driver aborted"};
+    const char *kernel = noted_kernel, *what = how[signal_number == SIGABRT];
+    crash_append(crash, call, strcspn(call, "("));
+    crash_append(crash, what, strlen(what));
+    if (kernel) {
+        static const char at[] = " at the kernel ";
+        crash_append(crash, at, sizeof at - 1);
+        crash_append(crash, kernel, strlen(kernel));
+    }
+    crash_append(crash, limits, strlen(limits));
 }
 
 // Only what a signal handler may call.
 static void crash_report(int signal_number)
 {
     const char *call = noted_call ? noted_call : calling_threads > 0 ? last_call : NULL;
-    static const char start[] = "glint: ", warning[] = "warning: ", driver[] = ": the OpenCL driver ";
-    const char *how = signal_number == SIGABRT ? "aborted" : "crashed";
     if (!call && !is_complete) {
         signal(signal_number, SIG_DFL);
         raise(signal_number);
         return;
     }
-    error_write(start, sizeof start - 1);
-    if (is_complete) error_write(warning, sizeof warning - 1);
     if (!call) call = "at the end";
-    error_write(call, strcspn(call, "("));
-    error_write(driver, sizeof driver - 1);
-    error_write(how, strlen(how));
-    error_write(limits, strlen(limits));
-    error_write("\n", 1);
+    CrashText crash = {{0}, 0};
+    if (crash_record && !is_complete) {
+        crash_describe(&crash, call, signal_number);
+        memcpy(crash_record, crash.text, CRASH_TEXT_SIZE - 1);
+        _exit(EXIT_MACHINE);
+    }
+    static const char start[] = "glint: ", warning[] = "warning: ";
+    crash_append(&crash, start, sizeof start - 1);
+    if (is_complete) crash_append(&crash, warning, sizeof warning - 1);
+    crash_describe(&crash, call, signal_number);
+    crash_append(&crash, "\n", 1);
+    ssize_t ignored = write(STDERR_FILENO, crash.text, crash.length);
+    (void)ignored;
     _exit(is_complete ? complete_status : EXIT_MACHINE);
 }
 

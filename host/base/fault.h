@@ -19,6 +19,11 @@ _Noreturn void fault(const char *format, ...) __attribute__((format(printf, 1, 2
 void fault_catch_crashes(void);
 // Notes the OpenCL call that follows, a text up to a parenthesis; NULL: none.
 void fault_note_call(const char *call);
+// Notes the kernel that the following calls build or run, which a crash's message names; NULL: none.
+void fault_note_kernel(const char *name);
+// From here on a crash within a call is described in `text`, instead of on stderr.
+enum { CRASH_TEXT_SIZE = 160 };
+void fault_record_crashes(char text[CRASH_TEXT_SIZE]);
 // From here on a fault or a crash is a warning, and the process exits with `status`: all output is complete.
 void fault_output_is_complete(int status);
 // " (limited to …)" where the process has little address space or may have few threads, else "".

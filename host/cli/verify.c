@@ -1,12 +1,14 @@
 // glint verify: the hard cases on a device, one line each.
 #include "host/verify/verify.h"
 #include "host/base/clock.h"
-#include "host/base/fault.h"
 #include "host/base/json.h"
+#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
+#include "host/cli/progress.h"
 #include "host/cli/report_json.h"
+#include "host/cli/verify_journal.h"
 #include "host/cli/version.h"
 #include "host/render/arithmetic.h"
 #include <getopt.h>
@@ -47,16 +49,52 @@ typedef struct {
 } VerifyOptions;
 
 typedef struct {
+    const VerifyOptions *options;
+    VerifyJournal *journal;
     const Compute *compute;
-    Json *json; // or NULL: lines
+    Progress progress;
+    size_t case_count, row_count; // of a precision; of all that are asked for
+    // at work
+    Precision precision;
+    PrecisionRecord *record;
     char tier;
-    size_t passed, failed;
-    double start; // of the case
-} Report;
+} Verification;
 
-static void result_print(const VerifyResult *result, const Report *report)
+static bool is_chosen(const VerifyOptions *options, const char *name)
 {
-    printf("  %-3s %c  %-60s ", result->name, report->tier, result->title);
+    for (size_t i = 0; i < options->cases.count; i++)
+        if (strcmp(options->cases.names[i], name) == 0) return true;
+    return options->cases.count == 0;
+}
+
+static bool has_failed(const CaseRecord *record)
+{
+    return record->state == CASE_CRASHED || (record->state == CASE_DONE && !verify_holds(&record->result));
+}
+
+static bool has_ended(const CaseRecord *record)
+{
+    return record->state == CASE_DONE || record->state == CASE_CRASHED;
+}
+
+static size_t records_count(const PrecisionRecord *record, bool (*is_counted)(const CaseRecord *record))
+{
+    size_t count = 0;
+    for (size_t i = 0; i < VERIFY_CASES_MAX; i++)
+        count += is_counted(&record->cases[i]);
+    return count;
+}
+
+static void record_print(CaseRecord *record, char tier)
+{
+    const VerifyResult *result = &record->result;
+    record->is_printed = true;
+    printf("  %-3s %c  %-60s ", result->name, tier, result->title);
+    if (record->state == CASE_CRASHED) {
+        printf("%25s  FAIL  %s\n", "", record->crash);
+        fflush(stdout);
+        return;
+    }
     if (result->bound > 0)
         printf("%8.3g of %-8.3g %-4s", result->worst, result->bound, result->unit);
     else
@@ -77,12 +115,19 @@ static void result_print(const VerifyResult *result, const Report *report)
     fflush(stdout);
 }
 
-static void result_add_json(Json *json, const VerifyResult *result, double seconds)
+static void record_add_json(Json *json, const CaseRecord *record)
 {
+    const VerifyResult *result = &record->result;
     json_begin_object(json, NULL);
     json_text(json, "name", result->name);
     json_text(json, "title", result->title);
-    json_bool(json, "passed", verify_holds(result));
+    json_bool(json, "passed", !has_failed(record));
+    if (record->state == CASE_CRASHED) {
+        json_text(json, "crash", record->crash);
+        json_number(json, "seconds", record->seconds);
+        json_end(json);
+        return;
+    }
     json_int64(json, "rays", (int64_t)result->ray_count);
     json_int64(json, "wrong", (int64_t)result->wrong);
     json_int64(json, "leaks", (int64_t)result->leaks);
@@ -96,69 +141,131 @@ static void result_add_json(Json *json, const VerifyResult *result, double secon
     json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
     if (result->bound > 0) json_text(json, "unit", result->unit);
     hash_json(json, "hash", result->hash);
-    json_number(json, "seconds", seconds);
+    json_number(json, "seconds", record->seconds);
     json_end(json);
 }
 
-static bool result_take(void *context, const VerifyResult *result)
+static CaseRecord *record_of(const Verification *verification, const char *name)
 {
-    Report *report = context;
-    if (!compute_ok(report->compute)) return false;
-    if (verify_holds(result))
-        report->passed++;
-    else
-        report->failed++;
-    if (report->json)
-        result_add_json(report->json, result, clock_seconds() - report->start);
-    else
-        result_print(result, report);
-    report->start = clock_seconds();
+    size_t i = 0;
+    while (strcmp(verify_case_name(i), name) != 0)
+        i++;
+    return &verification->record->cases[i];
+}
+
+static size_t rows_ended(const Verification *verification)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < ARITHMETIC_COUNT; i++)
+        count += records_count(&verification->journal->precisions[i], has_ended);
+    return count;
+}
+
+// In place of the progress.
+static void line_begin(Verification *verification)
+{
+    fflush(stdout);
+    progress_close(&verification->progress);
+}
+
+static bool case_start(void *context, const VerifyResult *result)
+{
+    Verification *verification = context;
+    CaseRecord *record = record_of(verification, result->name);
+    if (record->state == CASE_CRASHED && !record->is_printed && !verification->options->json) {
+        line_begin(verification);
+        record_print(record, verification->tier);
+    }
+    if (has_ended(record)) return false;
+    *record = (CaseRecord){.state = CASE_RUNNING, .result = *result, .start_seconds = clock_seconds()};
+    const size_t ended = rows_ended(verification);
+    progress_step(&verification->progress, (double)ended / (double)verification->row_count,
+                  "%s at %s, case %zu of %zu", result->name, precision_names[verification->precision],
+                  ended + 1, verification->row_count);
     return true;
 }
 
-// Runs all cases at one precision; returns how many failed.
-static size_t precision_verify(Compute *compute, const VerifyOptions *options, Precision precision,
-                               Json *json)
+static bool case_take(void *context, const VerifyResult *result)
 {
-    VerifySettings settings = {.render = settings_whole(&options->common, 1, 1), .lean = options->lean};
-    settings.render.precision = precision;
-    settings.render.bounce_count = BOUNCES_DEFAULT;
+    Verification *verification = context;
+    if (!compute_ok(verification->compute)) return false;
+    CaseRecord *record = record_of(verification, result->name);
+    record->result = *result;
+    record->seconds = clock_seconds() - record->start_seconds;
+    record->state = CASE_DONE;
+    if (verification->options->json) return true;
+    line_begin(verification);
+    record_print(record, verification->tier);
+    return true;
+}
+
+static RenderSettings precision_settings(const VerifyOptions *options, Precision precision)
+{
+    RenderSettings settings = settings_whole(&options->common, 1, 1);
+    settings.precision = precision;
+    settings.bounce_count = BOUNCES_DEFAULT;
+    return settings;
+}
+
+// Runs those cases at the verification's precision that have not ended.
+static void precision_verify(Verification *verification, Compute *compute)
+{
+    const VerifyOptions *options = verification->options;
+    const VerifySettings settings = {.render = precision_settings(options, verification->precision),
+                                     .lean = options->lean};
     const VerifyTier tier = verify_tier(&settings.render);
-    if (tier == TIER_D && verify_reference_bits() < 64)
-        fprintf(stderr,
-                "glint: verify: the reference has %d bits here: tier D is checked against numbers of its own "
-                "precision\n",
-                verify_reference_bits());
-    double start = clock_seconds();
-    Report report = {.compute = compute, .json = json, .tier = (char)('A' + tier), .start = start};
-    const char *name = precision_names[precision];
-    if (json) {
-        json_begin_object(json, NULL);
-        json_text(json, "precision", name);
-        json_text(json, "tier", (const char[]){report.tier, '\0'});
-        json_begin_array(json, "cases");
-    } else {
-        printf("%s\n", name);
+    PrecisionRecord *record = verification->record;
+    verification->tier = (char)('A' + tier);
+    if (!record->is_started) {
+        record->start_seconds = clock_seconds();
+        if (tier == TIER_D && verify_reference_bits() < 64)
+            fprintf(stderr,
+                    "glint: verify: the reference has %d bits here: tier D is checked against numbers of its "
+                    "own precision\n",
+                    verify_reference_bits());
+        if (!options->json) {
+            line_begin(verification);
+            printf("%s\n", precision_names[verification->precision]);
+            fflush(stdout);
+        }
+        record->is_started = true;
     }
     const VerifyChoice *choice = options->cases.count > 0 ? &options->cases : NULL;
-    const VerifyKernels kernels = verify_run(compute, &settings, choice, result_take, &report);
-    double seconds = clock_seconds() - start;
-    if (json) {
-        json_end(json);
-        json_int64(json, "lanes", kernels.lanes);
-        hash_json(json, "trace_kernel", kernels.trace_hash);
-        hash_json(json, "render_kernel", kernels.render_hash);
-        json_int64(json, "passed", (int64_t)report.passed);
-        json_int64(json, "failed", (int64_t)report.failed);
-        json_number(json, "seconds", seconds);
-        json_end(json);
-    } else if (compute_ok(compute)) {
-        printf("  tier %c: %zu of %zu cases passed, in %.1f s; kernels: trace %016" PRIx64
-               ", render %016" PRIx64 "\n",
-               report.tier, report.passed, report.passed + report.failed, seconds, kernels.trace_hash,
-               kernels.render_hash);
-    }
-    return report.failed;
+    const VerifySink sink = {case_start, case_take, verification};
+    verify_run(compute, &settings, choice, &sink, &record->kernels);
+    record->seconds = clock_seconds() - record->start_seconds;
+    if (!compute_ok(compute)) return;
+    record->is_ended = true;
+    if (options->json) return;
+    const size_t count = records_count(record, has_ended);
+    line_begin(verification);
+    printf("  tier %c: %zu of %zu case%s passed, in %.1f s; kernels: trace %016" PRIx64 ", render %016" PRIx64
+           "\n",
+           verification->tier, count - records_count(record, has_failed), count, text_plural(count),
+           record->seconds, record->kernels.trace_hash, record->kernels.render_hash);
+    fflush(stdout);
+}
+
+static void precision_add_json(Json *json, const PrecisionRecord *record, Precision precision,
+                               const VerifyOptions *options)
+{
+    const RenderSettings settings = precision_settings(options, precision);
+    const char tier[] = {(char)('A' + verify_tier(&settings)), '\0'};
+    json_begin_object(json, NULL);
+    json_text(json, "precision", precision_names[precision]);
+    json_text(json, "tier", tier);
+    json_begin_array(json, "cases");
+    for (size_t i = 0; i < VERIFY_CASES_MAX; i++)
+        if (has_ended(&record->cases[i])) record_add_json(json, &record->cases[i]);
+    json_end(json);
+    const size_t failed = records_count(record, has_failed);
+    json_int64(json, "lanes", record->kernels.lanes);
+    hash_json(json, "trace_kernel", record->kernels.trace_hash);
+    hash_json(json, "render_kernel", record->kernels.render_hash);
+    json_int64(json, "passed", (int64_t)(records_count(record, has_ended) - failed));
+    json_int64(json, "failed", (int64_t)failed);
+    json_number(json, "seconds", record->seconds);
+    json_end(json);
 }
 
 // What the results are of.
@@ -173,19 +280,34 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
     perturb_json(json, common->perturb_seed, common->perturb_scale);
 }
 
+static void journal_print_json(const Verification *verification)
+{
+    const VerifyOptions *options = verification->options;
+    Json *json = json_open();
+    origin_add_json(json, verification->compute->device, &options->common);
+    json_begin_array(json, "precisions");
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+        const PrecisionRecord *record = &verification->journal->precisions[precision];
+        if (record->is_started) precision_add_json(json, record, precision, options);
+    }
+    json_end(json);
+    json_print(json, stdout);
+}
+
 // Prints why the arithmetic of the device does not suit a precision.
 static bool arithmetic_is_suitable(Compute *compute, const VerifyOptions *options, Precision precision)
 {
-    RenderSettings settings = settings_whole(&options->common, 1, 1);
-    settings.precision = precision;
+    const RenderSettings settings = precision_settings(options, precision);
     MessageList messages = {0};
     const bool is_suitable = arithmetic_suits(compute, &settings, &messages);
     messages_print(&messages, NULL);
     return is_suitable;
 }
 
-static int device_verify(Compute *compute, const VerifyOptions *options)
+static int device_verify(Verification *verification, Compute *compute)
 {
+    const VerifyOptions *options = verification->options;
+    VerifyJournal *journal = verification->journal;
     Precision first = options->every_precision ? PRECISION_FAST : options->common.precision;
     Precision last = options->every_precision ? PRECISION_DOUBLE : options->common.precision;
     if (!compute->device->fp64 && last == PRECISION_DOUBLE) {
@@ -196,24 +318,41 @@ static int device_verify(Compute *compute, const VerifyOptions *options)
         }
         last = PRECISION_STRICT;
     }
-    if (!options->every_precision && !arithmetic_is_suitable(compute, options, first)) return EXIT_USER;
-    Json *json = options->json ? json_open() : NULL;
-    if (json) {
-        origin_add_json(json, compute->device, &options->common);
-        json_begin_array(json, "precisions");
-    } else {
+    if (!options->every_precision && !journal->is_headed && !arithmetic_is_suitable(compute, options, first))
+        return EXIT_USER;
+    if (!options->json && !journal->is_headed) {
         printf("%s; reference of %d bits\n", compute->device->name, verify_reference_bits());
+        fflush(stdout);
     }
+    journal->is_headed = true;
+    verification->row_count = verification->case_count * (size_t)(last - first + 1);
     size_t failed = 0;
-    for (Precision precision = first; precision <= last && compute_ok(compute); precision++)
-        if (arithmetic_is_suitable(compute, options, precision))
-            failed += precision_verify(compute, options, precision, json);
-    if (!json) passports_remark(compute->device, stdout);
-    if (json) {
-        json_end(json);
-        json_print(json, stdout);
+    for (Precision precision = first; precision <= last && compute_ok(compute); precision++) {
+        PrecisionRecord *record = &journal->precisions[precision];
+        verification->precision = precision;
+        verification->record = record;
+        if (!record->is_started && !record->is_unsuitable)
+            record->is_unsuitable = !arithmetic_is_suitable(compute, options, precision);
+        if (!record->is_ended && !record->is_unsuitable) precision_verify(verification, compute);
+        failed += records_count(record, has_failed);
     }
+    progress_close(&verification->progress);
+    if (options->json)
+        journal_print_json(verification);
+    else
+        passports_remark(compute->device, stdout);
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
+}
+
+static int verification_work(void *context)
+{
+    Verification *verification = context;
+    OpenDevice open;
+    if (!device_open(&open, &verification->options->common)) return EXIT_USER;
+    verification->compute = &open.compute;
+    progress_open(&verification->progress, false);
+    progress_end_at_once();
+    return device_close(&open, device_verify(verification, &open.compute));
 }
 
 static bool is_case(const char *name)
@@ -262,7 +401,8 @@ int command_verify(int argument_count, char **arguments)
     VerifyOptions options;
     int status = options_read(&options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    OpenDevice open;
-    if (!device_open(&open, &options.common)) return EXIT_USER;
-    return device_close(&open, device_verify(&open.compute, &options));
+    Verification verification = {.options = &options, .journal = verify_journal_open()};
+    for (size_t i = 0; verify_case_name(i); i++)
+        verification.case_count += is_chosen(&options, verify_case_name(i));
+    return verify_journal_work(verification.journal, verification_work, &verification);
 }

@@ -1,6 +1,7 @@
 // The kernels of a renderer: their variants, which differ in the definitions before their text and in
 // compiler options, and their launches.
 #include "host/base/array.h"
+#include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/compile/features.h"
 #include "host/render/renderer_state.h"
@@ -172,7 +173,9 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
         .no_cache = renderer->settings.no_cache,
     };
     stage_begin(renderer->settings.stage, "building the kernel", NULL, 0);
+    fault_note_kernel(slot->request.kernel);
     program_build(renderer->compute, &slot->request, &slot->program);
+    fault_note_kernel(NULL);
     if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;
@@ -187,7 +190,9 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
                        const size_t *items, const size_t *group)
 {
     KernelSlot *slot = &renderer->variant.kernels[kind];
+    fault_note_kernel(kernel_sources[kind].name);
     LaunchTime time = kernel_launch_from(renderer->compute, slot->kernel, dimensions, first, items, group);
+    fault_note_kernel(NULL);
     const bool is_fixed = renderer->compute->device->work_group[0] > 0;
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)
         compute_fail(renderer->compute, "clEnqueueNDRangeKernel", CL_INVALID_WORK_GROUP_SIZE,

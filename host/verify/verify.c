@@ -67,6 +67,8 @@ static const struct {
     {"R8", "degenerate cameras", {verify_camera_frames, verify_degenerate_views}},
 };
 
+_Static_assert(sizeof cases / sizeof *cases <= VERIFY_CASES_MAX, "VERIFY_CASES_MAX is too small");
+
 bool verify_holds(const VerifyResult *result)
 {
     return result->wrong + result->leaks + result->unsound + result->off_surface + result->wrong_normals +
@@ -357,29 +359,28 @@ VerifyTier verify_tier(const RenderSettings *settings)
     return is_inexact(settings) ? TIER_A : tiers[settings->precision];
 }
 
-VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
-                         VerifySink sink, void *context)
+void verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
+                const VerifySink *sink, VerifyKernels *kernels)
 {
-    VerifyKernels kernels = {0};
     Renderer *tracer = NULL, *painter = NULL;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         if (!is_chosen(choice, cases[i].name)) continue;
         VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
+        if (sink->start && !sink->start(sink->context, &result)) continue;
         VerifyRun run = {.compute = compute,
                          .settings = settings,
                          .tier = verify_tier(&settings->render),
                          .inexact = is_inexact(&settings->render),
                          .result = &result,
-                         .kernels = &kernels,
+                         .kernels = kernels,
                          .tracer = &tracer,
                          .painter = &painter};
         for (size_t k = 0; k < verify_rays_count; k++)
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
-        if (!sink(context, &result)) break;
+        if (!sink->take(sink->context, &result)) break;
     }
     renderer_close(tracer);
     renderer_close(painter);
-    return kernels;
 }

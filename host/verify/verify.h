@@ -48,8 +48,13 @@ typedef struct {
 
 bool verify_holds(const VerifyResult *result);
 
-// Returns whether to go on with the next case.
-typedef bool (*VerifySink)(void *context, const VerifyResult *result);
+typedef struct {
+    // Returns whether to run a case, of which the name and the title are known; NULL: all are run.
+    bool (*start)(void *context, const VerifyResult *result);
+    // Returns whether to continue with the next case.
+    bool (*take)(void *context, const VerifyResult *result);
+    void *context;
+} VerifySink;
 
 // Which cases to run, by name; NULL: all.
 typedef struct {
@@ -57,12 +62,13 @@ typedef struct {
     size_t count;
 } VerifyChoice;
 
+enum { VERIFY_CASES_MAX = 64 };
 // In the order in which they run; NULL past the last.
 const char *verify_case_name(size_t i);
 
 // The bits of the reference's numbers: 113, or those of a long double where the compiler has no more.
 int verify_reference_bits(void);
 
-// Runs the cases in turn, until the sink ends it.
-VerifyKernels verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
-                         VerifySink sink, void *context);
+// Runs the cases in turn, until the sink ends it. Keeps *kernels up to date.
+void verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
+                const VerifySink *sink, VerifyKernels *kernels);

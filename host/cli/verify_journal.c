@@ -1,0 +1,81 @@
+#include "host/cli/verify_journal.h"
+
+#include "host/base/clock.h"
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+VerifyJournal *verify_journal_open(void)
+{
+    VerifyJournal *journal =
+        mmap(NULL, sizeof *journal, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (journal == MAP_FAILED) fault("out of memory: the journal of verify");
+    return journal;
+}
+
+static CaseRecord *running_case(VerifyJournal *journal)
+{
+    for (size_t i = 0; i < ARITHMETIC_COUNT; i++)
+        for (size_t k = 0; k < VERIFY_CASES_MAX; k++)
+            if (journal->precisions[i].cases[k].state == CASE_RUNNING)
+                return &journal->precisions[i].cases[k];
+    return NULL;
+}
+
+static void crash_record(VerifyJournal *journal, CaseRecord *record, int status)
+{
+    record->state = CASE_CRASHED;
+    record->seconds = clock_seconds() - record->start_seconds;
+    if (journal->crash[0] != '\0')
+        memcpy(record->crash, journal->crash, sizeof record->crash);
+    else if (WIFSIGNALED(status))
+        snprintf(record->crash, sizeof record->crash, "the process was ended by a signal: %s",
+                 strsignal(WTERMSIG(status)));
+    else
+        snprintf(record->crash, sizeof record->crash, "the process ended with status %d",
+                 WEXITSTATUS(status));
+    journal->crash[0] = '\0';
+}
+
+// A terminal's signals go to the parent, too, which ends this process when it ends.
+static void child_begin(VerifyJournal *journal, pid_t parent)
+{
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(EXIT_INTERRUPTED);
+    signal(SIGINT, SIG_IGN);
+    signal(SIGHUP, SIG_IGN);
+    fault_record_crashes(journal->crash);
+}
+
+int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void *context)
+{
+    const pid_t parent = getpid();
+    for (;;) {
+        fflush(stdout); // or each process prints what is in the buffer
+        const pid_t child = fork();
+        if (child < 0) {
+            fprintf(stderr, "glint: verify: cannot start a process: %s\n", strerror(errno));
+            return EXIT_MACHINE;
+        }
+        if (child == 0) {
+            child_begin(journal, parent);
+            const int status = work(context);
+            journal->is_ended = true;
+            return status;
+        }
+        int status = 0;
+        while (waitpid(child, &status, 0) < 0 && errno == EINTR)
+            ;
+        CaseRecord *running = running_case(journal);
+        if (journal->is_ended || !running) {
+            if (journal->crash[0] != '\0') fprintf(stderr, "glint: %s\n", journal->crash);
+            return WIFEXITED(status) ? WEXITSTATUS(status) : EXIT_MACHINE;
+        }
+        crash_record(journal, running, status);
+    }
+}
