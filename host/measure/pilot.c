@@ -13,10 +13,8 @@ static const double time_tolerance = 1.1;
 static uint32_t cell_for(const RenderSettings *settings, double pixels_wanted)
 {
     const double pixels = (double)settings->region_width * settings->region_height;
-    uint32_t cell = (uint32_t)fmin(fmax(floor(sqrt(pixels / pixels_wanted)), CELL_MIN), CELL_MAX);
-    while (cell > 1 && (cell > settings->region_width || cell > settings->region_height))
-        cell--;
-    return cell;
+    const double cell = fmin(fmax(floor(sqrt(pixels / pixels_wanted)), CELL_MIN), CELL_MAX);
+    return (uint32_t)fmax(1, fmin(cell, fmin(settings->region_width, settings->region_height)));
 }
 
 // The squares of the image, of which one pixel each is rendered.
