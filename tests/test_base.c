@@ -57,6 +57,7 @@ static void test_message_place(void **state)
     check_message("one\n", 4, "a.yaml:2:1: error: bad word\n\n^\n");
     check_message("", 0, "a.yaml:1:1: error: bad word\n\n^\n");
     check_message("one\r\ntwo\r\n", 6, "a.yaml:2:2: error: bad word\ntwo\n ^\n");
+    check_message("one\rtwo\rthree", 5, "a.yaml:2:2: error: bad word\ntwo\n ^\n");
     check_message("\xEF\xBB\xBFone", 4, "a.yaml:1:2: error: bad word\none\n ^\n");
 }
 

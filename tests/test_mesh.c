@@ -329,7 +329,7 @@ static void faults_name_file_and_vertex(void **state)
         {"a.ply", PLY_HEADER("99999999", "1") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
          "14:1: error: the file ends before vertex 4 (from 0) of 99999999"},
         {"a.ply", PLY_HEADER("3\rcomment\relement face 99999999", "1") "end_header\r\n0 0 0\n",
-         "7:9: error: the header declares 'face' twice"},
+         "9:9: error: the header declares 'face' twice"},
         {"a.gltf", "{", "1:1: error: string or '}' expected near end of file"},
         {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n",
          "4:18: error: a.off: vertex 2 (from 0) is not finite or too large"},

@@ -3,6 +3,7 @@
 #include "tests/scene_reading.h"
 #include <setjmp.h>
 #include <stdarg.h>
+#include <string.h>
 #include <cmocka.h>
 
 enum { OBJECTS_MAX = 4 };
@@ -48,15 +49,27 @@ static const struct {
      {11, 19, 28, 36}},
 };
 
+static void check_lines(size_t i, const char *line_end)
+{
+    Text text = {0};
+    for (const char *at = cases[i].text; *at; at++)
+        text_append(&text, *at == '\n' ? line_end : at, *at == '\n' ? strlen(line_end) : 1);
+    Scene scene = scene_of_text(cases[i].name, text_c(&text));
+    assert_int_equal(scene.objects.count, OBJECTS_MAX);
+    for (size_t k = 0; k < OBJECTS_MAX; k++)
+        assert_int_equal(scene.objects.items[k].line, cases[i].lines[k]);
+    scene_free(&scene);
+    text_free(&text);
+}
+
+// Line ends of Unix, Windows and old Macs.
 static void test_lines(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        Scene scene = scene_of_text(cases[i].name, cases[i].text);
-        assert_int_equal(scene.objects.count, OBJECTS_MAX);
-        for (size_t k = 0; k < OBJECTS_MAX; k++)
-            assert_int_equal(scene.objects.items[k].line, cases[i].lines[k]);
-        scene_free(&scene);
+        check_lines(i, "\n");
+        check_lines(i, "\r\n");
+        check_lines(i, "\r");
     }
 }
 

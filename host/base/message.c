@@ -87,15 +87,14 @@ static Message message_place(const Source *source, size_t offset)
     if (offset < start) offset = start;
     message.line = 1;
     for (size_t i = start; i < offset; i++) {
-        if (source->bytes[i] == '\n') {
+        if (text_ends_line(source->bytes + i, source->length - i)) {
             message.line++;
             start = i + 1;
         }
     }
     size_t end = offset;
-    while (end < source->length && source->bytes[end] != '\n')
+    while (end < source->length && source->bytes[end] != '\n' && source->bytes[end] != '\r')
         end++;
-    if (end > start && source->bytes[end - 1] == '\r') end--;
     message.column = 1 + (unsigned)character_count(source->bytes + start, offset - start);
     if (message.column <= CHARACTERS_SHOWN)
         message.source_line = printable_copy(source->bytes + start, end - start, CHARACTERS_SHOWN, true);

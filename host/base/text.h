@@ -30,6 +30,12 @@ ShortText text_duration(double seconds);
 // Returns what makes a noun of that many a plural: "" for 1, else "s".
 const char *text_plural(uint64_t count);
 
+// Returns whether a line ends with the first byte: a newline, or a carriage return that none follows.
+static inline bool text_ends_line(const char *text, size_t length)
+{
+    return *text == '\n' || (*text == '\r' && (length < 2 || text[1] != '\n'));
+}
+
 // Bytes of the well-formed UTF-8 character that `text` starts with; 0 if it does not start with one.
 size_t text_character_size(const char *text, size_t length);
 

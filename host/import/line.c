@@ -1,4 +1,5 @@
 #include "host/import/line.h"
+#include "host/base/text.h"
 
 #include <string.h>
 
@@ -18,8 +19,10 @@ bool line_next(Line *line, char comment)
     if (line->next >= source->length) return false;
     line->start = line->at = line->next;
     const char *bytes = source->bytes + line->start;
-    const char *newline = memchr(bytes, '\n', source->length - line->start);
-    line->end = newline ? (size_t)(newline - source->bytes) : source->length;
+    line->end = line->start;
+    while (line->end < source->length &&
+           !text_ends_line(source->bytes + line->end, source->length - line->end))
+        line->end++;
     line->next = line->end + 1;
     const char *start_of_comment = comment ? memchr(bytes, comment, line->end - line->start) : NULL;
     if (start_of_comment) line->end = (size_t)(start_of_comment - source->bytes);

@@ -18,7 +18,8 @@ typedef struct {
 // Positions before the first line of the report's source. Reports an error and returns false if that contains
 // a NUL.
 bool line_open(Line *line, Report *report);
-// Moves to the next line; `comment`: the character that starts a comment, or '\0'. False at the end.
+// Moves to the next line. Lines end with a newline, a carriage return or both; `comment`: the character that
+// starts a comment, or '\0'. False at the end.
 bool line_next(Line *line, char comment);
 
 // Words are separated by spaces, tabs and carriage returns. Empty at the end of the line.

@@ -1,18 +1,15 @@
 #include "host/import/place.h"
 
 #include "host/base/array.h"
+#include "host/base/text.h"
+
 #include <stdlib.h>
-#include <string.h>
 
 Places places_open(const Source *source)
 {
     Places places = {0};
-    const char *end = source->bytes + source->length;
-    for (const char *at = source->bytes; at < end; at++) {
-        at = memchr(at, '\n', (size_t)(end - at));
-        if (!at) break;
-        array_push(places.line_starts, (size_t)(at + 1 - source->bytes));
-    }
+    for (size_t i = 0; i < source->length; i++)
+        if (text_ends_line(source->bytes + i, source->length - i)) array_push(places.line_starts, i + 1);
     return places;
 }
 
