@@ -50,6 +50,10 @@ static void text_is_read(void **state)
         {"solid a\n" FACET("0 0 0", "1 0 0", "0 1 0") "endsolid a\nsolid b\ncolor 1 0 0\ncolor 1 0 0\n" FACET(
              "0 1 0", "1 0 0", "1 1 0") "endsolid b",
          "11:1: warning: 'color' is not used\n"},
+        {" \tsolid\n" TWO_FACETS, ""},
+        {"\xEF\xBB\xBFsolid\n" TWO_FACETS, ""},
+        {"# made by hand\r\r\n\nsolid\n" TWO_FACETS, ""},
+        {"; by hand\n solid\n" TWO_FACETS, "1:1: warning: ';' is not used\n"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         file_write("a.stl", cases[i].text);

@@ -124,12 +124,26 @@ static bool binary_read(MeshDraft *draft)
     return true;
 }
 
-// Binary files may start with `solid`, too; their size is then that of their facets.
+// Returns whether a line before the first NUL starts with `solid`. Comments, blanks and a byte order mark may
+// precede it.
+static bool is_text(const Source *source)
+{
+    Scan scan = scan_open(source);
+    if (source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0) scan.at += 3;
+    const size_t length = strnlen(scan.at, (size_t)(scan.end - scan.at));
+    for (scan.end = scan.at + length; scan.at < scan.end; scan_line(&scan)) {
+        scan_more(&scan);
+        if (strncasecmp(scan.at, "solid", strlen("solid")) == 0) return true;
+    }
+    return false;
+}
+
+// The header of a binary file may start with `solid`, but only such a file has exactly the size of its
+// facets.
 bool stl_read(MeshDraft *draft)
 {
     const Source *source = &draft->source;
-    const bool is_solid = source->length >= 5 && strncasecmp(source->bytes, "solid", 5) == 0;
     const bool is_exact =
         source->length >= HEADER_SIZE && source->length == HEADER_SIZE + facet_count(source) * FACET_SIZE;
-    return is_solid && !is_exact ? text_read(draft) : binary_read(draft);
+    return !is_exact && is_text(source) ? text_read(draft) : binary_read(draft);
 }
