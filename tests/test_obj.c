@@ -249,6 +249,13 @@ static void images_of_materials_are_used(void **state)
     assert_int_equal(triangle_material(&scene, 0)->texture, 0);
     assert_vector(triangle_material(&scene, 0)->color, 0.75, 0.5, 0.25);
     scene_free(&scene);
+    scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "f 1/1 2/2 3/3\n",
+                         "scene.yaml:4:18: warning: a.obj: no texture coordinates for the image './a.ppm' of "
+                         "material 'red'\n"
+                         "a.obj:6:13: warning: a face names texture coordinate 3 (from 1); there are 0: not "
+                         "used\n");
+    assert_int_equal(triangle_material(&scene, 0)->texture, 0);
+    scene_free(&scene);
 
     static const struct {
         const char *mtl, *expected;
@@ -307,6 +314,41 @@ static void what_is_not_used_is_reported_once(void **state)
     scene_free(&scene);
 }
 
+// Faces do without texture coordinates and normals that the file lacks.
+static void missing_parts_are_dropped(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *obj, *expected;
+        bool has_uvs, has_normals;
+    } cases[] = {
+        {CORNERS "vn 0 0 1\nf 1//1 2//1 3//2\nf 1//1 2//3 3//2\n",
+         "a.obj:6:11: warning: a face names normal 3 (from 1); there are 1: not used\n", false, true},
+        {CORNERS "vn 0 0 1\nf 1//1 2//0 3//-2\n",
+         "a.obj:5:11: warning: a face names normal 0; there are 1 before it: not used\n", false, true},
+        {CORNERS "vn 0 0 1\nf 1//0 2//0 3//0\n",
+         "a.obj:5:6: warning: a face names normal 0; there are 1 before it: not used\n", false, false},
+        {CORNERS "f 1/1 2/2 3/99999999999\n",
+         "a.obj:4:9: warning: a face names texture coordinate 2 (from 1); there are 0: not used\n"
+         "a.obj:4:13: warning: a face names texture coordinate 99999999999; there are 0 before it: not "
+         "used\n",
+         false, false},
+        {CORNERS "vt 0 0\nf 1/1 2/2 3/1\n",
+         "a.obj:5:9: warning: a face names texture coordinate 2 (from 1); there are 1: not used\n", true,
+         false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Scene scene = scene_of_obj(cases[i].obj, cases[i].expected);
+        const Mesh *mesh = &scene.meshes.items[0];
+        assert_int_equal(mesh->uvs != NULL, cases[i].has_uvs);
+        assert_int_equal(mesh->normals != NULL, cases[i].has_normals);
+        assert_vector(corner_of(mesh, 1), 1, 0, 0);
+        if (mesh->normals) assert_vector(mesh->normals[mesh->triangles[0][0]], 0, 0, 1);
+        if (mesh->normals) assert_vector(mesh->normals[mesh->triangles[0][2]], 0, 0, 0);
+        scene_free(&scene);
+    }
+}
+
 // Nine times the most corners a face may have: to cut them would take half a minute.
 static void many_large_polygons_are_refused(void **state)
 {
@@ -347,12 +389,12 @@ static void faults_have_their_place(void **state)
         {CORNERS "f -4 2 3\n", "a.obj:4:3: error: a face names vertex -4; there are 3 before it\n"},
         {CORNERS "f 1 2 9999999999\n",
          "a.obj:4:7: error: a face names vertex 9999999999; there are 3 before it\n"},
-        {CORNERS "f 1 2 99999999999\n", "a.obj:4:7: error: '99999999999' is no corner of a face\n"},
+        {CORNERS "f 1 2 99999999999\n",
+         "a.obj:4:7: error: a face names vertex 99999999999; there are 3 before it\n"},
+        {CORNERS "f 1 2 1000000000000000000\n",
+         "a.obj:4:7: error: '1000000000000000000' is no corner of a face\n"},
         {CORNERS "f 1 2 4294967295\n",
          "a.obj:4:7: error: a face names vertex 4294967295 (from 1); there are 3\n"},
-        {CORNERS "vt 0 0\nf 1/1 2/2 3/1\n",
-         "a.obj:5:9: error: a face names texture coordinate 2 (from 1); there are 1\n"},
-        {CORNERS "f 1//1 2 3\n", "a.obj:4:6: error: a face names normal 1 (from 1); there are 0\n"},
         {CORNERS "f 1 2 x\n", "a.obj:4:7: error: 'x' is no corner of a face\n"},
         {CORNERS "f 1 2 3/1/1/1\n", "a.obj:4:7: error: '3/1/1/1' is no corner of a face\n"},
         {CORNERS "f 1 2 3.5\n", "a.obj:4:7: error: '3.5' is no corner of a face\n"},
@@ -425,6 +467,7 @@ int main(void)
         cmocka_unit_test(missing_materials_are_reported),
         cmocka_unit_test(images_of_materials_are_used),
         cmocka_unit_test(what_is_not_used_is_reported_once),
+        cmocka_unit_test(missing_parts_are_dropped),
         cmocka_unit_test(many_large_polygons_are_refused),
         cmocka_unit_test(faults_have_their_place),
         cmocka_unit_test(test_progress),

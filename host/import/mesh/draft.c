@@ -71,6 +71,30 @@ void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner)
         indices->items[indices->count] = DRAFT_NONE;
 }
 
+static void indices_drop(MeshDraft *draft, DraftPart part)
+{
+    const DraftPlace *needed = &draft->needed[part];
+    DraftIndices *indices = &draft->corners[part];
+    const size_t count = draft_part_count(draft, part);
+    size_t kept = 0;
+    for (size_t i = 0; i < indices->count; i++) {
+        if (indices->items[i] >= count) indices->items[i] = DRAFT_NONE;
+        kept += indices->items[i] != DRAFT_NONE;
+    }
+    if (kept == 0) indices->count = 0;
+    if (needed->index > count)
+        report_warning(&draft->report, needed->offset,
+                       "a face names %s %zu (from %zu); there are %zu: not used", draft_part_names[part],
+                       needed->index - 1 + draft->first_index, draft->first_index, count);
+    draft->needed[part].index = 0;
+}
+
+void draft_drop_missing(MeshDraft *draft)
+{
+    indices_drop(draft, DRAFT_UV);
+    indices_drop(draft, DRAFT_NORMAL);
+}
+
 void draft_share_part(MeshDraft *draft, DraftPart part, size_t count)
 {
     draft->is_shared[part] = true;

@@ -94,6 +94,10 @@ void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t off
 // one a value of 0. A reader calls it before it adds values and after the last position.
 void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
 
+// Drops the indices of texture coordinates and normals that the file lacks, with a warning. A part is gone if
+// no index of it remains.
+void draft_drop_missing(MeshDraft *draft);
+
 // The index, whose place in the file is `offset`, of the next corner; one that the file has later is checked
 // at the end. Position first.
 static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t index, size_t offset)

@@ -11,6 +11,7 @@ typedef struct {
     Scan scan;
     UnusedWords unused;
     bool has_colors;
+    bool lacks[DRAFT_PART_COUNT]; // whether a warning named an index of nothing
     ObjMaterials materials;
 } ObjReader;
 
@@ -78,10 +79,26 @@ static bool corner_fails(ObjReader *reader, const char *start)
                        word.text);
 }
 
+// Reads an index that names nothing: an error for a vertex. A corner does without the other parts.
+static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t offset)
+{
+    MeshDraft *draft = reader->draft;
+    const size_t count = draft_part_count(draft, part);
+    if (part == DRAFT_POSITION)
+        return draft_fails(draft, offset, "a face names vertex %lld; there are %zu before it",
+                           (long long)index, count);
+    if (!reader->lacks[part])
+        report_warning(&draft->report, offset, "a face names %s %lld; there are %zu before it: not used",
+                       draft_part_names[part], (long long)index, count);
+    reader->lacks[part] = true;
+    array_push(draft->corners[part], DRAFT_NONE);
+    return true;
+}
+
 // The next index, of a vertex or behind a slash: from 1, or below 0 back from the last one so far.
 static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
 {
-    enum { DIGITS_MAX = 10 };
+    enum { DIGITS_MAX = 18 };
     const char *at = reader->scan.at, *start = at;
     const bool is_negative = *at == '-';
     if (*at == '-' || *at == '+') at++;
@@ -95,9 +112,7 @@ static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
     const int64_t count = (int64_t)draft_part_count(reader->draft, part);
     const int64_t from_0 = is_negative ? count - index : index - 1;
     if (from_0 < 0 || from_0 >= DRAFT_NONE || (is_negative && index == 0))
-        return draft_fails(reader->draft, offset, "a face names %s %s%lld; there are %lld before it",
-                           draft_part_names[part], is_negative ? "-" : "", (long long)index,
-                           (long long)count);
+        return index_fails(reader, part, is_negative ? -index : index, offset);
     draft_add_index(reader->draft, part, (uint32_t)from_0, offset);
     return true;
 }
@@ -182,6 +197,7 @@ bool obj_read(MeshDraft *draft)
             read = line_read(&reader);
         } while (read && scan_line(&reader.scan));
     }
+    if (read) draft_drop_missing(draft);
     if (read && draft->import->own_materials) obj_materials_read(draft, &reader.materials);
     free(reader.materials.used.items);
     free(reader.materials.libraries.items);
