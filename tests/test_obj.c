@@ -146,6 +146,68 @@ static const Material *triangle_material(const Scene *scene, size_t triangle)
                 .items[mesh->materials ? mesh->materials[triangle] : scene->objects.items[0].material];
 }
 
+// Opacity dims what the surface shows. Glass has bright highlights, and its illumination models bend light.
+static void opacity_is_dissolve(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *lines, *expected;
+        double diffuse, specular, transmission, ior;
+    } cases[] = {
+        {"d 1\n", "", 1, 0.5, 0, 1.5},
+        {"d 0\n", "", 0, 0, 1, 1.5},
+        {"d 0.25\n", "", 0.25, 0.125, 0.75, 1.5},
+        {"Tr 0.75\n", "", 0.25, 0.125, 0.75, 1.5},
+        {"Tr 0.75\nd 0.25\n", "", 0.25, 0.125, 0.75, 1.5},
+        {"d 0.25\nTr 0.25\n",
+         "a.mtl:6:4: warning: Tr 0.25 does not fit d 0.25, which it subtracts from 1: d is used\n", 0.25,
+         0.125, 0.75, 1.5},
+        {"d -halo 0.25\n", "a.mtl:5:3: warning: '-halo' is not used\n", 0.25, 0.125, 0.75, 1.5},
+        {"d 0.25\nillum 2\n", "", 0.25, 0.125, 0.75, 1},
+        {"illum 9\nd 0.25\n", "", 0.25, 0.5, 0.75, 1},
+        {"illum 7\nd 0.25\n", "a.mtl:5:7: warning: the reflections of illum 3 to 8 are not shown\n", 0.25,
+         0.5, 0.75, 1.5},
+        {"illum 9\n", "a.mtl:5:7: warning: illum 9 is for glass, but there is no d or Tr: opaque\n", 1, 0.5,
+         0, 1.5},
+    };
+    file_write("a.ppm", "P3 1 1 255 255 0 0\n");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Text mtl = {0};
+        text_appendf(&mtl, "newmtl red\nKd 0.5 0 0\nKs 0.5\nNi 1.5\n%smap_Kd a.ppm\n", cases[i].lines);
+        file_write("a.mtl", text_c(&mtl));
+        text_free(&mtl);
+        Scene scene =
+            scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", cases[i].expected);
+        const Material *red = triangle_material(&scene, 0);
+        assert_number(red->diffuse.x, 0.5 * cases[i].diffuse);
+        assert_number(red->ambient, 0.5 / 3 * cases[i].diffuse);
+        assert_number(red->specular, cases[i].specular);
+        assert_number(red->transmission, cases[i].transmission);
+        assert_number(red->ior, cases[i].ior);
+        scene_free(&scene);
+    }
+}
+
+static void invalid_numbers_become_defaults(void **state)
+{
+    (void)state;
+    file_write("a.mtl", "newmtl red\nKd -1 0 0\nNi 0\nNs -5\nd 7\nKs 0 -2\nillum 11\nTr -1\n");
+    Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
+                               "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n"
+                               "a.mtl:3:4: warning: must be greater than 0, not 0: the default is used\n"
+                               "a.mtl:4:4: warning: must be 0 or more, not -5: the default is used\n"
+                               "a.mtl:5:3: warning: must be from 0 to 1, not 7: the default is used\n"
+                               "a.mtl:6:6: warning: must be 0 or more, not -2: the default is used\n"
+                               "a.mtl:7:7: warning: must be from 0 to 10, not 11: the default is used\n"
+                               "a.mtl:8:4: warning: must be from 0 to 1, not -1: the default is used\n");
+    const Material *red = triangle_material(&scene, 0);
+    assert_vector(red->color, 1, 1, 1);
+    assert_number(red->shininess, material_default().shininess);
+    assert_number(red->specular, 0);
+    assert_number(red->transmission, 0);
+    scene_free(&scene);
+}
+
 // Polygons become triangles, and the materials move with them.
 static void materials_are_those_of_their_faces(void **state)
 {
@@ -153,7 +215,7 @@ static void materials_are_those_of_their_faces(void **state)
     file_write("a.mtl", "Kd 1 0 0\nnewmtl red one \nKd 1 0 0\nKa 9 9 9\nillum 2\nKe 0 0 0\nTf 1 1 1\n");
     file_write(
         "b c.mtl",
-        "newmtl gray\nKd 0.5\nKs 0.9 0.3 0\nNs 40\nd -halo 0.25\nNi 1.25\nnewmtl clear\nTr 0.5\nKd -1 2 0\n");
+        "newmtl gray\nKd 0.5\nKs 0.9 0.3 0\nNs 40\nd 0.25\nNi 1.25\nnewmtl clear\nTr 0.5\nKd 0 2 0\n");
     Scene scene = scene_of_obj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nmtllib a.mtl\nusemtl red "
                                "one\nf 1 2 3\nf 1 2 3 4\nusemtl gray\n"
                                "usemtl clear\nf 1 2 3\nusemtl gray\nf 1 2 3 4\nf 1 2 3\nmtllib b c.mtl\n",
@@ -166,7 +228,7 @@ static void materials_are_those_of_their_faces(void **state)
         assert_number(triangle_material(&scene, i)->color.y, greens[i]);
     }
     const Material *gray = triangle_material(&scene, 8), *clear = triangle_material(&scene, 5);
-    assert_number(gray->specular, 0.4);
+    assert_number(gray->specular, 0.1);
     assert_number(gray->shininess, 40);
     assert_number(gray->transmission, 0.75);
     assert_number(gray->ior, 1.25);
@@ -463,6 +525,8 @@ int main(void)
         cmocka_unit_test(layouts_are_read),
         cmocka_unit_test(corners_combine_their_parts),
         cmocka_unit_test(one_position_may_have_many_normals),
+        cmocka_unit_test(opacity_is_dissolve),
+        cmocka_unit_test(invalid_numbers_become_defaults),
         cmocka_unit_test(materials_are_those_of_their_faces),
         cmocka_unit_test(missing_materials_are_reported),
         cmocka_unit_test(images_of_materials_are_used),

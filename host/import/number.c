@@ -113,7 +113,7 @@ NumberStatus number_read(const char *text, size_t length, double *value)
     return status;
 }
 
-static bool range_holds(const Range *range, double value)
+bool range_holds(const Range *range, double value)
 {
     return range->open ? value > range->low && value < range->high
                        : value >= range->low && value <= range->high;

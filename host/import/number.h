@@ -26,6 +26,8 @@ typedef struct {
 extern const Range range_positive, range_not_negative, range_unit, range_byte, range_field_of_view,
     range_pixels;
 
+bool range_holds(const Range *range, double value);
+
 // Reads the number called `name`; reports an error and returns false if it is invalid. `range` NULL: any.
 bool number_read_field(Report *report, size_t offset, const char *name, const char *text, size_t length,
                        const Range *range, double *value);

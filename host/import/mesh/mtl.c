@@ -13,8 +13,13 @@
 typedef struct {
     char *name;
     Material material;
-    char *image;          // of map_Kd, or NULL
-    uint32_t scene_index; // DRAFT_NONE: not in the scene yet
+    char *image;           // of map_Kd, or NULL
+    uint32_t scene_index;  // DRAFT_NONE: not in the scene yet
+    double dissolve;       // d: the opacity; NAN: not given
+    double transparency;   // Tr: 1 - d; NAN: not given
+    size_t opacity_offset; // of the last of them
+    double illumination;   // illum; NAN: not given
+    size_t illumination_offset;
 } MtlMaterial;
 
 typedef struct {
@@ -32,6 +37,8 @@ typedef struct {
     Report report;
     Scan scan;
     UnusedWords unused;
+    size_t first_material;
+    bool has_reflection; // whether a warning named it
 } MtlReader;
 
 // Relative to the folder of the file that names it.
@@ -49,32 +56,73 @@ static char *path_of(const char *from, const char *name, size_t length)
 
 static MtlMaterial *material_of(MtlReader *reader)
 {
-    return reader->materials.count > 0 ? &reader->materials.items[reader->materials.count - 1] : NULL;
+    return reader->materials.count > reader->first_material
+               ? &reader->materials.items[reader->materials.count - 1]
+               : NULL;
+}
+
+// Sets the opacity of a material that has all its lines. By its specification glass has highlights that are
+// not dimmed, and bends light only with illum 6 and 7; without illum Ni alone decides.
+static void material_end(MtlReader *reader, MtlMaterial *material)
+{
+    const double illumination = material->illumination;
+    const bool refracts = illumination == 6 || illumination == 7,
+               is_glass = refracts || illumination == 4 || illumination == 9,
+               has_dissolve = !isnan(material->dissolve), has_transparency = !isnan(material->transparency);
+    Material *look = &material->material;
+    if (illumination >= 3 && illumination <= 8 && look->specular > 0 && !reader->has_reflection) {
+        report_warning(&reader->report, material->illumination_offset,
+                       "the reflections of illum 3 to 8 are not shown");
+        reader->has_reflection = true;
+    }
+    if (is_glass && !has_dissolve && !has_transparency)
+        report_warning(&reader->report, material->illumination_offset,
+                       "illum %g is for glass, but there is no d or Tr: opaque", illumination);
+    if (has_dissolve && has_transparency && fabs(1 - material->transparency - material->dissolve) > 1e-3)
+        report_warning(&reader->report, material->opacity_offset,
+                       "Tr %g does not fit d %g, which it subtracts from 1: d is used",
+                       material->transparency, material->dissolve);
+    const double opacity = has_dissolve       ? material->dissolve
+                           : has_transparency ? 1 - material->transparency
+                                              : 1;
+    if (opacity == 1) return;
+    const double specular = look->specular, ior = look->ior;
+    material_set_opacity(look, opacity);
+    if (is_glass) look->specular = specular;
+    if (refracts || isnan(illumination)) look->ior = ior;
 }
 
 static void name_read(MtlReader *reader, MtlMaterial *previous)
 {
-    (void)previous;
+    if (previous) material_end(reader, previous);
     const Word name = scan_rest(&reader->scan);
     MtlMaterial material = {.name = memory_copy_part(name.text, name.length),
                             .material = material_default(),
-                            .scene_index = DRAFT_NONE};
+                            .scene_index = DRAFT_NONE,
+                            .dissolve = NAN,
+                            .transparency = NAN,
+                            .illumination = NAN};
     material.material.ior = 1;
     array_push(reader->materials, material);
 }
 
-// False with a warning where it is no number.
-static bool number_of_line(MtlReader *reader, double *value)
+// Returns false with a warning where it is not a number of the range.
+static bool number_of_line(MtlReader *reader, const Range *range, double *value)
 {
     double number;
     scan_more(&reader->scan);
-    const NumberStatus status = scan_number(&reader->scan, &number);
-    if (status == NUMBER_READ)
-        *value = number;
-    else
-        report_warning(&reader->report, scan_offset(&reader->scan), "no number up to %g: the default is used",
-                       NUMBER_MAX);
-    return status == NUMBER_READ;
+    const size_t offset = scan_offset(&reader->scan);
+    if (scan_number(&reader->scan, &number) != NUMBER_READ) {
+        report_warning(&reader->report, offset, "no number up to %g: the default is used", NUMBER_MAX);
+        return false;
+    }
+    if (!range_holds(range, number)) {
+        report_warning(&reader->report, offset, "must be %s, not %g: the default is used", range->must,
+                       number);
+        return false;
+    }
+    *value = number;
+    return true;
 }
 
 // One number stands for three.
@@ -83,11 +131,11 @@ static bool color_of_line(MtlReader *reader, Color *color)
     double numbers[3];
     int count = 0;
     do
-        if (!number_of_line(reader, &numbers[count])) return false;
+        if (!number_of_line(reader, &range_not_negative, &numbers[count])) return false;
     while (++count < 3 && scan_more(&reader->scan));
     if (count == 1) numbers[1] = numbers[0];
     if (count < 3) numbers[2] = numbers[1];
-    *color = (Color){fmax(numbers[0], 0), fmax(numbers[1], 0), fmax(numbers[2], 0)};
+    *color = (Color){numbers[0], numbers[1], numbers[2]};
     return true;
 }
 
@@ -105,28 +153,39 @@ static void specular_read(MtlReader *reader, MtlMaterial *material)
 
 static void shininess_read(MtlReader *reader, MtlMaterial *material)
 {
-    double number;
-    if (number_of_line(reader, &number)) material->material.shininess = fmax(number, 0);
+    number_of_line(reader, &range_not_negative, &material->material.shininess);
 }
 
 static void ior_read(MtlReader *reader, MtlMaterial *material)
 {
-    double number;
-    if (number_of_line(reader, &number) && number > 0) material->material.ior = number;
+    number_of_line(reader, &range_positive, &material->material.ior);
 }
 
 static void transparency_read(MtlReader *reader, MtlMaterial *material)
 {
-    double number;
-    if (number_of_line(reader, &number)) material->material.transmission = fmin(fmax(number, 0), 1);
+    scan_more(&reader->scan);
+    material->opacity_offset = scan_offset(&reader->scan);
+    number_of_line(reader, &range_unit, &material->transparency);
 }
 
 static void dissolve_read(MtlReader *reader, MtlMaterial *material)
 {
     Scan ahead = reader->scan;
-    if (word_is(scan_word(&ahead), "-halo")) reader->scan = ahead;
-    double number;
-    if (number_of_line(reader, &number)) material->material.transmission = 1 - fmin(fmax(number, 0), 1);
+    const Word word = scan_word(&ahead);
+    material->opacity_offset = word.offset;
+    if (word_is(word, "-halo")) {
+        unused_note(&reader->unused, &reader->report, word, "is not used");
+        reader->scan = ahead;
+    }
+    number_of_line(reader, &range_unit, &material->dissolve);
+}
+
+static void illumination_read(MtlReader *reader, MtlMaterial *material)
+{
+    static const Range range_illumination = {0, 10, false, "from 0 to 10"};
+    scan_more(&reader->scan);
+    material->illumination_offset = scan_offset(&reader->scan);
+    number_of_line(reader, &range_illumination, &material->illumination);
 }
 
 // An option of a texture starts with `-`; up to three numbers or one word are its own.
@@ -190,9 +249,9 @@ static const struct {
     const char *word;
     void (*read)(MtlReader *reader, MtlMaterial *material);
 } statements[] = {
-    {"newmtl", name_read}, {"Kd", diffuse_read},      {"Ks", specular_read}, {"Ns", shininess_read},
-    {"Ni", ior_read},      {"Tr", transparency_read}, {"d", dissolve_read},  {"map_Kd", texture_read},
-    {"Ka", nothing_read},  {"illum", nothing_read},
+    {"newmtl", name_read}, {"Kd", diffuse_read},         {"Ks", specular_read}, {"Ns", shininess_read},
+    {"Ni", ior_read},      {"Tr", transparency_read},    {"d", dissolve_read},  {"map_Kd", texture_read},
+    {"Ka", nothing_read},  {"illum", illumination_read},
 };
 
 static void line_read(MtlReader *reader)
@@ -242,10 +301,14 @@ static bool library_read(MtlReader *reader, const char *path)
         reader->report = report_open(&source, &messages);
         reader->scan = (Scan){source.bytes, source.bytes + source.length, source.bytes};
         reader->unused.count = 0;
+        reader->has_reflection = false;
+        reader->first_material = reader->materials.count;
         if (scan_is_text(&reader->scan, &reader->report)) {
             do
                 line_read(reader);
             while (scan_line(&reader->scan));
+            MtlMaterial *last = material_of(reader);
+            if (last) material_end(reader, last);
         }
         report_include(reader->draft->import->report, &reader->report);
     }
@@ -325,8 +388,9 @@ static void texture_use(MeshDraft *draft, MtlMaterial *material)
     }
     Material *look = &material->material;
     look->texture = texture;
-    look->diffuse = look->color;
-    look->ambient = (look->color.x + look->color.y + look->color.z) / 3;
+    look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
+                            look->diffuse.z * look->color.z};
+    look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
 }
 
 static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)
