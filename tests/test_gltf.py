@@ -390,6 +390,21 @@ class Test(TestCase):
         gltf.write("b.gltf")
         self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[0]: only glint render FILE shows emission", "no lights")
 
+    def test_invalid_numbers_become_defaults(self):
+        for member, expected in (
+            ({"pbrMetallicRoughness": {"baseColorFactor": [1, -1, 0, 1]}}, "pbrMetallicRoughness.baseColorFactor: must be from 0 to 1, not -1: the default"),
+            ({"pbrMetallicRoughness": {"metallicFactor": 7}}, "pbrMetallicRoughness.metallicFactor: must be from 0 to 1, not 7: the default"),
+            ({"emissiveFactor": [0, 0, -2]}, "emissiveFactor: must be 0 or more, not -2: the default"),
+            ({"extensions": {"KHR_materials_ior": {"ior": -1.5}}}, "KHR_materials_ior.ior: must be 0 or more, not -1.5: the default"),
+        ):
+            gltf = Gltf(materials=[member])
+            gltf.square(material=0)
+            self.checked(gltf.write("a.gltf"), expected)
+        numbers = {"v": SQUARE, "n": [(0, 0, 1)] * 4, "t": WHOLE}
+        text = DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()})
+        write("a.dae", text.replace("<texture texture='s2' texcoord='UV'/>", "<color>-1 0 0 1</color>"))
+        self.checked("a.dae", "a color of material 'm' is out of range: the default is used")
+
     def test_missing_image_is_named(self):
         gltf = Gltf(textures=[{"source": 0}], images=[{"uri": "a%20b.png"}])
         material = gltf.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}})

@@ -66,15 +66,16 @@ static Affine affine_of_node(const struct aiMatrix4x4 *m)
 
 static bool color_is_sound(const struct aiColor4D *color)
 {
-    return fabs(color->r) <= NUMBER_MAX && fabs(color->g) <= NUMBER_MAX && fabs(color->b) <= NUMBER_MAX;
+    return color->r >= 0 && color->r <= NUMBER_MAX && color->g >= 0 && color->g <= NUMBER_MAX &&
+           color->b >= 0 && color->b <= NUMBER_MAX;
 }
 
 static void warn_default(const Importer *importer, const struct aiMaterial *material, const char *what)
 {
     struct aiString name = {0};
     aiGetMaterialString(material, AI_MATKEY_NAME, &name);
-    draft_warn(importer->draft, "a %s of material '%.40s' is not finite or too large: using the default",
-               what, name.data);
+    draft_warn(importer->draft, "a %s of material '%.40s' is out of range: the default is used", what,
+               name.data);
 }
 
 // Key, type and index: what assimp's AI_MATKEY_… expand to.
@@ -83,18 +84,18 @@ static Color color_of(const Importer *importer, const struct aiMaterial *materia
 {
     struct aiColor4D color;
     if (aiGetMaterialColor(material, key, type, index, &color) != aiReturn_SUCCESS) return otherwise;
-    if (color_is_sound(&color)) return (Color){fmax(color.r, 0), fmax(color.g, 0), fmax(color.b, 0)};
+    if (color_is_sound(&color)) return (Color){color.r, color.g, color.b};
     warn_default(importer, material, "color");
     return otherwise;
 }
 
 static double number_of(const Importer *importer, const struct aiMaterial *material, const char *key,
-                        unsigned type, unsigned index, double otherwise)
+                        unsigned type, unsigned index, double largest, double otherwise)
 {
     ai_real number;
     if (aiGetMaterialFloatArray(material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
         return otherwise;
-    if (fabs(number) <= NUMBER_MAX) return number >= 0 ? number : otherwise;
+    if (number >= 0 && number <= largest) return number;
     warn_default(importer, material, "number");
     return otherwise;
 }
@@ -183,7 +184,7 @@ static Material material_of(Importer *importer, const struct aiMaterial *from)
     int shading = aiShadingMode_Phong;
     aiGetMaterialIntegerArray(from, AI_MATKEY_SHADING_MODEL, &shading, NULL);
     if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
-    material.shininess = number_of(importer, from, AI_MATKEY_SHININESS, material.shininess);
+    material.shininess = number_of(importer, from, AI_MATKEY_SHININESS, NUMBER_MAX, material.shininess);
     if (is_scene) material.ambient = 0;
     if (is_scene && !vector_is_zero(emission)) {
         material_set_emission(&material, emission);
@@ -191,8 +192,8 @@ static Material material_of(Importer *importer, const struct aiMaterial *from)
     } else if (!vector_is_zero(emission)) {
         lose(importer, LOSES_EMISSION, "only glint render FILE shows emission: lit by the lights instead");
     }
-    const double opacity = fmin(number_of(importer, from, AI_MATKEY_OPACITY, 1), 1),
-                 ior = number_of(importer, from, AI_MATKEY_REFRACTI, 0);
+    const double opacity = number_of(importer, from, AI_MATKEY_OPACITY, 1, 1),
+                 ior = number_of(importer, from, AI_MATKEY_REFRACTI, NUMBER_MAX, 0);
     if (opacity < 1) material_set_opacity(&material, opacity);
     if (opacity < 1 && ior > 0) material.ior = ior;
     return material;

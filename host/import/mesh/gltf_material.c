@@ -15,7 +15,26 @@ typedef struct {
     bool is_unlit;
 } Surface;
 
-static bool surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
+// A writer's float may round 1 up.
+static const Range range_factor = {-1e-6, 1 + 1e-6, false, "from 0 to 1"};
+
+// Reads a member of up to 4 numbers. It leaves the defaults, with a warning, where one is beyond the range.
+static void factors_read(Gltf *gltf, const GltfItem *item, const char *key, size_t count, const Range *range,
+                         double *values)
+{
+    double read[4];
+    memcpy(read, values, count * sizeof *read);
+    if (!gltf_numbers(gltf, item, key, count, read)) return;
+    for (size_t i = 0; i < count; i++) {
+        if (range_holds(range, read[i])) continue;
+        const GltfItem member = gltf_member(item, key);
+        gltf_warn(gltf, &member, "must be %s, not %g: the default is used", range->must, read[i]);
+        return;
+    }
+    memcpy(values, read, count * sizeof *read);
+}
+
+static void surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
 {
     *surface = (Surface){
         .base = {1, 1, 1, 1}, .emissive_strength = 1, .metal = 1, .roughness = 1, .ior = 1.5, .cutoff = 0.5};
@@ -27,16 +46,15 @@ static bool surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
     surface->is_unlit = gltf_extension(item, "KHR_materials_unlit").json != NULL;
     surface->base_texture = gltf_member(&pbr, "baseColorTexture");
     surface->emissive_texture = gltf_member(item, "emissiveTexture");
-    // each is read, so that each fault is named
-    bool is_sound = gltf_numbers(gltf, &pbr, "baseColorFactor", 4, surface->base);
-    is_sound &= gltf_numbers(gltf, &pbr, "metallicFactor", 1, &surface->metal);
-    is_sound &= gltf_numbers(gltf, &pbr, "roughnessFactor", 1, &surface->roughness);
-    is_sound &= gltf_numbers(gltf, item, "emissiveFactor", 3, surface->emissive);
-    is_sound &= gltf_numbers(gltf, item, "alphaCutoff", 1, &surface->cutoff);
-    is_sound &= gltf_numbers(gltf, &strength, "emissiveStrength", 1, &surface->emissive_strength);
-    is_sound &= gltf_numbers(gltf, &glass, "transmissionFactor", 1, &surface->transmission);
-    is_sound &= gltf_numbers(gltf, &ior, "ior", 1, &surface->ior);
-    is_sound &= gltf_numbers(gltf, &volume, "thicknessFactor", 1, &surface->thickness);
+    factors_read(gltf, &pbr, "baseColorFactor", 4, &range_factor, surface->base);
+    factors_read(gltf, &pbr, "metallicFactor", 1, &range_factor, &surface->metal);
+    factors_read(gltf, &pbr, "roughnessFactor", 1, &range_factor, &surface->roughness);
+    factors_read(gltf, item, "emissiveFactor", 3, &range_not_negative, surface->emissive);
+    factors_read(gltf, item, "alphaCutoff", 1, &range_not_negative, &surface->cutoff);
+    factors_read(gltf, &strength, "emissiveStrength", 1, &range_not_negative, &surface->emissive_strength);
+    factors_read(gltf, &glass, "transmissionFactor", 1, &range_factor, &surface->transmission);
+    factors_read(gltf, &ior, "ior", 1, &range_not_negative, &surface->ior);
+    factors_read(gltf, &volume, "thicknessFactor", 1, &range_not_negative, &surface->thickness);
     const struct {
         const GltfItem *item;
         const char *key;
@@ -49,7 +67,6 @@ static bool surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
         const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
         if (lost.json) gltf_lose(gltf, losses[i].loss, &lost);
     }
-    return is_sound;
 }
 
 // Adds the image to the scene's textures. Returns 0 with a warning if it cannot be used.
@@ -168,7 +185,7 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surfac
 {
     Material *look = &material->look;
     const bool is_scene = gltf->draft->import->view != NULL;
-    const double strength = fmax(surface->emissive_strength, 0);
+    const double strength = surface->emissive_strength;
     const double emission[3] = {surface->emissive[0] * strength, surface->emissive[1] * strength,
                                 surface->emissive[2] * strength};
     const bool emits = mean_of(emission) > 0;
@@ -244,8 +261,6 @@ static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *materi
     Material *look = &material->look;
     for (int i = 0; i < 4; i++)
         surface.base[i] = fmax(surface.base[i], 0);
-    for (int i = 0; i < 3; i++)
-        surface.emissive[i] = fmax(surface.emissive[i], 0);
     texture_read(gltf, &surface.base_texture, material);
     look->color = (Color){surface.base[0], surface.base[1], surface.base[2]};
     gloss_set(gltf, item, &surface, look);
