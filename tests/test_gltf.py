@@ -413,6 +413,10 @@ class Test(TestCase):
         with open("a b.png", "wb") as file:
             file.write(QUADRANTS)
         self.assertIn("IMAGES", self.checked("a.gltf")["features"])
+        for uri in ("C:\\Users\\me\\a b.png", "/home/me/a%20b.png", "file:///C:/me/a%20b.png", "textures/a b.png"):
+            gltf.json["images"] = [{"uri": uri}]
+            report = self.checked(gltf.write("a.gltf"), "'a b.png' is used")
+            self.assertIn("IMAGES", report["features"])
 
     def test_lights_and_cameras(self):
         gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [
@@ -476,13 +480,13 @@ class Test(TestCase):
         node = "<node id='{0}' name='{0}'><translate>0.5 0.5 {1}</translate><instance_{2} url='#{3}'/></node>"
         nodes = node.format("C", 2, "camera", "c") + node.format("L", 2, "light", "l") + node.format("P", 3, "light", "p")
         write("a.dae", text.replace("</visual_scene>", nodes + "</visual_scene>"))
-        report = self.checked("a.dae", "m: no 'C:/a/a.png': 'a.png' is used", "lights do not fade")
+        report = self.checked("a.dae", "m: no 'C:\\a\\a.png': 'a.png' is used", "lights do not fade")
         self.assertEqual(set(report["features"]), {"TRIANGLES", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "IMAGES"})
         self.glint("render a.dae --size 20x10 -o a.npy")
         row = npy_read("a.npy")[2][100:120]  # 60 degrees wide, at a distance of 2: the square is 8.7 columns wide
         self.assertEqual([i for i, color in enumerate(row) if abs(color[0] - 0.18) > 1e-3 or abs(color[1] - 0.18) > 1e-3], list(range(6, 14)))
         write("s.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, 5]}}]\nobjects:\n  - mesh: {file: a.dae}\n")
-        self.checked("s.yaml", "a.dae: cameras and lights of a mesh are not used", "a.dae: m: no 'C:/a/a.png'")
+        self.checked("s.yaml", "a.dae: cameras and lights of a mesh are not used", "a.dae: m: no 'C:\\a\\a.png'")
 
     def test_pixels(self):
         """One square for each material, side by side, lit by 1 along the view."""

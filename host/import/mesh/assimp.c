@@ -113,8 +113,6 @@ static const struct aiTexture *embedded_texture(const struct aiScene *file, cons
     return NULL;
 }
 
-// Adds an image. Files often hold a path of another machine, so an image that is missing there is looked for
-// next to the file.
 static uint32_t texture_add(const Importer *importer, const char *name, const char *owner)
 {
     MeshDraft *draft = importer->draft;
@@ -125,16 +123,10 @@ static uint32_t texture_add(const Importer *importer, const char *name, const ch
                               .length = embedded->mHeight == 0 ? embedded->mWidth : 0};
         return draft_add_embedded_texture(draft, &bytes, name);
     }
-    const char *from = draft->import->path, *slash = strrchr(from, '/');
-    const int folder_length = slash ? (int)(slash + 1 - from) : 0;
-    char *path = text_format("%.*s%s", name[0] == '/' ? 0 : folder_length, from, name);
-    for (char *at = path + folder_length; *at; at++)
-        if (*at == '\\') *at = '/';
-    char *near = text_format("%.*s%s", folder_length, from, file_name(path));
-    const bool is_moved = file_obstacle(path) && !file_obstacle(near);
-    const uint32_t texture = draft_add_texture(draft, is_moved ? near : path, owner);
-    if (is_moved && texture > 0) draft_warn(draft, "%s: no '%.100s': '%.100s' is used", owner, path, near);
-    free(near);
+    bool is_moved;
+    char *path = draft_find_file(draft->import->path, name, strlen(name), &is_moved);
+    const uint32_t texture = draft_add_texture(draft, path, owner);
+    if (is_moved && texture > 0) draft_warn(draft, "%s: no '%.100s': '%.100s' is used", owner, name, path);
     free(path);
     return texture;
 }

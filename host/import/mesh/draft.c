@@ -2,8 +2,10 @@
 #include "host/base/file.h"
 #include "host/image/image.h"
 
+#include <ctype.h>
 #include <stdarg.h>
 #include <stdlib.h>
+#include <string.h>
 
 const char *const draft_part_names[DRAFT_PART_COUNT] = {
     [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
@@ -102,6 +104,29 @@ void draft_share_part(MeshDraft *draft, DraftPart part, size_t count)
         array_push(draft->normals, ((Vector3){0, 0, 0}));
     while (part == DRAFT_UV && draft->uvs.count < count)
         draft_add_uv(draft, 0, 0);
+}
+
+static bool is_absolute(const char *path)
+{
+    const bool has_drive = isalpha((unsigned char)path[0]) && path[1] == ':';
+    const char first = has_drive ? path[2] : path[0];
+    return first == '/' || first == '\\';
+}
+
+char *draft_find_file(const char *from, const char *name, size_t length, bool *is_moved)
+{
+    const char *slash = strrchr(from, '/');
+    const int folder_length = slash ? (int)(slash + 1 - from) : 0;
+    char *given = text_format("%.*s", (int)length, name);
+    for (char *at = given; *at; at++)
+        if (*at == '\\') *at = '/';
+    const char *last_slash = strrchr(given, '/');
+    char *path = text_format("%.*s%s", is_absolute(given) ? 0 : folder_length, from, given),
+         *near = text_format("%.*s%s", folder_length, from, last_slash ? last_slash + 1 : given);
+    *is_moved = file_obstacle(path) && !file_obstacle(near);
+    free(given);
+    free(*is_moved ? path : near);
+    return *is_moved ? near : path;
 }
 
 static uint32_t texture_add(MeshDraft *draft, const char *path, const char *owner)

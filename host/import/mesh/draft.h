@@ -119,6 +119,11 @@ static inline bool draft_has(const MeshDraft *draft, DraftPart part)
     return draft->is_shared[part] || draft->corners[part].count > 0;
 }
 
+// Returns the path of a file that the file `from` names, relative to its folder. Files often hold paths of
+// another machine: where there is no such file, but one of that name next to `from`, returns that one's path
+// and sets *is_moved. The caller frees it.
+char *draft_find_file(const char *from, const char *name, size_t length, bool *is_moved);
+
 // Adds an image to the scene's textures, from a file or from bytes, which are copied. Returns 0 with a
 // warning at `owner` if the image cannot be used.
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner);

@@ -116,8 +116,9 @@ bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_
 bool gltf_view_read(Gltf *gltf, const GltfItem *item, const char *key, Source *bytes, size_t *stride);
 // Decodes a `data:` URI. Returns false if the URI has another scheme or is damaged.
 bool gltf_data_decode(Text *bytes, const char *uri);
-// Returns the path of the file that a relative URI names, or NULL if it names none. The caller frees it.
-char *gltf_path(const Gltf *gltf, const char *uri);
+// Returns the path of the file that a URI names, or NULL if it names none. Warns if the file lies elsewhere.
+// The caller frees it.
+char *gltf_path(Gltf *gltf, const GltfItem *uri);
 
 // gltf_material.c
 

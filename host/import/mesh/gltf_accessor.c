@@ -49,23 +49,31 @@ bool gltf_data_decode(Text *bytes, const char *uri)
     return true;
 }
 
-char *gltf_path(const Gltf *gltf, const char *uri)
+char *gltf_path(Gltf *gltf, const GltfItem *uri)
 {
-    const size_t scheme = strspn(uri, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
-    if (uri[0] == '\0' || uri[scheme] == ':') return NULL;
-    const char *from = gltf->draft->import->path, *slash = strrchr(from, '/');
-    Text path = {0};
-    if (slash && uri[0] != '/') text_append(&path, from, (size_t)(slash + 1 - from));
-    percent_decode(&path, uri);
+    static const char file_scheme[] = "file://";
+    const char *text = json_string_value(uri->json);
+    const bool is_file = strncmp(text, file_scheme, sizeof file_scheme - 1) == 0;
+    if (is_file) text += sizeof file_scheme - 1;
+    const size_t scheme = strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
+    // one letter is a drive
+    if (text[0] == '\0' || (scheme != 1 && text[scheme] == ':')) return NULL;
+    Text name = {0};
+    percent_decode(&name, text);
+    bool is_moved = false;
     // a NUL would end the name early
-    if (strlen(path.items) != path.count) text_free(&path);
-    return path.items;
+    char *path = strlen(name.items) == name.count
+                     ? draft_find_file(gltf->draft->import->path, name.items, name.count, &is_moved)
+                     : NULL;
+    if (is_moved) gltf_warn(gltf, uri, "no '%.100s': '%.100s' is used", name.items, path);
+    text_free(&name);
+    return path;
 }
 
 // Reads the buffer's file, or shares the bytes of another buffer that has it.
 static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri)
 {
-    char *path = gltf_path(gltf, json_string_value(uri->json));
+    char *path = gltf_path(gltf, uri);
     if (!path) return gltf_fails(gltf, uri, "must be a relative path or base64 data");
     const SceneOptions *options = gltf->draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);

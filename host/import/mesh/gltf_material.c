@@ -76,7 +76,7 @@ static uint32_t image_add(Gltf *gltf, const GltfItem *image)
     const GltfItem uri = gltf_member(image, "uri");
     const char *text = json_string_value(uri.json);
     if (text && strncmp(text, "data:", 5) != 0) {
-        char *path = gltf_path(gltf, text);
+        char *path = gltf_path(gltf, &uri);
         if (!path) gltf_warn(gltf, &uri, "must be a relative path or base64 data: the color is used");
         const uint32_t texture = path ? draft_add_texture(draft, path, image->path) : 0;
         free(path);

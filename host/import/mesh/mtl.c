@@ -41,19 +41,6 @@ typedef struct {
     bool has_reflection; // whether a warning named it
 } MtlReader;
 
-// Relative to the folder of the file that names it.
-static char *path_of(const char *from, const char *name, size_t length)
-{
-    const char *slash = strrchr(from, '/');
-    Text path = {0};
-    if (slash && !(length > 0 && *name == '/')) text_append(&path, from, (size_t)(slash + 1 - from));
-    const size_t start = path.count;
-    text_append(&path, name, length);
-    for (size_t i = start; i < path.count; i++)
-        if (path.items[i] == '\\') path.items[i] = '/';
-    return path.items;
-}
-
 static MtlMaterial *material_of(MtlReader *reader)
 {
     return reader->materials.count > reader->first_material
@@ -212,7 +199,11 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
         has_options = true;
     if (has_options) report_warning(&reader->report, offset, "options of textures are not used");
     const Word name = scan_rest(&reader->scan);
-    char *path = path_of(reader->path, name.text, name.length);
+    bool is_moved;
+    char *path = draft_find_file(reader->path, name.text, name.length, &is_moved);
+    if (is_moved)
+        report_warning(&reader->report, name.offset, "no '%.*s': '%s' is used", word_shown(name), name.text,
+                       path);
     const SceneOptions *options = reader->draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);
     free(material->image);
@@ -317,21 +308,27 @@ static bool library_read(MtlReader *reader, const char *path)
     return is_there;
 }
 
+static bool library_of_word_read(MtlReader *reader, Word name)
+{
+    MeshDraft *draft = reader->draft;
+    bool is_moved;
+    char *path = draft_find_file(draft->import->path, name.text, name.length, &is_moved);
+    const bool read = library_read(reader, path);
+    if (is_moved && read)
+        report_warning(&draft->report, name.offset, "no '%.*s': '%s' is used", word_shown(name), name.text,
+                       path);
+    free(path);
+    return read;
+}
+
 // The name may have blanks, or be several names.
 static bool libraries_of_line_read(MtlReader *reader, Word line)
 {
-    const char *obj_path = reader->draft->import->path;
-    char *path = path_of(obj_path, line.text, line.length);
-    bool read = library_read(reader, path);
-    free(path);
+    bool read = library_of_word_read(reader, line);
     if (read || !memchr(line.text, ' ', line.length)) return read;
-    Scan scan = {line.text, line.text + line.length, line.text};
-    for (Word word = scan_word(&scan); word.length > 0 && word.text < scan.end; word = scan_word(&scan)) {
-        path = path_of(obj_path, word.text, word.length);
-        read = library_read(reader, path);
-        free(path);
-        if (!read) return false;
-    }
+    Scan scan = {line.text, line.text + line.length, line.text - line.offset};
+    for (Word word = scan_word(&scan); word.length > 0 && word.text < scan.end; word = scan_word(&scan))
+        if (!library_of_word_read(reader, word)) return false;
     return true;
 }
 
