@@ -418,6 +418,43 @@ static void missing_parts_are_dropped(void **state)
     }
 }
 
+// Whatever a file is warned of, however often a scene names it.
+static void files_have_each_message_once(void **state)
+{
+    (void)state;
+    Text scene_text = {0}, obj = {0}, expected = {0};
+    text_appendf(&scene_text, SCENE_OF(""));
+    for (int i = 0; i < 29; i++)
+        text_appendf(&scene_text, "  - mesh: {file: a.obj}\n");
+    text_appendf(&obj, "mtllib a.mtl\nusemtl red\n" FACE "f 1 1 1\n");
+    text_appendf(&expected,
+                 "scene.yaml:4:18: warning: a.obj: triangles without area, which are never hit: 1\n"
+                 "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n");
+    for (int i = 0; i < 25; i++) {
+        text_appendf(&obj, "word%d\n", i);
+        if (i < 18) text_appendf(&expected, "a.obj:%d:1: warning: 'word%d' is not used\n", 8 + i, i);
+    }
+    text_appendf(&expected, "(null):warning: scene.yaml: 7 more warnings\n");
+    file_write("a.mtl", "newmtl red\nKd -1\n");
+    file_write("a.obj", text_c(&obj));
+    Scene scene;
+    assert_true(scene_read(&scene, text_c(&scene_text), text_c(&expected)));
+    assert_int_equal(scene.objects.count, 30);
+    scene_free(&scene);
+    text_free(&expected);
+
+    file_write("a.obj", CORNERS "f 1 2 4\n");
+    text_appendf(&expected, "a.obj:4:7: error: a face names vertex 4 (from 1); there are 3\n");
+    assert_false(scene_read(&scene, text_c(&scene_text), text_c(&expected)));
+    unlink("a.obj");
+    text_free(&expected);
+    text_appendf(&expected, "scene.yaml:4:18: error: a.obj: No such file or directory\n");
+    assert_false(scene_read(&scene, text_c(&scene_text), text_c(&expected)));
+    text_free(&expected);
+    text_free(&obj);
+    text_free(&scene_text);
+}
+
 // Nine times the most corners a face may have: to cut them would take half a minute.
 static void many_large_polygons_are_refused(void **state)
 {
@@ -539,6 +576,7 @@ int main(void)
         cmocka_unit_test(images_of_materials_are_used),
         cmocka_unit_test(what_is_not_used_is_reported_once),
         cmocka_unit_test(missing_parts_are_dropped),
+        cmocka_unit_test(files_have_each_message_once),
         cmocka_unit_test(many_large_polygons_are_refused),
         cmocka_unit_test(faults_have_their_place),
         cmocka_unit_test(test_progress),

@@ -1,6 +1,7 @@
 #include "host/import/report.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
+#include "host/base/hash.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -65,23 +66,20 @@ static bool message_is_among(const Message *message, const MessageList *list, si
     return false;
 }
 
-void report_include(Report *report, Report *included)
+bool report_repeats(Report *report, const char *file, unsigned line, unsigned column, const char *text)
 {
-    report_close(included);
-    MessageList *from = included->messages, *to = &report->included;
-    for (size_t i = 0; i < from->count; i++) {
-        const Message *message = &from->items[i];
-        size_t *count = message->severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
-        if (message_is_among(message, to, 0, to->count) || (*count)++ >= MESSAGES_MAX)
-            message_free(&from->items[i]);
-        else
-            array_push(*to, *message);
-    }
-    free(from->items);
-    *from = (MessageList){0};
+    const unsigned place[] = {line, column};
+    uint64_t hash = hash_bytes(HASH_START, place, sizeof place);
+    hash = hash_bytes(hash, file ? file : "", file ? strlen(file) + 1 : 1);
+    hash = hash_bytes(hash, text, strlen(text));
+    for (size_t i = 0; i < report->known_count; i++)
+        if (report->known[i] == hash) return true;
+    if (report->known_count < REPORT_FILE_MESSAGES) report->known[report->known_count++] = hash;
+    return false;
 }
 
-bool report_close(Report *report)
+// Sorts the messages into source order and drops repeats.
+static void report_sort(Report *report)
 {
     MessageList *list = report->messages;
     size_t kept = report->first;
@@ -99,8 +97,36 @@ bool report_close(Report *report)
     list->count = kept;
     message_list_move(list, &report->included);
     if (report_is_full(report)) message_error(list, "%s: many errors: reading stopped", report->source->file);
-    if (report->warning_count > MESSAGES_MAX)
-        message_warning(list, "%s: %zu more warnings", report->source->file,
-                        report->warning_count - MESSAGES_MAX);
+}
+
+static size_t warnings_beyond_limit(const Report *report)
+{
+    return report->warning_count > MESSAGES_MAX ? report->warning_count - MESSAGES_MAX : 0;
+}
+
+void report_include(Report *report, Report *included)
+{
+    report_sort(included);
+    MessageList *from = included->messages, *to = &report->included;
+    for (size_t i = 0; i < from->count; i++) {
+        const Message *message = &from->items[i];
+        size_t *count = message->severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
+        if (report_repeats(report, message->file, message->line, message->column, message->text) ||
+            (*count)++ >= MESSAGES_MAX)
+            message_free(&from->items[i]);
+        else
+            array_push(*to, *message);
+    }
+    if (!report_repeats(report, included->source->file, 0, 0, "")) // counted once for each file
+        report->warning_count += warnings_beyond_limit(included);
+    free(from->items);
+    *from = (MessageList){0};
+}
+
+bool report_close(Report *report)
+{
+    report_sort(report);
+    const size_t more = warnings_beyond_limit(report);
+    if (more > 0) message_warning(report->messages, "%s: %zu more warnings", report->source->file, more);
     return report->error_count == 0;
 }

@@ -3,15 +3,20 @@
 
 #include "host/base/message.h"
 
+// How many messages about other files a report remembers.
+enum { REPORT_FILE_MESSAGES = 256 };
+
 // A message shows at most this many bytes of a word of the source.
 enum { WORD_SHOWN = 40 };
 
 typedef struct {
     const Source *source;
     MessageList *messages;
-    size_t first;                      // of this report in `messages`
-    size_t error_count, warning_count; // including those beyond the limit
-    MessageList included;              // of other files that the source names
+    size_t first;                         // of this report in `messages`
+    size_t error_count, warning_count;    // including those beyond the limit
+    MessageList included;                 // of other files that the source names
+    uint64_t known[REPORT_FILE_MESSAGES]; // hashes of messages about other files
+    size_t known_count;
 } Report;
 
 Report report_open(const Source *source, MessageList *messages);
@@ -21,6 +26,10 @@ bool report_error(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void report_warning(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+// Returns whether a message about another file repeats one, and remembers it. A source may name a file many
+// times, in different places.
+bool report_repeats(Report *report, const char *file, unsigned line, unsigned column, const char *text);
 
 // Whether the error limit is reached: a reader stops there, which bounds the time for a hostile file.
 bool report_is_full(const Report *report);

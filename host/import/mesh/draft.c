@@ -15,6 +15,7 @@ static void draft_report(const MeshDraft *draft, bool is_error, const char *form
     char text[512];
     vsnprintf(text, sizeof text, format, arguments);
     const MeshImport *import = draft->import;
+    if (report_repeats(import->report, import->path, is_error, 0, text)) return;
     if (import->offset == MESSAGE_WHOLE_FILE) // of a file that is the scene, which the message names
         (is_error ? (void)report_error(import->report, import->offset, "%s", text)
                   : report_warning(import->report, import->offset, "%s", text));
