@@ -73,10 +73,11 @@ class Gltf:
         return write(path, json.dumps(self.json))
 
 
-def png(rows):
-    """An 8-bit RGB image of 0 and 1."""
-    raw = b"".join(b"\0" + bytes(255 * value for pixel in row for value in pixel) for row in rows)
-    chunks = ((b"IHDR", struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0)), (b"IDAT", zlib.compress(raw)), (b"IEND", b""))
+def png(rows, color=2, *extra):
+    """An 8-bit image of 0 and 1, by default RGB, with extra chunks."""
+    raw = b"".join(b"\0" + bytes(int(255 * value) for pixel in row for value in pixel) for row in rows)
+    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, color, 0, 0, 0)
+    chunks = ((b"IHDR", header), *extra, (b"IDAT", zlib.compress(raw)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in chunks
     )
@@ -417,6 +418,30 @@ class Test(TestCase):
             gltf.json["images"] = [{"uri": uri}]
             report = self.checked(gltf.write("a.gltf"), "'a b.png' is used")
             self.assertIn("IMAGES", report["features"])
+
+    def test_alpha_of_images(self):
+        """It is named where a pixel is transparent and the format does not define it as ignored; the colors stay."""
+        palette = (b"PLTE", bytes([255, 0, 0, 0, 255, 0]))
+        images = {
+            "rgba": (png([[(1, 0, 0, 1), (0, 1, 0, 0.5)]], 6), True),
+            "opaque": (png([[(1, 0, 0, 1), (0, 1, 0, 1)]], 6), False),
+            "key": (png([[RED, GREEN]], 2, (b"tRNS", struct.pack(">HHH", 0, 255, 0))), True),
+            "palette": (png([[(0,), (1 / 255,)]], 3, palette, (b"tRNS", b"\xff\x00")), True),
+            "plain": (png([[(0,), (1 / 255,)]], 3, palette), False),
+        }
+        with open("rgb.png", "wb") as file:
+            file.write(png([[RED, GREEN]]))
+        write("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
+        for name, (data, is_named) in images.items():
+            with open(f"{name}.png", "wb") as file:
+                file.write(data)
+            self.glint(f"diff {name}.png rgb.png")
+            write("a.mtl", f"newmtl m\nmap_Kd {name}.png\n")
+            self.checked("a.obj", *[f"the alpha of '{name}.png' is ignored"] * is_named)
+        for mode in ("OPAQUE", "MASK", "BLEND"):
+            gltf = Gltf(images=[{"uri": "rgba.png"}], textures=[{"source": 0}])
+            gltf.square(WHOLE, material=gltf.add("materials", alphaMode=mode, pbrMetallicRoughness={"baseColorTexture": {"index": 0}}))
+            self.checked(gltf.write("a.gltf"), *["the alpha of textures is not used"] * (mode != "OPAQUE"))
 
     def test_lights_and_cameras(self):
         gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [

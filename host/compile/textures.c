@@ -156,6 +156,10 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
             *texture = (CompiledTexture){image.width, image.height, first_level,
                                          (uint32_t)list->levels.count - first_level,
                                          largest_texel(&list->levels.items[first_level])};
+        if (done && image.has_alpha && !scene_texture->ignores_alpha)
+            message_add_at(messages, MESSAGE_WARNING, &source, scene_texture->offset,
+                           "the alpha of '%s' is ignored: its transparent parts are opaque",
+                           scene_texture->path);
         image_free(&image);
         if (problem)
             message_add_at(messages, MESSAGE_ERROR, &source, scene_texture->offset, "cannot use '%s': %s",

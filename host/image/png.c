@@ -164,7 +164,7 @@ static bool png_prepare(PngReader *reader, Image *image)
         png_set_palette_to_rgb(png);
     else if (png_get_bit_depth(png, info) < 8)
         png_set_expand_gray_1_2_4_to_8(png);
-    png_set_strip_alpha(png);
+    if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
     png_set_interlace_handling(png);
 
     // Deflate expands a byte to at most 1032 (zlib, technical details), and a byte holds at most 8 palette
@@ -178,14 +178,26 @@ static bool png_prepare(PngReader *reader, Image *image)
     return reader->state.bytes || image_refuse(reader->file, "the image does not fit into memory");
 }
 
+static unsigned png_sample(const uint8_t *bytes, size_t i, bool is_wide)
+{
+    return is_wide ? (unsigned)(bytes[2 * i] << 8 | bytes[2 * i + 1]) : bytes[i];
+}
+
 static void png_values(const PngReader *reader, Image *image)
 {
-    size_t count = (size_t)image->width * image->height * image->channels;
+    const size_t count = (size_t)image->width * image->height;
+    const size_t channels = image->channels,
+                 samples = png_get_channels(reader->state.png, reader->state.info);
     const uint8_t *bytes = reader->state.bytes;
-    bool is_wide = png_get_bit_depth(reader->state.png, reader->state.info) == 16;
-    for (size_t i = 0; i < count; i++)
-        image->values[i] =
-            is_wide ? (float)(bytes[2 * i] << 8 | bytes[2 * i + 1]) / 65535.0F : (float)bytes[i] / 255.0F;
+    const bool is_wide = png_get_bit_depth(reader->state.png, reader->state.info) == 16;
+    const unsigned largest = is_wide ? UINT16_MAX : UINT8_MAX;
+    for (size_t i = 0; i < count; i++) {
+        for (size_t channel = 0; channel < channels; channel++)
+            image->values[i * channels + channel] =
+                (float)png_sample(bytes, i * samples + channel, is_wide) / (float)largest;
+        image->has_alpha |=
+            samples > channels && png_sample(bytes, i * samples + channels, is_wide) < largest;
+    }
 }
 
 static bool png_read_all(PngReader *reader, Image *image)

@@ -53,10 +53,11 @@ typedef struct {
 
 // A texture's image; scene_compile decodes it.
 typedef struct {
-    char *path;    // of the image's file; where it has `bytes`, only for messages
-    char *layer;   // of an EXR file; NULL: its default layer, or its only one with colors
-    size_t offset; // of its name in the scene's text
-    Text bytes;    // of an image within another file; else empty
+    char *path;         // of the image's file; where it has `bytes`, only for messages
+    char *layer;        // of an EXR file; NULL: its default layer, or its only one with colors
+    size_t offset;      // of its name in the scene's text
+    Text bytes;         // of an image within another file; else empty
+    bool ignores_alpha; // its format defines its alpha as ignored, or its reader has reported the loss
 } SceneTexture;
 
 // Every shape, by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),

@@ -147,7 +147,11 @@ static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *materia
     sampler_read(gltf, &texture, material);
     const GltfItem image = gltf_entry(gltf, "images", source);
     uint32_t *known = &gltf->images[source];
-    if (*known == DRAFT_NONE) *known = image_add(gltf, &image);
+    if (*known == DRAFT_NONE) {
+        *known = image_add(gltf, &image);
+        // alphaMode decides whether alpha counts, and transparency_set warns where it does
+        if (*known > 0) gltf->draft->scene->textures.items[*known - 1].ignores_alpha = true;
+    }
     material->texture = *known;
 }
 
