@@ -495,6 +495,17 @@ class Reports(CliTestCase):
         self.assertEqual(report["schema"], 1)
         self.assertGreaterEqual(len(report["features"]), 14)
 
+    def test_sizes_that_float_cannot_hold(self):
+        """A width below a trillionth of an object's distance, named with its line, at each precision in float alone."""
+        write("long.yaml", SPHERE + "  - cylinder: {from: [50, 0, -1e17], to: [50, 0, 1e17], radius: 7}\n")
+        line = len(read("long.yaml").splitlines())
+        pattern = rf"warning: the cylinder on line {line} reaches 1e\+17 from the eye, and the width of the sphere on line \d+ is 2: precision"
+        self.assertRegex(self.glint("check long.yaml").stderr, pattern)
+        if need_device()["fp64"]:
+            self.assertNotIn("warning", self.glint(f"render long.yaml {SMALL} --precision double -o a.png").stderr)
+        write("far.yaml", SPHERE + "  - cylinder: {from: [50, 0, -1e11], to: [50, 0, 1e11], radius: 7}\n")
+        self.assertNotIn("warning", self.glint("check far.yaml").stderr)
+
     def test_devices(self):
         self.assertRegex(self.glint("devices").stdout, r"(?m)^0\*? ")
         self.assertTrue(self.json("devices --json")["devices"])

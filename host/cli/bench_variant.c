@@ -78,7 +78,8 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
         const RenderReport *report = renderer_report(variant->renderer);
         row->traverses_bvh = (report->features & FEATURE_BVH) != 0;
     } else {
-        row->failure = memory_copy_text(messages.count > 0 ? messages.items[0].text : "unknown");
+        row->failure =
+            memory_copy_text(messages.count > 0 ? messages.items[messages.count - 1].text : "unknown");
     }
     message_list_free(&messages);
 }

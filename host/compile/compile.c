@@ -49,6 +49,7 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
 {
     double start = clock_seconds();
     if (!size_fits(scene, messages)) return false;
+    sizes_check(scene, settings, messages);
     *compiled = (CompiledScene){.unit = scene_unit(scene, settings)};
     Scene scaled = {0};
     if (compiled->unit != 1) scaled = scene_scaled(scene, 1 / compiled->unit);

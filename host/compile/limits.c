@@ -1,5 +1,6 @@
 #include "host/base/parallel.h"
 #include "host/compile/camera_basis.h"
+#include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <float.h>
 #include <stdatomic.h>
@@ -10,6 +11,57 @@ bool size_fits(const Scene *scene, MessageList *messages)
     size_t count = scene_primitive_count(scene);
     if (count <= largest) return true;
     return message_error(messages, "the scene has %zu objects and triangles, more than %zu", count, largest);
+}
+
+typedef struct {
+    const Object *object;
+    double size;
+} Extreme;
+
+// The second largest side of a box, or the largest if the others are 0: the size of what has a length and a
+// flat or round section.
+static double box_width(const Bounds *bounds)
+{
+    const Vector3 size = vector_subtract(bounds->max, bounds->min);
+    const double largest = fmax(size.x, fmax(size.y, size.z)), smallest = fmin(size.x, fmin(size.y, size.z));
+    const double middle = fmax(fmin(size.x, size.y), fmin(fmax(size.x, size.y), size.z));
+    return middle > 0 ? middle : smallest > 0 ? smallest : largest;
+}
+
+static void extreme_describe(const Extreme *extreme, char text[48])
+{
+    const char *name = shape_names[extreme->object->kind];
+    if (extreme->object->line > 0)
+        snprintf(text, 48, "%s on line %u", name, extreme->object->line);
+    else
+        snprintf(text, 48, "%s", name);
+}
+
+void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages)
+{
+    const double detail = 1e-12; // docs/scene-format.md
+    if (settings->precision == PRECISION_DOUBLE || settings->certifies) return;
+    const Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    Extreme farthest = {NULL, 0}, smallest = {NULL, INFINITY};
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        Bounds bounds;
+        if (!shape_ops[object->kind]->bounds(scene, object, &bounds)) continue;
+        const double reach = fmax(vector_largest(vector_subtract(bounds.min, eye)),
+                                  vector_largest(vector_subtract(bounds.max, eye)));
+        const double width = box_width(&bounds);
+        if (reach > farthest.size) farthest = (Extreme){object, reach};
+        if (width > 0 && width < smallest.size) smallest = (Extreme){object, width};
+    }
+    if (!farthest.object || !(smallest.size < detail * farthest.size)) return;
+    char names[2][48];
+    extreme_describe(&farthest, names[0]);
+    extreme_describe(&smallest, names[1]);
+    message_warning(
+        messages,
+        "the %s reaches %.3g from the eye, and the width of the %s is %.3g: precision %s may lose "
+        "details below a trillionth; change the sizes, or use --precision double",
+        names[0], farthest.size, names[1], smallest.size, precision_names[settings->precision]);
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,

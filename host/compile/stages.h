@@ -7,6 +7,9 @@
 // limits.c: false with a message where the scene has more primitives than a BVH counts.
 bool size_fits(const Scene *scene, MessageList *messages);
 
+// limits.c: warns of a scene whose sizes differ by more than a trillion, if the precision is in float.
+void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages);
+
 // units.c: scene units per unit of length on the device, a power of two; 1 for most scenes.
 double scene_unit(const Scene *scene, const CompileSettings *settings);
 
