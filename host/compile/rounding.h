@@ -41,7 +41,8 @@ static inline double roundoff_of(const Rounding *rounding) // half an ulp of 1
 
 Quad3 exact_from_eye(const Rounding *rounding, Vector3 point);
 // A point of a plane, rounded, that the rounding moves off the plane by at most some ulp of the plane's
-// distance from the eye: the given one, or where that is too far away the one nearest to the eye.
+// distance from the eye: the given one, or where that is too far away the one nearest to the eye. In double
+// without an eye the given one, which nothing rounds.
 Vector3 plane_point_from_eye(const Rounding *rounding, Vector3 point, Vector3 normal);
 
 // The same direction, scaled by a power of two so that its largest component lies in 1/2..1: exact.
