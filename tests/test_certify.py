@@ -38,6 +38,19 @@ objects:
   - disc: {center: [1, 4.999999999999, 0], normal: [0, 1, 0], radius: 1}
   - disc: {center: [0, 1e-10, 0], normal: [0.1, 1, 0.2], radius: 2, material: glass}
 """
+# Rays run between parallel mirrors, some to a disc after dozens of bounces.
+MIRRORS = """\
+camera: {position: [0.1, 0.2, 0.3], look_at: [3, 0.1, 2], fov: 40}
+ambient: [0.5, 0.5, 0.5]
+lights: [{point: {position: [0.5, 1, 0.2]}}]
+materials:
+  mirror: {reflection: 0.95, diffuse: 0.1}
+  tiles: {checker: {colors: [[0.8, 0.8, 0.8], [0.4, 0.4, 0.4]], size: 0.5}}
+objects:
+  - plane: {point: [0, 0, 1], normal: [0.1, 0.2, 1], material: mirror}
+  - plane: {point: [0, 0, -1], normal: [0.1, 0.2, 1], material: mirror}
+  - disc: {center: [30, 0, -3], normal: [1, 0, 0], radius: 1, material: tiles}
+"""
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -122,6 +135,14 @@ class Certify(TestCase):
         self.assertEqual([row[name] for name in ("wrong_decided", "unconfirmed", "contradicted")], [0, 0, 0])
         self.assertGreater(row["compared"], 6000)
         self.assertLess(row["undecided"]["pixels"], 600)
+
+    @unittest.skipUnless(HAS_DOUBLE, "no fp64")
+    def test_parallel_mirrors(self):
+        """Bounds grow by addition from one flat mirror to the next, so that 64 bounces are decided."""
+        write("mirrors.yaml", MIRRORS)
+        report = self.json("certify mirrors.yaml --size 24x16 --pixels 384 --bounces 64 --precision certified --json")
+        row = report["precisions"][0]
+        self.assertEqual((row["compared"], row["undecided"]["pixels"], row["wrong_decided"]), (384, 0, 0))
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_undecided_pixels(self):

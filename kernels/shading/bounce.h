@@ -12,7 +12,7 @@ typedef struct {
     uint depth;
     real travelled; // distance from the eye along the path
     // at `certified`: as of a Ray
-    real origin_error, direction_error;
+    real origin_error, start_error, direction_error;
     integer left;
     mask leaves_outward;
     real chord_turn, chord_end_place;
@@ -29,6 +29,7 @@ static inline Ray bounce_ray(const Bounce *bounce)
     if (HAS_IMAGES) ray.travelled = bounce->travelled;
     if (IS_CERTIFIED) {
         ray.origin_error = bounce->origin_error;
+        ray.tmin = -bounce->start_error;
         ray.direction_error = bounce->direction_error;
         ray.left = bounce->left;
         ray.leaves_outward = bounce->leaves_outward;
@@ -219,7 +220,10 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
 {
     const Color3 none = {(real)(0), (real)(0), (real)(0)};
     const Incidence incidence = surface_incidence(surface, ray);
-    reflected->origin_error = refracted->origin_error = surface->place_error;
+    reflected->origin_error = surface->line_error;
+    reflected->start_error = surface->start_error;
+    refracted->origin_error = surface->place_error;
+    refracted->start_error = (real)(0);
     reflected->left = refracted->left = surface->object;
     reflected->leaves_outward = surface->entering;
     refracted->leaves_outward = !surface->entering;

@@ -38,6 +38,7 @@ typedef struct {
     // At `certified`: bounds on the distance of the position from the exact one and of the shading normal
     // and, with HAS_TRIANGLES, of the geometric normal from the exact ones, and of to_eye; what is in doubt.
     real place_error, normal_error, geometric_error, eye_error;
+    real line_error, start_error; // origin_error and -tmin of a reflected ray
     mask doubt;
     ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
@@ -151,7 +152,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
 
 // How far a hit's position may be from the exact one: across the ray by the ray's error, along it by t's, and
 // by the roundings of ray_point, with the shapes' own.
-static inline real hit_place_error(const Ray *ray, const Hit *hit)
+static inline void surface_set_place_error(Surface *surface, const Ray *ray, const Hit *hit)
 {
     real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
     real rounding =
@@ -160,7 +161,20 @@ static inline real hit_place_error(const Ray *ray, const Hit *hit)
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
     // not less than the root of the sum of squares
     real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
-    return real_fma((real)(1.04f), both, rounding);
+    surface->place_error = real_fma((real)(1.04f), both, rounding);
+    surface->line_error = across * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding; // but for the surface
+    surface->start_error = along * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
+}
+
+// A flat mirror that is `height` off moves the line of a reflected ray by twice that, and keeps its distance
+// from the exact one: errors of place add up from mirror to mirror, where those of points grow by one over
+// the cosine.
+static inline void surface_set_line_error(Surface *surface, const SurfacePoint *point)
+{
+    real line_error = real_fma((real)(2), point->height, surface->line_error);
+    mask flat = line_error < surface->place_error;
+    surface->line_error = lanes_select(flat, line_error, surface->place_error);
+    surface->start_error = lanes_select(flat, surface->start_error, (real)(0));
 }
 
 // Of the shading normal.
@@ -270,7 +284,10 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
 // Turns both normals to the side that the ray comes from.
 static inline void surface_set_point(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
-    if (IS_CERTIFIED) surface_set_errors(surface, point, ray);
+    if (IS_CERTIFIED) {
+        surface_set_errors(surface, point, ray);
+        surface_set_line_error(surface, point);
+    }
     surface->position = point->position;
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
     if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
@@ -301,7 +318,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     }
     if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
     if (IS_CERTIFIED) {
-        surface.place_error = hit_place_error(ray, hit);
+        surface_set_place_error(&surface, ray, hit);
         surface.eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
     }
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));

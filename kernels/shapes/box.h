@@ -139,6 +139,8 @@ static inline mask box_set_errors(const Box *box, const Ray *ray, real t, real p
     real x = real_min(fabs(position.x - low.x), fabs(position.x - high.x));
     real y = real_min(fabs(position.y - low.y), fabs(position.y - high.y));
     real z = real_min(fabs(position.z - low.z), fabs(position.z - high.z));
+    real along = lanes_select(normal.x != zero, x, lanes_select(normal.y != zero, y, z));
+    point->height = real_fma((real)(4 * UNIT_ROUNDOFF), vector_norm1(position) + along, along);
     return ((normal.x == zero) & (x <= error)) | ((normal.y == zero) & (y <= error)) |
            ((normal.z == zero) & (z <= error));
 }

@@ -2,9 +2,9 @@
 // ray only approximates, and against the exact shape, whose numbers were rounded. docs/numerics.md derives
 // every bound; constants leave room beyond what it needs.
 //
-// The exact ray's point at t lies within origin_error + direction_error |d| t of the packet's. So a shape is
-// hit for certain where the packet's ray hits it shrunk by all errors, and missed where it misses it enlarged
-// by them; in between the answer is in doubt.
+// The exact ray's point at t, or its line's before it starts, lies within origin_error + direction_error |d|
+// t of the packet's. So a shape is hit for certain where the packet's ray hits it shrunk by all errors, and
+// missed where it misses it enlarged by them; in between the answer is in doubt.
 #ifndef CERTAIN_H
 #define CERTAIN_H
 
@@ -52,7 +52,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask per
     mask before = high < ray->tmin;
     low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers: anywhere
     perhaps = perhaps & !(beyond | before);
-    hit.found = certain & perhaps & (low > ray->tmin) & (high < ray->tmax);
+    hit.found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
     hit.doubt = perhaps & !hit.found;
     hit.t = (real)(0.5f) * (low + high);
     hit.low = low;

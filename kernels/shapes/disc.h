@@ -122,6 +122,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 static inline mask disc_set_errors(const Disc *disc, const Ray *ray, real t, real place_error,
                                    SurfacePoint *point)
 {
+    point->height = certain_plane_height(disc_foot(disc), disc->normal, point->position);
     return mask_none();
 }
 

@@ -95,9 +95,21 @@ static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
     return certain_crossing(ray, lanes & crosses, lanes, low, high);
 }
 
+// A bound on the height of a point over a plane.
+static inline real certain_plane_height(Vector point, scalar4 normal_and_inverse, Vector position)
+{
+    Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, position);
+    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
+    real rounding = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
+                                             (real)(2) * vector_norm1_along(unsigned_normal, point));
+    return (fabs(vector_dot(normal, to_point)) + rounding) *
+           (real)((1 + 16 * UNIT_ROUNDOFF) * normal_and_inverse.w);
+}
+
 static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real place_error,
                                     SurfacePoint *point)
 {
+    point->height = certain_plane_height(vector_of(plane->point), plane->normal, point->position);
     return mask_none();
 }
 

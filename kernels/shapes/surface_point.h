@@ -13,8 +13,9 @@ typedef struct {
     Vector normal;         // geometric, unit, to either side
     Vector shading_normal; // unit; differs on smooth triangles
     real rounding_scale;
-    // At `certified`: how fast the shading normal turns along the surface, and a bound on its own error.
-    real curvature, normal_error;
+    // At `certified`: how fast the shading normal turns along the surface, and a bound on its own error; of a
+    // flat surface a bound on the position's height over the exact one, else NEVER.
+    real curvature, normal_error, height;
 } SurfacePoint;
 
 static inline SurfacePoint surface_point_make(Vector position, Vector normal, real rounding_scale)
@@ -23,7 +24,10 @@ static inline SurfacePoint surface_point_make(Vector position, Vector normal, re
     point.position = position;
     point.normal = point.shading_normal = normal;
     point.rounding_scale = rounding_scale;
-    if (IS_CERTIFIED) point.curvature = point.normal_error = (real)(0);
+    if (IS_CERTIFIED) {
+        point.curvature = point.normal_error = (real)(0);
+        point.height = NEVER;
+    }
     return point;
 }
 
@@ -53,6 +57,7 @@ static inline void surface_point_replace(SurfacePoint *point, mask where, const 
     if (!IS_CERTIFIED) return;
     point->curvature = lanes_select(where, other->curvature, point->curvature);
     point->normal_error = lanes_select(where, other->normal_error, point->normal_error);
+    point->height = lanes_select(where, other->height, point->height);
 }
 
 #endif

@@ -60,7 +60,8 @@ static inline real box_slack(const Ray *ray, scalar4 bounds)
     const real max_norm1 = bounds_max_norm1(ray->origin, bounds);
     if (IS_CERTIFIED) // the exact hit lies in its box
         return real_fma((real)(2 * BOX_ROUNDING_SLACK * UNIT_ROUNDOFF), max_norm1,
-                        bounds_place_error(ray, bounds));
+                        bounds_place_error(ray, bounds)) -
+               ray->length * ray->tmin;
     return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(ray->origin, bounds),
                     (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
 }
@@ -82,7 +83,7 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
     rays.inverse = inverse;
     rays.to_near = vector_subtract(to_plane, slack_t);
     rays.to_far = vector_add(to_plane, slack_t);
-    rays.tmin = ray->tmin;
+    rays.tmin = IS_CERTIFIED ? (real)(0) : ray->tmin; // the slack covers less
     rays.slack = slack;
     rays.negative_x = lanes_bits(d.x < (real)(0));
     rays.negative_y = lanes_bits(d.y < (real)(0));

@@ -23,9 +23,10 @@ typedef struct {
     // compiler may rearrange how the direction was computed, within u of the origin
     uint common_origin;
     real cull_slack; // enlarges cull spheres by the rounding of the direction
-    // At `certified`: bounds on the distance of the origin from the exact ray's, and of the direction,
+    // At `certified`: bounds on the distance of the origin from the exact ray's line, and of the direction,
     // relative to its length; the object that the ray leaves, -1: none; whether it leaves it outward for
     // certain; whether the exact rays end at one point, a light, where their origins' errors have vanished.
+    // The exact ray starts between t = tmin <= 0 and -tmin.
     real origin_error, direction_error;
     integer left;
     mask leaves_outward;
