@@ -42,12 +42,13 @@ static void crash_record(VerifyJournal *journal, CaseRecord *record, int status)
     journal->crash[0] = '\0';
 }
 
-// A terminal's signals go to the parent, too, which ends this process when it ends.
+// What ends a group of processes also goes to the parent, and this process ends with it.
 static void child_begin(VerifyJournal *journal, pid_t parent)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(EXIT_INTERRUPTED);
     signal(SIGINT, SIG_IGN);
+    signal(SIGTERM, SIG_IGN);
     signal(SIGHUP, SIG_IGN);
     fault_record_crashes(journal->crash);
 }
