@@ -1,6 +1,6 @@
 // Feeds damaged files to one reader, in this process: fuzz_scene FORMAT RUNS SEED FILE…
-// FORMAT: of a scene, yaml, rt, cfg or nff, or the ending of a mesh: those that assimp reads it reads in a
-// process each. The same arguments give the same inputs. Build it with sanitizers; it ends with a failure
+// FORMAT: of a scene, yaml, rt, cfg, nff or dat, or the ending of a mesh: those that assimp reads it reads in
+// a process each. The same arguments give the same inputs. Build it with sanitizers; it ends with a failure
 // only where a reader crashes, leaks or hangs, which assimp may; it then leaves the input in fuzz_scene.input
 // (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
 #include "host/base/array.h"
@@ -158,6 +158,7 @@ static bool scene_read(const char *format, const char *bytes, size_t length)
     bool read = !strcmp(format, "rt")    ? scene_read_rt(&scene, &source, &options, &messages)
                 : !strcmp(format, "cfg") ? scene_read_cfg(&scene, &source, &messages)
                 : !strcmp(format, "nff") ? scene_read_nff(&scene, &source, &messages)
+                : !strcmp(format, "dat") ? scene_read_dat(&scene, &source, &messages)
                                          : scene_read_yaml(&scene, &source, &options, &messages);
     if (read == (message_count(&messages, MESSAGE_ERROR) > 0)) abort(); // errors and the verdict must agree
     scene_free(&scene);
@@ -197,7 +198,7 @@ static bool mesh_read(const char *format, const char *bytes, size_t length)
 static bool is_scene(const char *format)
 {
     return !strcmp(format, "yaml") || !strcmp(format, "rt") || !strcmp(format, "cfg") ||
-           !strcmp(format, "nff");
+           !strcmp(format, "nff") || !strcmp(format, "dat");
 }
 
 static void keep_input(int signal_number)

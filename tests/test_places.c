@@ -43,6 +43,15 @@ static const struct {
      "p 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
      "s 3 0 0\n1\n",
      {10, 11, 11, 16}},
+    {"a.dat",
+     "begin_scene\nresolution 8 8\n"
+     "camera zoom 1 aspectratio 1 antialiasing 0 raydepth 5 center 0 0 -5 viewdir 0 0 1 updir 0 1 0 "
+     "end_camera\n"
+     "light center 0 9 0 rad 0 color 1 1 1\n"
+     "texdef t ambient 0 diffuse 1 specular 0 opacity 1 color 1 1 1 texfunc 0\n"
+     "sphere center 0 0 0 rad 1 t sphere\ncenter 0 0 0\nrad 1 t\n"
+     "polycylinder points 1\n0 0 0 rad 1 t\nplane center 0 0 0 normal 0 1 0 t\nend_scene\n",
+     {6, 6, 9, 11}},
     {"a.cfg",
      "=>camera :\n{\nposition 0 0 -5\nlook_at 0 0 0\n}\n"
      "=>light :\n{\nposition 0 9 0\nintensity 1 1 1\n}\n" CFG_SPHERE CFG_SPHERE "\n" CFG_SPHERE CFG_SPHERE,

@@ -145,7 +145,8 @@ static void test_names(void **state)
     assert_false(scene_load(&scene, "tests/scenes/complete.txt", &options, &messages));
     assert_string_equal(
         messages.items[0].text,
-        "tests/scenes/complete.txt: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff, or in a "
+        "tests/scenes/complete.txt: a scene's name ends in .yaml, .yml, .rt, .cfg, .nff or .dat, or in "
+        "a "
         "mesh's, such as .obj, .ply, .stl, .gltf, .glb, .fbx, .dae");
     assert_false(scene_load(&scene, ".rt", &options, &messages));
     assert_false(scene_load(&scene, "tests/scenes/absent.yml", &options, &messages));
@@ -157,9 +158,13 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        {"test_yaml", check_folder, NULL, NULL, "yaml"},  {"test_rt", check_folder, NULL, NULL, "rt"},
-        {"test_cfg", check_folder, NULL, NULL, "cfg"},    {"test_nff", check_folder, NULL, NULL, "nff"},
-        cmocka_unit_test(test_every_message_has_a_scene), cmocka_unit_test(test_names),
+        {"test_yaml", check_folder, NULL, NULL, "yaml"},
+        {"test_rt", check_folder, NULL, NULL, "rt"},
+        {"test_cfg", check_folder, NULL, NULL, "cfg"},
+        {"test_nff", check_folder, NULL, NULL, "nff"},
+        {"test_dat", check_folder, NULL, NULL, "dat"},
+        cmocka_unit_test(test_every_message_has_a_scene),
+        cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

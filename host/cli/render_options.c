@@ -58,7 +58,7 @@ static const char help_text[] =
                     "light; the metric is\n"
                     "                        rmse, max or flip (default: rmse)\n"
                     "      --timing[=json]   report the time of every stage and launch\n"
-                    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg and .nff)\n"
+                    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and .dat)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"

@@ -1,8 +1,10 @@
 #include "host/import/load.h"
 
+#include "host/base/file.h"
 #include "host/base/hash.h"
 #include "host/base/text.h"
 #include "host/import/mesh/mesh_import.h"
+#include <ctype.h>
 #include <string.h>
 #include <strings.h>
 
@@ -28,21 +30,39 @@ static bool scene_read(Scene *scene, const Source *source, const SceneOptions *o
     if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
     if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
     if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
-    return scene_read_yaml(scene, source, options, messages);
+    if (ends_with(source->file, ".yaml") || ends_with(source->file, ".yml"))
+        return scene_read_yaml(scene, source, options, messages);
+    return scene_read_dat(scene, source, messages);
+}
+
+// Returns whether the file's first word behind comments begins a Tachyon scene, which may have any name.
+static bool begins_dat(const char *path)
+{
+    static const char begin[] = "begin_scene";
+    char text[1 << 14];
+    FILE *file = file_obstacle(path) ? NULL : fopen(path, "rbe");
+    const size_t length = file ? fread(text, 1, sizeof text, file) : 0;
+    if (file) fclose(file);
+    size_t at = 0;
+    for (bool is_comment = false; at < length; at++) {
+        is_comment = text[at] == '#' || (is_comment && text[at] != '\n' && text[at] != '\r');
+        if (!is_comment && !isspace((unsigned char)text[at])) break;
+    }
+    return length - at >= strlen(begin) && strncasecmp(text + at, begin, strlen(begin)) == 0;
 }
 
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
 {
-    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg", ".nff"};
+    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg", ".nff", ".dat"};
     *scene = (Scene){0};
     bool is_known = false;
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
         is_known |= ends_with(path, endings[i]);
     if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
-    if (!is_known)
+    if (!is_known && !begins_dat(path))
         return message_error(
             messages,
-            "%s: a scene's name ends in .yaml, .yml, .rt, .cfg or .nff, or in a mesh's, such as "
+            "%s: a scene's name ends in .yaml, .yml, .rt, .cfg, .nff or .dat, or in a mesh's, such as "
             ".obj, .ply, .stl, .gltf, .glb, .fbx, .dae",
             path);
     Text text = {0};

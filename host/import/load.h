@@ -13,7 +13,8 @@ typedef struct {
     Stage *stage; // shows what is being read; NULL: not wanted
 } SceneOptions;
 
-// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff, or one of a mesh). On a mistake in
+// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff .dat, or one of a mesh), or its first
+// word that of .dat. On a mistake in
 // the file returns false with errors in `messages` and an empty scene. Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
@@ -22,6 +23,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
+bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages);
 
 // A file that mesh_is_known has: its triangles, materials, camera and lights. Without a camera one frames it,
 // without lights there are two.

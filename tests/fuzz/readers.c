@@ -142,6 +142,13 @@ static void nff_fuzz(const char *path, const Source *source, MessageList *messag
     if (scene_read_nff(&scene, source, messages)) scene_free(&scene);
 }
 
+static void dat_fuzz(const char *path, const Source *source, MessageList *messages)
+{
+    (void)path;
+    Scene scene;
+    if (scene_read_dat(&scene, source, messages)) scene_free(&scene);
+}
+
 // Each band that it has can be read, or the checkpoint fails: it never holds rows that the image has not.
 static void checkpoint_fuzz(const char *path, const Source *source, MessageList *messages)
 {
@@ -214,6 +221,7 @@ static const struct {
     {"rt", NULL, rt_fuzz},
     {"cfg", NULL, cfg_fuzz},
     {"nff", NULL, nff_fuzz},
+    {"dat", NULL, dat_fuzz},
     {"checkpoint", "a", checkpoint_fuzz},
     {"cache", NULL, cache_fuzz},
     {"baseline", "a.json", baseline_fuzz},

@@ -1,0 +1,69 @@
+// A Tachyon scene being read: words, textures and what glint does not show.
+#pragma once
+
+#include "host/import/line.h"
+#include "host/import/load.h"
+#include "host/scene/bounds.h"
+
+typedef struct {
+    Word name;
+    uint64_t hash;
+    uint32_t material; // of the scene
+} DatTexture;
+
+// The strength of a light is divided by fading[0] + fading[1] d + fading[2] d^2 at the distance d.
+typedef struct {
+    size_t light; // index
+    double fading[3];
+    size_t offset;
+} DatFading;
+
+typedef struct {
+    Report report;
+    Line line;
+    Scene *scene;
+    bool has_resolution, has_camera, is_at_end;
+    bool dims_clear;            // opacity dims what a transparent surface shows, as in VMD
+    double orthographic_height; // of the frame; 0: in perspective
+    Bounds bounds;              // of the points of finite objects
+    struct {
+        DatTexture *items;
+        size_t count, capacity;
+    } textures;
+    uint32_t *slots; // of a hash table: 1 + index of a texture; 0: free
+    size_t slot_count;
+    struct {
+        DatFading *items;
+        size_t count, capacity;
+    } fadings;
+} DatReader;
+
+// Return the next word, on this or a later line, and leave it or move behind it. Empty at the end of the
+// source.
+Word dat_peek(DatReader *reader);
+Word dat_word(DatReader *reader);
+// Returns whether the word is the keyword, in any case.
+bool dat_is(Word word, const char *keyword);
+// Skips the next word if it is the keyword, and returns whether it is.
+bool dat_skip(DatReader *reader, const char *keyword);
+// Warns of something that the source may have many times, once.
+void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+// These read the keyword and what follows it. Each reports an error and returns false if either is missing.
+bool dat_expect(DatReader *reader, const char *keyword);
+bool dat_number(DatReader *reader, const char *keyword, double *value);
+// Reads a vector. Tachyon's coordinates are left-handed: z is negated.
+bool dat_vector(DatReader *reader, const char *keyword, Vector3 *vector);
+// Reads the three numbers of a vector, or of a color as they are.
+bool dat_components(DatReader *reader, const char *name, Vector3 *vector);
+
+// dat_texture.c
+
+Material dat_texture_default(void);
+// Reads the definition of a texture, from its first keyword to its last, `texfunc` or `vcst`.
+bool dat_texture_body(DatReader *reader, Material *material);
+// Reads an object's texture, defined there or by its name, and sets *material to its index in the scene.
+bool dat_texture(DatReader *reader, uint32_t *material);
+bool dat_texture_definition(DatReader *reader);
+bool dat_texture_alias(DatReader *reader);

@@ -1,0 +1,225 @@
+// Tachyon's textures, which are materials, and their names.
+#include "host/base/array.h"
+#include "host/base/hash.h"
+#include "host/base/memory.h"
+#include "host/import/dat.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+Material dat_texture_default(void)
+{
+    Material material = material_default();
+    material.ambient = 0.1;
+    material.diffuse = vector_all(0.9);
+    material.shininess = 25;
+    material.ior = 1;
+    return material;
+}
+
+// A texture being read.
+typedef struct {
+    double ambient, diffuse, specular, opacity, phong, phong_size;
+    Color color;
+    bool is_metal;
+} Texture;
+
+// Reads a number, which stays the default, with a warning, where it is out of range.
+static bool factor_read(DatReader *reader, const char *name, const Range *range, double *factor)
+{
+    double number;
+    const size_t offset = dat_peek(reader).offset;
+    if (!line_number(&reader->line, name, NULL, &number)) return false;
+    if (range_holds(range, number))
+        *factor = number;
+    else
+        dat_warn(reader, offset, "'%s' must be %s, not %g: the default is used", name, range->must, number);
+    return true;
+}
+
+static bool color_read(DatReader *reader, Color *color)
+{
+    Color read;
+    const size_t offset = dat_peek(reader).offset;
+    if (!dat_components(reader, "color", &read)) return false;
+    if (vector_is_zero(vector_min(read, vector_all(0))))
+        *color = read;
+    else
+        dat_warn(reader, offset, "'color' must be 0 or more: the default is used");
+    return true;
+}
+
+static bool phong_read(DatReader *reader, Texture *texture)
+{
+    const size_t offset = dat_peek(reader).offset;
+    texture->is_metal = dat_skip(reader, "metal");
+    if (texture->is_metal)
+        dat_warn(reader, offset, "highlights have the light's color, not that of metal");
+    else
+        dat_skip(reader, "plastic");
+    return factor_read(reader, "phong", &range_not_negative, &texture->phong);
+}
+
+static bool transmode_read(DatReader *reader)
+{
+    const Word mode = dat_word(reader);
+    if (dat_is(mode, "r3d"))
+        dat_warn(reader, mode.offset, "'transmode r3d' is not used: opacity does not depend on the angle");
+    return true;
+}
+
+static bool outline_read(DatReader *reader, const char *name)
+{
+    const size_t offset = dat_peek(reader).offset;
+    double number;
+    if (!line_number(&reader->line, name, NULL, &number)) return false;
+    if (number != 0) dat_warn(reader, offset, "outlines are not shown");
+    return true;
+}
+
+// Reads the number of a procedural texture or an image, and its parameters.
+static bool function_read(DatReader *reader)
+{
+    enum { FIRST_IMAGE = 7, LAST = 10 };
+    static const Range range_function = {0, LAST, false, "from 0 to 10"};
+    static const char *const keywords[] = {"center", "rotate", "scale", "uaxis", "vaxis", "waxis"};
+    const size_t offset = dat_peek(reader).offset;
+    unsigned function;
+    if (!line_whole_number(&reader->line, "texfunc", &range_function, &function)) return false;
+    if (function > 0) dat_warn(reader, offset, "texfunc %u is not shown: the color is used", function);
+    if (function >= FIRST_IMAGE) dat_word(reader);
+    for (size_t i = 0; i < sizeof keywords / sizeof *keywords && function > 0; i++) {
+        Vector3 unused;
+        if (dat_skip(reader, keywords[i]) && !dat_components(reader, keywords[i], &unused)) return false;
+    }
+    return true;
+}
+
+// The highlight is Blinn's, of the angle between the normal and the vector halfway between light and viewer,
+// which is half as large as Phong's: cos(a / 2)^n is about cos(a)^(n / 4).
+static Material material_of(const DatReader *reader, const Texture *texture)
+{
+    Material material = dat_texture_default();
+    material.color = texture->color;
+    material.ambient = texture->ambient;
+    material.diffuse = vector_all(texture->diffuse);
+    material.specular = texture->phong;
+    if (texture->is_metal) material.specular *= (texture->color.x + texture->color.y + texture->color.z) / 3;
+    material.shininess = texture->phong_size / 4;
+    material.reflection = texture->specular;
+    if (reader->dims_clear && texture->opacity < 1) material_set_opacity(&material, texture->opacity);
+    material.transmission = 1 - texture->opacity;
+    return material;
+}
+
+// Reads what follows a keyword. Reports an error and returns false if that is invalid.
+static bool key_read(DatReader *reader, Word word, Texture *texture)
+{
+    const struct {
+        const char *name;
+        const Range *range;
+        double *value;
+    } factors[] = {{"ambient", &range_not_negative, &texture->ambient},
+                   {"diffuse", &range_not_negative, &texture->diffuse},
+                   {"specular", &range_unit, &texture->specular},
+                   {"opacity", &range_unit, &texture->opacity},
+                   {"phong_size", &range_not_negative, &texture->phong_size}};
+    for (size_t i = 0; i < sizeof factors / sizeof *factors; i++)
+        if (dat_is(word, factors[i].name))
+            return factor_read(reader, factors[i].name, factors[i].range, factors[i].value);
+    if (dat_is(word, "phong")) return phong_read(reader, texture);
+    if (dat_is(word, "color")) return color_read(reader, &texture->color);
+    if (dat_is(word, "transmode")) return transmode_read(reader);
+    if (dat_is(word, "outline")) return outline_read(reader, "outline");
+    if (dat_is(word, "outline_width")) return outline_read(reader, "outline_width");
+    if (!word.length) return report_error(&reader->report, word.offset, "the texture lacks its 'texfunc'");
+    return report_error(&reader->report, word.offset, "unknown key '%.*s' of a texture", word_shown(word),
+                        word.text);
+}
+
+bool dat_texture_body(DatReader *reader, Material *material)
+{
+    Texture texture = {.ambient = 0.1, .diffuse = 0.9, .opacity = 1, .phong_size = 100, .color = {1, 1, 1}};
+    Word word = dat_word(reader);
+    while (!dat_is(word, "texfunc") && !dat_is(word, "vcst")) {
+        if (!key_read(reader, word, &texture)) return false;
+        word = dat_word(reader);
+    }
+    *material = material_of(reader, &texture);
+    return dat_is(word, "vcst") || function_read(reader);
+}
+
+static size_t slot_of(const DatReader *reader, Word name, uint64_t hash)
+{
+    size_t slot = hash & (reader->slot_count - 1);
+    for (; reader->slots[slot]; slot = (slot + 1) & (reader->slot_count - 1)) {
+        const DatTexture *texture = &reader->textures.items[reader->slots[slot] - 1];
+        if (texture->hash == hash && words_equal(texture->name, name)) break;
+    }
+    return slot;
+}
+
+static void slots_grow(DatReader *reader)
+{
+    reader->slot_count = reader->slot_count ? 2 * reader->slot_count : 64;
+    free(reader->slots);
+    reader->slots = memory_allocate_zeroed(reader->slot_count, sizeof *reader->slots);
+    for (size_t i = 0; i < reader->textures.count; i++) {
+        const DatTexture *texture = &reader->textures.items[i];
+        reader->slots[slot_of(reader, texture->name, texture->hash)] = (uint32_t)i + 1;
+    }
+}
+
+// The last texture of a name counts.
+static void texture_add(DatReader *reader, Word name, uint32_t material)
+{
+    if (2 * reader->textures.count >= reader->slot_count) slots_grow(reader);
+    const DatTexture texture = {name, hash_bytes(HASH_START, name.text, name.length), material};
+    array_push(reader->textures, texture);
+    reader->slots[slot_of(reader, name, texture.hash)] = (uint32_t)reader->textures.count;
+}
+
+static uint32_t texture_find(DatReader *reader, Word name)
+{
+    const size_t slot =
+        reader->slot_count ? slot_of(reader, name, hash_bytes(HASH_START, name.text, name.length)) : 0;
+    if (reader->slot_count && reader->slots[slot])
+        return reader->textures.items[reader->slots[slot] - 1].material;
+    dat_warn(reader, name.offset, "unknown texture '%.*s': white", word_shown(name), name.text);
+    const Material white = dat_texture_default();
+    const uint32_t material = scene_add_material(reader->scene, &white, "");
+    texture_add(reader, name, material);
+    return material;
+}
+
+bool dat_texture(DatReader *reader, uint32_t *material)
+{
+    const Word word = dat_word(reader);
+    if (!word.length) return report_error(&reader->report, word.offset, "the object's texture is missing");
+    if (!dat_is(word, "texture")) {
+        *material = texture_find(reader, word);
+        return true;
+    }
+    Material read;
+    if (!dat_texture_body(reader, &read)) return false;
+    *material = scene_add_material(reader->scene, &read, "");
+    return true;
+}
+
+bool dat_texture_definition(DatReader *reader)
+{
+    const Word name = dat_word(reader);
+    dat_skip(reader, "texture");
+    Material material;
+    if (!dat_texture_body(reader, &material)) return false;
+    texture_add(reader, name, scene_add_material(reader->scene, &material, ""));
+    return true;
+}
+
+bool dat_texture_alias(DatReader *reader)
+{
+    const Word name = dat_word(reader), other = dat_word(reader);
+    texture_add(reader, name, texture_find(reader, other));
+    return true;
+}
