@@ -349,9 +349,9 @@ static void colors_write(const char *profile, double gamma, const double *primar
     if (is_srgb) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
     png_write_info(png, info);
     if (profile) { // as no reader would accept it, which glint does not notice
-        uint8_t chunk[80] = {0};
-        memcpy(chunk, profile, strlen(profile));
-        png_write_chunk(png, (const png_byte *)"iCCP", chunk, strlen(profile) + 8);
+        char chunk[80] = {0};
+        snprintf(chunk, sizeof chunk, "%s", profile);
+        png_write_chunk(png, (const png_byte *)"iCCP", (const png_byte *)chunk, strlen(profile) + 8);
     }
     png_write_row(png, (const uint8_t[]){10, 20, 30});
     png_write_end(png, NULL);
