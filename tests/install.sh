@@ -11,7 +11,7 @@ metadata_validate() {
     appstreamcli validate --no-net --override=url-homepage-missing=info "$1" || appstreamcli validate --no-net "$1"
 }
 
-check "CHANGELOG.md starts with $version" test "$(grep -om 1 '^## \[.*]' CHANGELOG.md)" = "## [$version]"
+check "CHANGELOG.md's latest version is $version" test "$(grep -om 1 '^## \[[0-9].*]' CHANGELOG.md)" = "## [$version]"
 check "metainfo has $version" grep -q "<release version=\"$version\" " tools/desktop/glint-view.metainfo.xml
 
 stage=$scratch/stage

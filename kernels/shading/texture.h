@@ -92,7 +92,7 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ki
 static inline scalar wrap_unit(scalar a, uint wrap)
 {
     scalar part = a - floor(a);
-    if (wrap == WRAP_MIRRORED) part = fabs(a - 2 * rint(a / 2));
+    if (wrap == WRAP_MIRRORED) part = fabs(a - 2 * rint(a * (scalar)0.5f));
     if (wrap == WRAP_CLAMPED) part = clamp(a, (scalar)0, (scalar)1);
     return part >= 0 && part <= 1 ? part : 0;
 }
