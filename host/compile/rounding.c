@@ -9,7 +9,8 @@ Quad3 exact_from_eye(const Rounding *rounding, Vector3 point)
 // over the axes.
 Vector3 plane_point_from_eye(const Rounding *rounding, Vector3 point, Vector3 normal)
 {
-    if (rounding->is_double && !rounding->has_eye && !rounding->certifies) return point; // exact, and so is the kernels' sum
+    if (rounding->is_double && !rounding->has_eye && !rounding->certifies)
+        return point; // exact, and so is the kernels' sum
     const Quad3 from_eye = exact_from_eye(rounding, point), n = quad3(axis_scaled(normal));
     const Quad height = quad3_dot(n, from_eye);
     if (quad3_dot_magnitude(n, from_eye) <= 4 * quad_absolute(height)) return point_from_eye(rounding, point);
