@@ -527,7 +527,7 @@ static Vector3 *vectors_read(DatReader *reader, const char *name, unsigned count
     } vectors = {0};
     array_reserve(vectors, 1);
     for (unsigned i = 0; i < count; i++) {
-        Vector3 vector;
+        Vector3 vector = {0};
         if (!(are_colors ? dat_components : coordinates_read)(reader, name, &vector)) {
             free(vectors.items);
             return NULL;
