@@ -142,7 +142,7 @@ class Diff(TestCase):
     def test_limits_of_a_distance_map(self):
         write("sphere.yaml", SPHERE)
         for precision in "single", "double":
-            self.glint(f"render sphere.yaml --size 48x32 --aov t --precision {precision} -o {precision}.exr")
+            self.glint(f"render sphere.yaml --size 48x32 --aov t --precision {precision} -o {precision}.png")
         far = self.json("diff double.t.npy single.t.npy --max-ulp 1e6 --json")["limits"]["ulp"]["value"]
         self.assertTrue(0 < far < 100, far)
         self.glint(f"diff double.t.npy single.t.npy --max-ulp {far * 0.99}", status=3)
