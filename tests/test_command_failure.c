@@ -144,7 +144,8 @@ static void test_release_after_the_output(void **state)
     (void)state;
     char path[] = "/tmp/glint-test-XXXXXX.png";
     assert_true(close(mkstemps(path, 4)) == 0);
-    Command command = {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", path}};
+    Command command = {command_render,
+                       {"render", "scenes/spheres16.yaml", "--size", "8x8", "--quiet", "-o", path}};
     failing_call = "clEnqueueUnmapMemObject";
     ChildEnd end = child_run(command_fail, &command, sizeof command);
     static const char expected[] = "glint: warning: clEnqueueUnmapMemObject: CL_OUT_OF_RESOURCES (-5) on ";
