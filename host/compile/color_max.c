@@ -1,4 +1,4 @@
-#include "host/compile/stages.h"
+#include "host/compile/compile.h"
 
 // What the rounding of shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
@@ -20,7 +20,7 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
     return vector_add(ambient, color_product(light_sum, factor));
 }
 
-double color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces)
+double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces)
 {
     Color light_sum = {0}, seen = {0};
     for (size_t i = 0; i < scene->lights.count; i++)

@@ -16,3 +16,7 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
 // `compiled` is then no scene's until a move succeeds.
 bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages);
+
+// Returns the largest channel that a pixel of the compiled scene can have with that many bounces, by its
+// lights, materials, textures and background; infinite where it overflows.
+double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces);

@@ -49,7 +49,6 @@ typedef struct {
     uint32_t cull_sphere_count;      // of each common origin
     Vector3 eye;                     // from which the arrays are seen; NAN: a move failed
     Vector3 eye_offset;              // of the camera's eye from there; 0 unless a preview
-    double color_max;                // the largest channel that a pixel can have
     Bounds contact;                  // where transparent and opaque primitives may touch
 } CompiledScene;
 

@@ -52,5 +52,4 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     memcpy(header.bvh_counts, compiled->bvh_counts, sizeof compiled->bvh_counts);
     flat_array_renew(compiled, FLAT_HEADER, 1);
     *(SceneHeader *)compiled->arrays[FLAT_HEADER].items = header;
-    compiled->color_max = color_max(compiled, scene, settings->bounce_count);
 }

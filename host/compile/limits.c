@@ -18,14 +18,13 @@ typedef struct {
     double size;
 } Extreme;
 
-// The second largest side of a box, or the largest if the others are 0: the size of what has a length and a
-// flat or round section.
+// Returns the second largest side of a box, or the largest if the others are 0: the size of what has a length
+// and a flat or round section.
 static double box_width(const Bounds *bounds)
 {
     const Vector3 size = vector_subtract(bounds->max, bounds->min);
-    const double largest = fmax(size.x, fmax(size.y, size.z)), smallest = fmin(size.x, fmin(size.y, size.z));
     const double middle = fmax(fmin(size.x, size.y), fmin(fmax(size.x, size.y), size.z));
-    return middle > 0 ? middle : smallest > 0 ? smallest : largest;
+    return middle > 0 ? middle : fmax(size.x, fmax(size.y, size.z));
 }
 
 static void extreme_describe(const Extreme *extreme, char text[48])

@@ -61,9 +61,5 @@ Bounds contact_find(const CompiledScene *compiled);
 // primitives and their distances from the eye. Else every pixel is in doubt.
 bool bounds_hold(const CompiledScene *compiled, const CompileSettings *settings);
 
-// color_max.c: the largest channel that a pixel of the scene can have, by its lights, materials, textures and
-// background.
-double color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces);
-
-// header.c: FLAT_HEADER, and color_max.
+// header.c: FLAT_HEADER.
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);

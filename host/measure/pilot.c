@@ -129,7 +129,7 @@ static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute
     if (!renderer) return false;
     bool whole = true;
     if (pilot->cell == 0) {
-        pilot->color_max = renderer_color_max(renderer);
+        pilot->color_max = renderer_color_max(renderer, scene);
         pilot->cell = cell_choose(pilot, &settings);
         squares = squares_of(&settings, pilot->cell);
         whole = pilot->cell == cell || renderer_move(renderer, scene, &squares, messages);

@@ -441,9 +441,9 @@ void renderer_close(Renderer *renderer)
     free(renderer);
 }
 
-double renderer_color_max(const Renderer *renderer)
+double renderer_color_max(const Renderer *renderer, const Scene *scene)
 {
-    return renderer->compiled.color_max;
+    return scene_color_max(&renderer->compiled, scene, renderer->settings.bounce_count);
 }
 
 size_t renderer_scalar_size(const Renderer *renderer)

@@ -108,9 +108,8 @@ void renderer_close(Renderer *renderer);
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);
 
-// The largest channel that a pixel of the scene can have, by its lights and materials; infinite where it
-// overflows.
-double renderer_color_max(const Renderer *renderer);
+// Returns scene_color_max of the renderer's scene, which `scene` is.
+double renderer_color_max(const Renderer *renderer, const Scene *scene);
 // What all bands with the color and the AOVs of the set have together.
 FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs);
 // Renders the color and the AOVs of the set in bands of about band_seconds each. False: the device failed
