@@ -248,7 +248,7 @@ static void test_windows(void **state)
         const int left = shifts[i][0], top = shifts[i][1];
         const char *names = "Y";
         exr_context_t context = exr_open(&names, 1, plain);
-        const exr_attr_box2i_t display = {.min = {{{left, top}}}, .max = {{{left + 19, top + 9}}}};
+        const exr_attr_box2i_t display = {.min.x = left, .min.y = top, .max.x = left + 19, .max.y = top + 9};
         must(exr_set_display_window(context, 0, &display));
         exr_close(context, 1, plain);
         MessageList messages = {0};

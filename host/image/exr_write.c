@@ -118,10 +118,11 @@ static exr_result_t exr_declare_size(const ImageWriter *writer)
     const int32_t width = (int32_t)header->width, height = (int32_t)header->height;
     const int32_t full_width = is_whole ? width : (int32_t)header->full_width;
     const int32_t full_height = is_whole ? height : (int32_t)header->full_height;
-    const exr_attr_box2i_t display = {.min = {{{0, 0}}}, .max = {{{full_width - 1, full_height - 1}}}};
-    const exr_attr_box2i_t data = {.min = {{{left, top}}}, .max = {{{left + width - 1, top + height - 1}}}};
+    const exr_attr_box2i_t display = {.max.x = full_width - 1, .max.y = full_height - 1};
+    const exr_attr_box2i_t data = {
+        .min.x = left, .min.y = top, .max.x = left + width - 1, .max.y = top + height - 1};
     return exr_initialize_required_attr(((const ExrWriter *)writer->state)->context, 0, &display, &data, 1,
-                                        &(exr_attr_v2f_t){{{0, 0}}}, 1, EXR_LINEORDER_INCREASING_Y,
+                                        &(exr_attr_v2f_t){.x = 0}, 1, EXR_LINEORDER_INCREASING_Y,
                                         EXR_COMPRESSION_ZIP);
 }
 
