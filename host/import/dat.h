@@ -55,7 +55,13 @@ bool dat_expect(DatReader *reader, const char *keyword);
 bool dat_number(DatReader *reader, const char *keyword, double *value);
 // Reads a vector. Tachyon's coordinates are left-handed: z is negated.
 bool dat_vector(DatReader *reader, const char *keyword, Vector3 *vector);
-// Reads the three numbers of a vector, or of a color as they are.
+// These read values alone; `name` is for errors. A word that is not a number may start the next statement, so
+// it stays.
+bool dat_value(DatReader *reader, const char *name, double *value);
+bool dat_value_in_range(DatReader *reader, const char *name, const Range *range, double *value);
+bool dat_whole_number(DatReader *reader, const char *name, const Range *range, unsigned *value);
+// Reads a vector whose z is negated, or the three numbers of a vector or a color as they are.
+bool dat_coordinates(DatReader *reader, const char *name, Vector3 *vector);
 bool dat_components(DatReader *reader, const char *name, Vector3 *vector);
 
 // dat_texture.c
@@ -67,3 +73,29 @@ bool dat_texture_body(DatReader *reader, Material *material);
 bool dat_texture(DatReader *reader, uint32_t *material);
 bool dat_texture_definition(DatReader *reader);
 bool dat_texture_alias(DatReader *reader);
+
+// dat_view.c: statements, and what is known only at the end of the source: how bright lights are at the
+// objects, and where an orthographic camera stands.
+
+bool dat_resolution(DatReader *reader);
+bool dat_camera(DatReader *reader);
+bool dat_background(DatReader *reader);
+bool dat_light(DatReader *reader);
+bool dat_directional_light(DatReader *reader);
+bool dat_spotlight(DatReader *reader);
+void dat_lights_finish(DatReader *reader);
+void dat_camera_finish(DatReader *reader);
+
+// dat_objects.c: statements.
+
+bool dat_sphere(DatReader *reader);
+bool dat_plane(DatReader *reader);
+bool dat_cylinder(DatReader *reader);
+bool dat_finite_cylinder(DatReader *reader);
+bool dat_polycylinder(DatReader *reader);
+bool dat_ring(DatReader *reader);
+bool dat_box(DatReader *reader);
+bool dat_triangle(DatReader *reader);
+bool dat_smooth_triangle(DatReader *reader);
+bool dat_colored_triangle(DatReader *reader);
+bool dat_vertex_array(DatReader *reader);

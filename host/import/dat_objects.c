@@ -1,0 +1,378 @@
+// Tachyon's objects.
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/import/dat.h"
+#include "host/scene/mesh.h"
+#include "host/scene/portable.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static bool point_of_object_read(DatReader *reader, const char *keyword, Vector3 *point)
+{
+    if (!dat_vector(reader, keyword, point)) return false;
+    reader->bounds = bounds_join(reader->bounds, (Bounds){*point, *point});
+    return true;
+}
+
+// Reads the number of things that follow.
+static bool count_read(DatReader *reader, const char *name, unsigned *count)
+{
+    static const Range range_count = {0, INT32_MAX, false, "from 0 to 2147483647"};
+    return dat_whole_number(reader, name, &range_count, count);
+}
+
+// Reads the texture and adds the object, unless it has a size that is not above 0, which Tachyon never hits.
+static bool object_end(DatReader *reader, Object object, double size, size_t offset)
+{
+    if (!dat_texture(reader, &object.material)) return false;
+    if (size > 0)
+        array_push(reader->scene->objects, object);
+    else
+        dat_warn(reader, offset, "a %s without size or direction is not shown", shape_names[object.kind]);
+    return true;
+}
+
+bool dat_sphere(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_SPHERE};
+    return point_of_object_read(reader, "center", &object.as.sphere.center) &&
+           dat_number(reader, "rad", &object.as.sphere.radius) &&
+           object_end(reader, object, object.as.sphere.radius, offset);
+}
+
+bool dat_plane(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_PLANE};
+    return dat_vector(reader, "center", &object.as.plane.point) &&
+           dat_vector(reader, "normal", &object.as.plane.normal) &&
+           object_end(reader, object, !vector_is_zero(object.as.plane.normal), offset);
+}
+
+bool dat_cylinder(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_CYLINDER};
+    return dat_vector(reader, "center", &object.as.cylinder.from) &&
+           dat_vector(reader, "axis", &object.as.cylinder.axis) &&
+           dat_number(reader, "rad", &object.as.cylinder.radius) &&
+           object_end(reader, object, vector_is_zero(object.as.cylinder.axis) ? 0 : object.as.cylinder.radius,
+                      offset);
+}
+
+bool dat_finite_cylinder(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_CYLINDER, .as.cylinder.finite = true};
+    Vector3 apex;
+    if (!point_of_object_read(reader, "base", &object.as.cylinder.from) ||
+        !point_of_object_read(reader, "apex", &apex) ||
+        !dat_number(reader, "rad", &object.as.cylinder.radius))
+        return false;
+    object.as.cylinder.axis = vector_subtract(apex, object.as.cylinder.from);
+    return object_end(reader, object, vector_is_zero(object.as.cylinder.axis) ? 0 : object.as.cylinder.radius,
+                      offset);
+}
+
+// Cylinders between successive points, and a sphere at each point.
+bool dat_polycylinder(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    unsigned count;
+    double radius;
+    struct {
+        Vector3 *items;
+        size_t count, capacity;
+    } points = {0};
+    bool read = dat_expect(reader, "points") && count_read(reader, "points", &count);
+    for (unsigned i = 0; read && i < count; i++) {
+        Vector3 point;
+        read = dat_coordinates(reader, "points", &point);
+        array_push(points, point);
+    }
+    uint32_t material;
+    read = read && dat_number(reader, "rad", &radius) && dat_texture(reader, &material);
+    if (read && !(radius > 0)) dat_warn(reader, offset, "a polycylinder without a radius is not shown");
+    for (size_t i = 0; read && radius > 0 && i < points.count; i++) {
+        const Vector3 point = points.items[i];
+        const Vector3 axis = i > 0 ? vector_subtract(points.items[i - 1], point) : (Vector3){0, 0, 0};
+        reader->bounds = bounds_join(reader->bounds, (Bounds){point, point});
+        const Object sphere = {.kind = SHAPE_SPHERE,
+                               .material = material,
+                               .as.sphere = {point, radius, false}},
+                     cylinder = {
+                         .kind = SHAPE_CYLINDER,
+                         .material = material,
+                         .as.cylinder = {.from = point, .axis = axis, .radius = radius, .finite = true}};
+        array_push(reader->scene->objects, sphere);
+        if (!vector_is_zero(axis)) array_push(reader->scene->objects, cylinder);
+    }
+    free(points.items);
+    return read;
+}
+
+static void mesh_add(DatReader *reader, Mesh *mesh, uint32_t material)
+{
+    const Object object = {
+        .kind = SHAPE_MESH, .material = material, .as.mesh.index = (uint32_t)reader->scene->meshes.count};
+    array_push(reader->scene->meshes, *mesh);
+    array_push(reader->scene->objects, object);
+}
+
+// A ring with a hole, as triangles: the circles deviate by less than a ten-thousandth of their radius.
+static Mesh ring_mesh(Vector3 center, Vector3 normal, double inner, double outer)
+{
+    enum { SEGMENTS = 256 };
+    Mesh mesh = {.vertices = memory_allocate(2 * SEGMENTS, sizeof *mesh.vertices),
+                 .vertex_count = 2 * SEGMENTS,
+                 .triangles = memory_allocate(2 * SEGMENTS, sizeof *mesh.triangles),
+                 .triangle_count = 2 * SEGMENTS};
+    const Vector3 n = vector_normalize(normal);
+    const Vector3 other = fabs(n.x) < 0.5 ? (Vector3){1, 0, 0} : (Vector3){0, 1, 0};
+    const Vector3 u = vector_normalize(vector_cross(n, other)), v = vector_cross(n, u);
+    for (uint32_t i = 0; i < SEGMENTS; i++) {
+        const double angle = i * (2 * M_PI / SEGMENTS);
+        const Vector3 toward =
+            vector_add(vector_scale(u, portable_cosine(angle)), vector_scale(v, portable_sine(angle)));
+        const uint32_t at = 2 * i, next = 2 * ((i + 1) % SEGMENTS);
+        mesh.vertices[at] = vector_add(center, vector_scale(toward, inner));
+        mesh.vertices[at + 1] = vector_add(center, vector_scale(toward, outer));
+        memcpy(mesh.triangles[at], (uint32_t[3]){at, at + 1, next + 1}, sizeof mesh.triangles[at]);
+        memcpy(mesh.triangles[at + 1], (uint32_t[3]){at, next + 1, next}, sizeof mesh.triangles[at]);
+    }
+    return mesh;
+}
+
+bool dat_ring(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_DISC};
+    Vector3 center, normal;
+    double inner, outer;
+    if (!point_of_object_read(reader, "center", &center) || !dat_vector(reader, "normal", &normal) ||
+        !dat_number(reader, "inner", &inner) || !dat_number(reader, "outer", &outer))
+        return false;
+    object.as.disc.center = center;
+    object.as.disc.normal = normal;
+    object.as.disc.radius = outer;
+    const double width = vector_is_zero(normal) ? 0 : outer - fmax(inner, 0);
+    if (inner <= 0 || width <= 0) return object_end(reader, object, width, offset);
+    if (!dat_texture(reader, &object.material)) return false;
+    Mesh mesh = ring_mesh(center, normal, inner, outer);
+    mesh_add(reader, &mesh, object.material);
+    return true;
+}
+
+bool dat_box(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_BOX};
+    Vector3 a, b;
+    if (!point_of_object_read(reader, "min", &a) || !point_of_object_read(reader, "max", &b)) return false;
+    object.as.box.min = vector_min(a, b);
+    object.as.box.max = vector_max(a, b);
+    return object_end(reader, object, 1, offset);
+}
+
+static bool vertices_read(DatReader *reader, Object *object)
+{
+    static const char *const names[] = {"v0", "v1", "v2"};
+    for (int i = 0; i < 3; i++)
+        if (!point_of_object_read(reader, names[i], &object->as.triangle.vertices[i])) return false;
+    return true;
+}
+
+static bool normals_read(DatReader *reader, Object *object)
+{
+    static const char *const names[] = {"n0", "n1", "n2"};
+    object->as.triangle.smooth = true;
+    for (int i = 0; i < 3; i++)
+        if (!dat_vector(reader, names[i], &object->as.triangle.normals[i])) return false;
+    for (int i = 0; i < 3; i++)
+        object->as.triangle.smooth &= !vector_is_zero(object->as.triangle.normals[i]);
+    return true;
+}
+
+bool dat_triangle(DatReader *reader)
+{
+    Object object = {.kind = SHAPE_TRIANGLE};
+    return vertices_read(reader, &object) && object_end(reader, object, 1, 0);
+}
+
+bool dat_smooth_triangle(DatReader *reader)
+{
+    Object object = {.kind = SHAPE_TRIANGLE};
+    return vertices_read(reader, &object) && normals_read(reader, &object) &&
+           object_end(reader, object, 1, 0);
+}
+
+// Returns the mean of the colors of a triangle's vertices.
+static Color mean_color(DatReader *reader, size_t offset, const Color *a, const Color *b, const Color *c)
+{
+    if (!vectors_equal(*a, *b) || !vectors_equal(*a, *c))
+        dat_warn(reader, offset, "triangles have the mean of the colors of their vertices");
+    const Color mean = vector_scale(vector_add(vector_add(*a, *b), *c), 1.0 / 3);
+    return vector_max(vectors_equal(*a, *b) && vectors_equal(*a, *c) ? *a : mean, vector_all(0));
+}
+
+// Adds a material of that color unless the last one has it.
+static uint32_t material_of_color(DatReader *reader, Material material, Color color)
+{
+    Scene *scene = reader->scene;
+    material.color = color;
+    const size_t count = scene->materials.count;
+    if (count > 0 && memcmp(&scene->materials.items[count - 1], &material, sizeof material) == 0)
+        return (uint32_t)count - 1;
+    return scene_add_material(scene, &material, "");
+}
+
+bool dat_colored_triangle(DatReader *reader)
+{
+    static const char *const names[] = {"c0", "c1", "c2"};
+    const size_t offset = reader->line.start;
+    Object object = {.kind = SHAPE_TRIANGLE};
+    Color colors[3];
+    Material material;
+    if (!vertices_read(reader, &object) || !normals_read(reader, &object)) return false;
+    for (int i = 0; i < 3; i++)
+        if (!dat_expect(reader, names[i]) || !dat_components(reader, names[i], &colors[i])) return false;
+    if (!dat_texture_body(reader, &material)) return false;
+    const Color color = mean_color(reader, offset, &colors[0], &colors[1], &colors[2]);
+    object.material = material_of_color(reader, material, color);
+    array_push(reader->scene->objects, object);
+    return true;
+}
+
+// A vertex array being read.
+typedef struct {
+    Mesh mesh;
+    Color *colors; // one for each vertex, or NULL
+    Material material;
+    uint32_t material_index;
+    struct {
+        uint32_t (*items)[3];
+        size_t count, capacity;
+    } triangles;
+    struct {
+        uint32_t *items;
+        size_t count, capacity;
+    } materials;
+} VertexArray;
+
+// Reads a vector for each vertex. Returns NULL with an error.
+static Vector3 *vectors_read(DatReader *reader, const char *name, unsigned count, bool are_colors)
+{
+    struct {
+        Vector3 *items;
+        size_t count, capacity;
+    } vectors = {0};
+    array_reserve(vectors, 1);
+    for (unsigned i = 0; i < count; i++) {
+        Vector3 vector = {0};
+        if (!(are_colors ? dat_components : dat_coordinates)(reader, name, &vector)) {
+            free(vectors.items);
+            return NULL;
+        }
+        array_push(vectors, vector);
+    }
+    return vectors.items;
+}
+
+static void array_triangle_add(DatReader *reader, VertexArray *array, const uint32_t corners[3],
+                               size_t offset)
+{
+    uint32_t material = array->material_index;
+    if (array->colors)
+        material = material_of_color(reader, array->material,
+                                     mean_color(reader, offset, &array->colors[corners[0]],
+                                                &array->colors[corners[1]], &array->colors[corners[2]]));
+    array_reserve(array->triangles, 1);
+    memcpy(array->triangles.items[array->triangles.count++], corners, sizeof *array->triangles.items);
+    array_push(array->materials, material);
+}
+
+// Reads the vertices of a strip, in which each one after the second ends a triangle, or of `count` triangles.
+static bool faces_read(DatReader *reader, VertexArray *array, bool is_strip)
+{
+    const size_t offset = reader->line.start;
+    const char *name = is_strip ? "tristrip" : "trimesh";
+    unsigned count;
+    if (!count_read(reader, name, &count)) return false;
+    uint32_t corners[3] = {0};
+    const size_t index_count = (is_strip ? 1 : 3) * (size_t)count;
+    for (size_t i = 0; i < index_count; i++) {
+        unsigned index;
+        const size_t index_offset = dat_peek(reader).offset;
+        if (!count_read(reader, name, &index)) return false;
+        if (index >= array->mesh.vertex_count)
+            return report_error(&reader->report, index_offset,
+                                "a triangle names vertex %u (from 0); there are %zu", index,
+                                array->mesh.vertex_count);
+        if (is_strip) {
+            corners[0] = corners[1];
+            corners[1] = corners[2];
+            corners[2] = index;
+        } else {
+            corners[i % 3] = index;
+        }
+        const bool is_odd = is_strip && i % 2 == 1;
+        const uint32_t turned[3] = {corners[is_odd], corners[!is_odd], corners[2]};
+        if (is_strip ? i >= 2 : i % 3 == 2) array_triangle_add(reader, array, turned, offset);
+    }
+    return true;
+}
+
+static bool array_parts_read(DatReader *reader, VertexArray *array)
+{
+    unsigned count;
+    if (!dat_expect(reader, "numverts") || !count_read(reader, "numverts", &count) ||
+        !dat_expect(reader, "coords"))
+        return false;
+    array->mesh.vertex_count = count;
+    array->mesh.vertices = vectors_read(reader, "coords", count, false);
+    if (!array->mesh.vertices || !dat_expect(reader, "normals")) return false;
+    array->mesh.normals = vectors_read(reader, "normals", count, false);
+    if (!array->mesh.normals) return false;
+    for (unsigned i = 0; i < count; i++) {
+        const Vector3 vertex = array->mesh.vertices[i];
+        reader->bounds = bounds_join(reader->bounds, (Bounds){vertex, vertex});
+        array->mesh.normals[i] = vector_normalize(array->mesh.normals[i]);
+    }
+    while (!dat_skip(reader, "end_vertexarray")) {
+        if (dat_skip(reader, "colors")) {
+            free(array->colors);
+            array->colors = vectors_read(reader, "colors", count, true);
+            if (!array->colors) return false;
+        } else if (dat_skip(reader, "texture")) {
+            if (!dat_texture_body(reader, &array->material)) return false;
+            array->material_index = scene_add_material(reader->scene, &array->material, "");
+        } else if (dat_skip(reader, "tristrip")) {
+            if (!faces_read(reader, array, true)) return false;
+        } else if (dat_skip(reader, "trimesh")) {
+            if (!faces_read(reader, array, false)) return false;
+        } else {
+            return dat_expect(reader, "end_vertexarray");
+        }
+    }
+    return true;
+}
+
+bool dat_vertex_array(DatReader *reader)
+{
+    VertexArray array = {.material = dat_texture_default()};
+    array.material_index = scene_add_material(reader->scene, &array.material, "");
+    const bool read = array_parts_read(reader, &array);
+    array.mesh.triangles = array.triangles.items;
+    array.mesh.materials = array.materials.items;
+    array.mesh.triangle_count = array.triangles.count;
+    if (read && array.mesh.triangle_count > 0) {
+        mesh_join_vertices(&array.mesh);
+        mesh_add(reader, &array.mesh, array.material_index);
+    } else {
+        mesh_free(&array.mesh);
+    }
+    free(array.colors);
+    return read;
+}

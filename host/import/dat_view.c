@@ -1,0 +1,200 @@
+// Tachyon's cameras and lights.
+#include "host/base/array.h"
+#include "host/import/dat.h"
+
+bool dat_resolution(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    if (reader->has_resolution) return report_error(&reader->report, offset, "a second resolution");
+    reader->has_resolution = true;
+    return dat_whole_number(reader, "width", &range_pixels, &reader->scene->width) &&
+           dat_whole_number(reader, "height", &range_pixels, &reader->scene->height);
+}
+
+// The values of a camera's block.
+typedef struct {
+    double zoom, aspect, frustum[4]; // frustum: left, right, bottom, top at a distance of 1
+    bool has_frustum;
+    Vector3 center, view, up;
+} CameraBlock;
+
+static bool projection_read(DatReader *reader)
+{
+    double unused;
+    if (!dat_skip(reader, "projection")) return true;
+    const Word name = dat_word(reader);
+    if (dat_is(name, "orthographic")) {
+        reader->orthographic_height = 1;
+        report_warning(&reader->report, name.offset,
+                       "the orthographic projection becomes one in perspective from afar");
+    } else if (dat_is(name, "perspective_dof")) {
+        report_warning(&reader->report, name.offset, "depth of field is not shown: all is in focus");
+        return dat_number(reader, "focallength", &unused) && dat_number(reader, "aperture", &unused);
+    } else if (dat_is(name, "fisheye")) {
+        report_warning(&reader->report, name.offset, "the fisheye projection becomes one in perspective");
+    } else if (!dat_is(name, "perspective")) {
+        return report_error(&reader->report, name.offset, "unknown projection '%.*s'", word_shown(name),
+                            name.text);
+    }
+    return true;
+}
+
+// glint takes the rays per pixel and their depth from the command line.
+static bool camera_block_read(DatReader *reader, CameraBlock *block)
+{
+    double unused;
+    if (!projection_read(reader) || !dat_expect(reader, "zoom") ||
+        !dat_value_in_range(reader, "zoom", &range_positive, &block->zoom) ||
+        !dat_expect(reader, "aspectratio"))
+        return false;
+    const size_t offset = dat_peek(reader).offset;
+    if (!dat_value_in_range(reader, "aspectratio", &range_positive, &block->aspect)) return false;
+    if (block->aspect != 1)
+        report_warning(&reader->report, offset, "'aspectratio' is not used: pixels are square");
+    if (!dat_number(reader, "antialiasing", &unused) || !dat_number(reader, "raydepth", &unused) ||
+        !dat_vector(reader, "center", &block->center) || !dat_vector(reader, "viewdir", &block->view) ||
+        !dat_vector(reader, "updir", &block->up))
+        return false;
+    block->has_frustum = dat_skip(reader, "frustum");
+    for (int i = 0; i < 4 && block->has_frustum; i++)
+        if (!dat_value(reader, "frustum", &block->frustum[i])) return false;
+    return dat_expect(reader, "end_camera");
+}
+
+bool dat_camera(DatReader *reader)
+{
+    const size_t offset = reader->line.start;
+    CameraBlock block;
+    if (reader->has_camera) return report_error(&reader->report, offset, "a second camera");
+    reader->has_camera = true;
+    if (!camera_block_read(reader, &block)) return false;
+    if (vector_is_zero(block.view))
+        return report_error(&reader->report, offset, "'viewdir' must not be zero");
+    double height = 1 / block.zoom;
+    if (block.has_frustum) {
+        const double *f = block.frustum;
+        height = f[3] - f[2];
+        if (!(f[1] > f[0] && height > 0))
+            return report_error(&reader->report, offset, "'frustum' must be left, right, bottom and top");
+        if (f[0] != -f[1] || f[2] != -f[3])
+            report_warning(&reader->report, offset, "the camera's frustum is not centered: its middle moves");
+        reader->scene->camera.frame_aspect = (f[1] - f[0]) / height;
+    }
+    Camera *camera = &reader->scene->camera;
+    camera->position = block.center;
+    // far from the origin a step of 1 may be lost in rounding
+    const double step = fmax(1, vector_length(block.center));
+    camera->look_at = vector_add(block.center, vector_scale(vector_normalize(block.view), step));
+    camera->up = block.up;
+    camera->field_axis = FIELD_VERTICAL;
+    camera->half_tangent = height / 2;
+    if (reader->orthographic_height > 0) reader->orthographic_height = height;
+    return true;
+}
+
+bool dat_background(DatReader *reader)
+{
+    return dat_components(reader, "background", &reader->scene->background);
+}
+
+static bool fading_read(DatReader *reader)
+{
+    DatFading fading = {.light = reader->scene->lights.count, .offset = dat_peek(reader).offset};
+    if (!dat_skip(reader, "attenuation")) return true;
+    if (!dat_number(reader, "constant", &fading.fading[0]) ||
+        !dat_number(reader, "linear", &fading.fading[1]) ||
+        !dat_number(reader, "quadratic", &fading.fading[2]))
+        return false;
+    array_push(reader->fadings, fading);
+    return true;
+}
+
+static bool light_end(DatReader *reader, Light light)
+{
+    const size_t offset = dat_peek(reader).offset;
+    if (!dat_expect(reader, "color") || !dat_components(reader, "color", &light.color)) return false;
+    if (!vector_is_zero(vector_min(light.color, vector_all(0))))
+        return report_error(&reader->report, offset, "'color' must be 0 or more");
+    if (light.kind != LIGHT_POINT && vector_is_zero(light.direction))
+        return report_error(&reader->report, offset, "'direction' must not be zero");
+    array_push(reader->scene->lights, light);
+    return true;
+}
+
+static bool light_place_read(DatReader *reader, Light *light)
+{
+    double radius;
+    if (!dat_vector(reader, "center", &light->position)) return false;
+    const size_t offset = dat_peek(reader).offset;
+    if (!dat_number(reader, "rad", &radius)) return false;
+    if (radius > 0) dat_warn(reader, offset, "lights are not visible themselves");
+    return true;
+}
+
+bool dat_light(DatReader *reader)
+{
+    Light light = {.kind = LIGHT_POINT};
+    return light_place_read(reader, &light) && fading_read(reader) && light_end(reader, light);
+}
+
+bool dat_directional_light(DatReader *reader)
+{
+    Light light = {.kind = LIGHT_DIRECTIONAL};
+    return dat_vector(reader, "direction", &light.direction) && light_end(reader, light);
+}
+
+bool dat_spotlight(DatReader *reader)
+{
+    static const Range range_falloff = {0, 180, true, "greater than 0 and less than 180"};
+    Light light = {.kind = LIGHT_SPOT};
+    double start;
+    if (!light_place_read(reader, &light) || !dat_vector(reader, "direction", &light.direction) ||
+        !dat_number(reader, "falloff_start", &start) || !dat_expect(reader, "falloff_end") ||
+        !dat_value_in_range(reader, "falloff_end", &range_falloff, &light.half_angle))
+        return false;
+    light.penumbra = light.half_angle - fmin(fmax(start, 0), light.half_angle);
+    return fading_read(reader) && light_end(reader, light);
+}
+
+static Vector3 objects_center(const DatReader *reader)
+{
+    const Bounds *bounds = &reader->bounds;
+    return bounds_is_empty(bounds) ? reader->scene->camera.look_at
+                                   : vector_scale(vector_add(bounds->min, bounds->max), 0.5);
+}
+
+// Gives each light its strength at the center of the objects, because lights do not fade in glint.
+void dat_lights_finish(DatReader *reader)
+{
+    const Vector3 center = objects_center(reader);
+    for (size_t i = 0; i < reader->fadings.count; i++) {
+        const DatFading *fading = &reader->fadings.items[i];
+        if (fading->light >= reader->scene->lights.count) continue; // an error was reported
+        Light *light = &reader->scene->lights.items[fading->light];
+        const double d = vector_length(vector_subtract(light->position, center));
+        const double divisor = fading->fading[0] + d * (fading->fading[1] + d * fading->fading[2]);
+        light->color = divisor > 0
+                           ? vector_min(vector_scale(light->color, 1 / divisor), vector_all(NUMBER_MAX))
+                           : (Color){0, 0, 0};
+        if (fading->fading[1] != 0 || fading->fading[2] != 0)
+            dat_warn(reader, fading->offset,
+                     "lights do not fade with distance: each has its strength at the center of the objects");
+    }
+}
+
+// Moves an orthographic camera so far back that its lines of sight are nearly parallel at the objects. Its
+// frame has the given size at their center.
+void dat_camera_finish(DatReader *reader)
+{
+    const double frames = 256;
+    const double height = reader->orthographic_height;
+    if (height == 0) return;
+    Camera *camera = &reader->scene->camera;
+    const Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position));
+    const Vector3 from_camera = vector_subtract(objects_center(reader), camera->position);
+    const double depth = vector_dot(from_camera, forward);
+    const double distance = fmin(frames * height, NUMBER_MAX);
+    camera->position = vector_add(camera->position, vector_scale(forward, depth - distance));
+    camera->look_at = vector_add(camera->position, vector_scale(forward, distance));
+    camera->half_tangent = height / 2 / distance;
+}
