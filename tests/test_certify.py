@@ -96,7 +96,7 @@ class Certify(TestCase):
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_colors_of_certified(self):
-        """Next to the edges of round shapes, too, they are as exact as those of single."""
+        """They are as exact as those of single, even at the edges of round shapes."""
         write("edge-of-a-cone.yaml", at_the_edge_of_the_cone(ARTICLE))
         for options in ["edge-of-a-cone.yaml --size 96x64 --pixels 6144"] + IS_LONG * [f"{ARTICLE} --size 640x360 --pixels 230400"]:
             report = self.json(f"certify {options} --precision single,certified --json")

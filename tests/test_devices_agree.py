@@ -92,7 +92,7 @@ class DevicesAgree(TestCase):
             self.assertTrue(kept, shape)
             scene = write("apart.yaml", "\n".join([head + "objects:", *kept]))
             self.check_image(shape, RUSTICL, scene)
-        # the compiler of Mesa 22.3 crashes at loops over what is no array in the kernel of paths
+        # the compiler of Mesa 22.3 crashes in the kernel of paths at loops over anything but an array
         self.assertEqual(self.paths(RUSTICL, scene), self.paths(POCL, scene))
 
 

@@ -568,7 +568,7 @@ class Test(TestCase):
         process = self.glint(f"render {path} --size {8 * count}x8 -o a.npy")
         self.assertEqual(process.stderr.count("warning"), 2, process.stderr)
         self.assertIn("transmitted light is not colored", process.stderr)
-        self.assertIn(f"meshes[{count - 1}].primitives[0]: there are no texture coordinates", process.stderr)
+        self.assertIn(f"meshes[{count - 1}].primitives[0]: the mesh lacks the texture's coordinates", process.stderr)
         _, _, pixels = npy_read("a.npy")
         for i, colors in enumerate(cells):
             for k, color in enumerate(colors):

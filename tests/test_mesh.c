@@ -315,7 +315,7 @@ static void faults_name_file_and_vertex(void **state)
         const char *name, *text, *message;
     } cases[] = {
         {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "4:18: error: a.obj: no triangles"},
-        {"a.ply", PLY_OF("nan", "2"), "12:3: error: 'nan' is no coordinate: a number up to 1e+30"},
+        {"a.ply", PLY_OF("nan", "2"), "12:3: error: 'nan' is not a coordinate: a number up to 1e+30"},
         {"a.ply", PLY_OF("1", "7"), "13:8: error: a face names vertex 7 (from 0); there are 3"},
         {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 -1"), "15:11: error: face 1 (from 0) names vertex -1"},
         {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 400000000"),

@@ -130,7 +130,7 @@ static void verdicts_of_a_sample(void **state)
     verdict = sample_judge(&budget, &reference, &off, &sampling);
     assert_true(verdict.keeps && verdict.error > 0 && verdict.error < 1e-3 && verdict.bound > 0.07);
 
-    // what is no sample counts as it is: an error of 0.5 in a channel of a pixel that is all of the rest
+    // pixels outside the sample count in full: an error of 0.5 in a channel of the only one
     Film turned = film_of(wrong + 3, COUNT - 1), turned_reference = film_of(colors + 3, COUNT - 1);
     const Sampling most = {.drawn = COUNT - 1, .drawn_share = 0.999, .color_max = 3, .risk = 0.05};
     const double drawn_bound =

@@ -99,10 +99,10 @@ static void faults_have_their_place(void **state)
         const char *text, *message;
     } cases[] = {
         {"solid\n" FACET("0 0 0", "1 x 0", "0 1 0"),
-         "5:14: error: 'x' is no coordinate: a number up to 1e+30\n"},
+         "5:14: error: 'x' is not a coordinate: a number up to 1e+30\n"},
         {"solid\n" FACET("0 0 0", "1 0", "0 1 0"), "5:15: error: a coordinate of the vertex is missing\n"},
         {"solid\n" FACET("0 0 0", "1 1e31 0", "0 1 0"),
-         "5:14: error: '1e31' is no coordinate: a number up to 1e+30\n"},
+         "5:14: error: '1e31' is not a coordinate: a number up to 1e+30\n"},
         {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",
          "6:1: error: a facet of 2 corners\n"},
         {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n",

@@ -130,7 +130,7 @@ static bool is_exr(const ImageOutput *output)
     return image_format_of(output->options->path) == IMAGE_EXR;
 }
 
-// Whether the format holds linear floats.
+// Returns whether the file's format holds linear floats.
 static bool holds_floats(const char *path)
 {
     const ImageFormat format = image_format_of(path);
@@ -234,19 +234,19 @@ bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scen
     return overwrites;
 }
 
-// Whether the AOV is written: the shadow masks of a scene without lights are not.
+// Returns whether the AOV is written. The shadow masks of a scene without lights are not.
 static bool is_written(const ImageOutput *output, const Film *film, Layer layer)
 {
     return (output->options->aovs >> layer & 1) && film_components(film, layer) > 0;
 }
 
-// Whether the AOV is a layer of the EXR, whose R, G and B are the color.
+// Returns whether the AOV is a layer of the EXR. The color is its R, G and B.
 static bool is_exr_layer(const ImageOutput *output, const Film *film, Layer layer)
 {
     return is_exr(output) && layer != LAYER_COLOR && is_written(output, film, layer);
 }
 
-// An EXR has alpha where an AOV tells what was hit.
+// Returns whether the file is an EXR with alpha, which needs an AOV that tells what was hit.
 static bool has_alpha(const ImageOutput *output)
 {
     return is_exr(output) && (output->options->aovs & (AOV_T | AOV_OBJECT));
@@ -348,13 +348,13 @@ static const double *positions_in_world(ImageOutput *output, const Film *band)
     return world;
 }
 
-// A layer's values as NPY files have them.
+// Returns a layer's values as NPY files have them.
 static const void *layer_values(ImageOutput *output, const Film *band, Layer layer)
 {
     return layer == LAYER_POSITION ? positions_in_world(output, band) : band->layers[layer];
 }
 
-// A layer's values as other formats have them, in 32 bits.
+// Returns a layer's values as other formats have them, in 32 bits.
 static const void *layer_narrowed(ImageOutput *output, const Film *band, Layer layer)
 {
     const void *values = layer_values(output, band, layer);
@@ -366,7 +366,7 @@ static const void *layer_narrowed(ImageOutput *output, const Film *band, Layer l
     return narrow;
 }
 
-// 1 where the ray through the pixel's center hits an object, else 0.
+// Returns 1 for each pixel whose central ray hits an object, and 0 for the others.
 static const float *alpha_of(ImageOutput *output, const Film *band)
 {
     const size_t count = film_pixel_count(band);

@@ -161,7 +161,7 @@ static size_t rows_ended(const Verification *verification)
     return count;
 }
 
-// In place of the progress.
+// Clears the line of progress for one of the report.
 static void line_begin(Verification *verification)
 {
     fflush(stdout);

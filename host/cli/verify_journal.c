@@ -42,7 +42,7 @@ static void crash_record(VerifyJournal *journal, CaseRecord *record, int status)
     journal->crash[0] = '\0';
 }
 
-// What ends a group of processes also goes to the parent, and this process ends with it.
+// Ignores the signals that end a group of processes: the parent gets them and ends this process.
 static void child_begin(VerifyJournal *journal, pid_t parent)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);

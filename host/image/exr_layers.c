@@ -19,7 +19,7 @@ typedef struct {
     const char *name; // not terminated
     size_t length;
     int part;
-    int first;             // channel that is no alpha, or -1
+    int first;             // channel other than alpha, or -1
     int bases[BASE_COUNT]; // channels, or -1
     uint32_t count;        // of channels without alpha
 } Candidate;
@@ -143,7 +143,7 @@ static bool channels_refuse(exr_const_context_t context, const ImageFile *file, 
     return false;
 }
 
-// The candidates that qualify are those whose light is `with_light`.
+// Refuses a choice among the layers that have light, or among those that do not.
 static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool with_light)
 {
     Text names = {0};

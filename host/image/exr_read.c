@@ -104,8 +104,8 @@ static bool planes_allocate(ExrReader *reader, Image *store)
     return true;
 }
 
-// Destination of a channel's values: a plane, or a scratch buffer. OpenEXR 3.1 writes through the null
-// pointer that should make it skip a channel if there are three channels of halves.
+// Sets the destination of a channel's values: a plane, or a scratch buffer. OpenEXR 3.1 writes through the
+// null pointer that should make it skip a channel if there are three channels of halves.
 static void channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t row_values)
 {
     channel->decode_to_ptr = (uint8_t *)place;
@@ -113,7 +113,7 @@ static void channel_place(exr_coding_channel_info_t *channel, float *place, uint
     channel->user_line_stride = (int32_t)(row_values * sizeof *place);
 }
 
-// False if the block, which starts at pixel (x, y) of the data, does not fit into the planes.
+// Returns false if the block, which starts at pixel (x, y) of the data, does not fit into the planes.
 static bool channels_place(const ExrReader *reader, exr_decode_pipeline_t *pipeline, float *scratch,
                            uint32_t x, uint32_t y)
 {
@@ -201,8 +201,8 @@ static void plane_sample(const Plane *plane, uint32_t x, uint32_t y, float *pixe
     *pixel = upper + down * (value[below] + along * (value[below + right] - value[below]) - upper);
 }
 
-// Luminance and chroma as in OpenEXR's "Technical Introduction" (2013), "Luminance/chroma images", with the
-// weights of Rec. 709.
+// Converts luminance and chroma to colors, as in OpenEXR's "Technical Introduction" (2013), "Luminance/chroma
+// images", with the weights of Rec. 709.
 static void chroma_convert(float *pixel)
 {
     const float luminance = pixel[0];

@@ -89,7 +89,7 @@ bool image_read(Image *image, const char *path, MessageList *messages);
 bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages);
 // Reads an image from memory; `source->file` names it in messages.
 bool image_read_bytes(Image *image, const Source *source, MessageList *messages);
-// Whether the file, or its bytes, start as those that image_read reads.
+// Return whether a file, or its bytes, start as those that image_read reads.
 bool image_is_known(const char *path);
 bool image_bytes_are_known(const void *bytes, size_t length);
 enum { IMAGE_PIXELS_MAX = 1 << 27 }; // the default: 1.6 GB of floats

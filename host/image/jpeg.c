@@ -29,7 +29,7 @@ static const uint8_t *segment_find(const ImageFile *file, uint8_t number, const 
     return NULL;
 }
 
-// From 1, upright, to 8 (Exif 2.32, 2019, section 4.6.4, tag 274).
+// Returns the orientation from 1, upright, to 8 (Exif 2.32, 2019, section 4.6.4, tag 274).
 static unsigned orientation_of(const ImageFile *file)
 {
     size_t length;

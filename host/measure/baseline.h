@@ -19,5 +19,5 @@ const char *baseline_board(const Baseline *baseline);
 const char *baseline_host(const Baseline *baseline);
 
 // Finds the wall and processor times of the row with this key; the scene's path does not count. Returns false
-// if the baseline has no such row.
+// if the baseline lacks the row.
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor);

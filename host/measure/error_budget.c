@@ -63,7 +63,7 @@ static double largest_error(const double reference[3], const double test[3])
                 fmax(fabs(test[1] - reference[1]), fabs(test[2] - reference[2])));
 }
 
-// Infinite if a color is not finite.
+// Returns infinity if a color is not finite.
 static double largest_channel(const Film *film)
 {
     double largest = 0;

@@ -17,7 +17,7 @@ static uint32_t cell_for(const RenderSettings *settings, double pixels_wanted)
     return (uint32_t)fmax(1, fmin(cell, fmin(settings->region_width, settings->region_height)));
 }
 
-// The squares of the image, of which one pixel each is rendered.
+// Returns the settings that render one pixel of each of the image's squares.
 static RenderSettings squares_of(const RenderSettings *settings, uint32_t cell)
 {
     RenderSettings squares = *settings;
@@ -29,7 +29,7 @@ static RenderSettings squares_of(const RenderSettings *settings, uint32_t cell)
 
 enum { REST_COUNT = 2 };
 
-// What the squares leave: columns at the right, and rows at the bottom.
+// Sets `rest` to what the squares leave: columns at the right, and rows at the bottom.
 static void rest_of(const RenderSettings *settings, uint32_t cell, RenderSettings rest[REST_COUNT])
 {
     const uint32_t columns = settings->region_width % cell, rows = settings->region_height % cell;
@@ -53,7 +53,8 @@ static Sampling sampling_of(const Pilot *pilot, const RenderSettings *settings, 
                       .risk = (1 - pilot->confidence) / (ARITHMETIC_COUNT - 1)};
 }
 
-// Where more pixels than usual can show that an RMSE is kept, as many as show it even if some of them err.
+// Returns the side of the squares. Where more pixels than usual can show that an RMSE is kept, there are as
+// many as show it even if some of them err.
 static uint32_t cell_choose(const Pilot *pilot, const RenderSettings *settings)
 {
     static const double margin = 0.7;

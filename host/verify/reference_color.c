@@ -23,7 +23,7 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
 typedef struct {
     Quad3 point, normal, geometric, to_eye;
     Quad scale; // how far the point is from the ray's origin
-    Quad start; // the surface is no farther than this from the point
+    Quad start; // the surface is at most this far from the point
     bool entering;
     uint32_t index; // of the object
     const Object *object;
@@ -211,7 +211,7 @@ static bool is_on_side(Quad3 direction, Quad3 normal, int side, double *margin)
     return height > 0;
 }
 
-// Of an opaque surface that coincides with a transparent one the opaque one is visible.
+// Replaces a hit on a transparent surface by one on an opaque surface that coincides with it.
 static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit)
 {
     const Scene *scene = &world->scene;

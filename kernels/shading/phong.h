@@ -87,7 +87,7 @@ enum { SHADOW_ERROR_MAX = 1 << 9 };
 // The least fourth power of a light's distance for which cull_slack does not underflow.
 #define CULLED_DISTANCE_MIN ((real)(SMALLEST_RATIO * 0x1p30f))
 
-// Of a light's color and of what it adds, in parts of them: roundings, up to those of the power.
+// The roundings of a light's color and of what it adds, up to those of the power, relative to them.
 #define COLOR_ROUNDING ((real)(128 * UNIT_ROUNDOFF))
 
 // The light's direction mirrored by the shading normal.
@@ -97,7 +97,7 @@ static inline Vector light_reflected(const Surface *surface, const LightVisibili
                       vector_negate(light->direction));
 }
 
-// Of a highlight's color: a bound above it is tightened.
+// A highlight's error bound is tightened if it exceeds this.
 #define HIGHLIGHT_ERROR_FAINT ((real)(CERTIFIED_COLOR_ERROR * 0x1p-4f))
 
 // How far a highlight of this brightness may be off where the vectors that it compares are off by `error`. As

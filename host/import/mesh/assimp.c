@@ -284,8 +284,7 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
     if (material) {
         const bool is_textured = material->texture > 0 && from->mTextureCoords[material->uv_set];
         if (material->texture > 0 && !is_textured)
-            lose(importer, LOSES_TEXTURE_PLACE,
-                 "there are no texture coordinates for a texture: the color is used");
+            lose(importer, LOSES_TEXTURE_PLACE, "the mesh lacks a texture's coordinates: the color is used");
         array_push(draft->materials,
                    ((DraftMaterialRun){draft->face_start, material->scene_index[is_textured]}));
     }

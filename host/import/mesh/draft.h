@@ -120,7 +120,7 @@ static inline bool draft_has(const MeshDraft *draft, DraftPart part)
 }
 
 // Returns the path of a file that the file `from` names, relative to its folder. Files often hold paths of
-// another machine: where there is no such file, but one of that name next to `from`, returns that one's path
+// another machine: if only a file of that name next to `from` exists, returns its path
 // and sets *is_moved. The caller frees it.
 char *draft_find_file(const char *from, const char *name, size_t length, bool *is_moved);
 

@@ -19,14 +19,15 @@ static Vector3 mesh_center(const Mesh *mesh)
     return vector_scale(vector_add(bounds.min, bounds.max), 0.5);
 }
 
-// z is up in STL by custom, and y in other formats.
+// Returns the upward direction: z in STL by custom, y in other formats.
 static Vector3 upward(const char *path)
 {
     const char *ending = strrchr(path, '.');
     return ending && strcasecmp(ending, ".stl") == 0 ? (Vector3){0, 0, 1} : (Vector3){0, 1, 0};
 }
 
-// Looks from the front, the right and above. The mesh takes up to nine tenths of the image's height.
+// Returns a camera that looks from the front, the right and above. The mesh takes up to nine tenths of the
+// image's height.
 static Camera camera_around(const Mesh *mesh, Vector3 center, Vector3 up)
 {
     const double half_tangent = 0.36397023426620234, filled = 0.9; // tan 20 degrees

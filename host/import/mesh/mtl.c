@@ -64,7 +64,7 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
     }
     if (is_glass && !has_dissolve && !has_transparency)
         report_warning(&reader->report, material->illumination_offset,
-                       "illum %g is for glass, but there is no d or Tr: opaque", illumination);
+                       "illum %g is for glass, but d and Tr are missing: opaque", illumination);
     if (has_dissolve && has_transparency && fabs(1 - material->transparency - material->dissolve) > 1e-3)
         report_warning(&reader->report, material->opacity_offset,
                        "Tr %g does not fit d %g, which it subtracts from 1: d is used",
@@ -213,7 +213,7 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
         report_warning(&reader->report, name.offset, "cannot read '%s': %s: the color is used", path,
                        obstacle);
     else if (!image_is_known(path))
-        report_warning(&reader->report, name.offset, "'%s' is no PNG, JPEG, PPM or EXR: the color is used",
+        report_warning(&reader->report, name.offset, "'%s' is not a PNG, JPEG, PPM or EXR: the color is used",
                        path);
     else
         material->image = memory_copy_text(path);

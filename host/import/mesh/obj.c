@@ -75,7 +75,7 @@ static bool corner_fails(ObjReader *reader, const char *start)
 {
     reader->scan.at = start;
     const Word word = scan_word(&reader->scan);
-    return draft_fails(reader->draft, word.offset, "'%.*s' is no corner of a face", word_shown(word),
+    return draft_fails(reader->draft, word.offset, "'%.*s' is not a corner of a face", word_shown(word),
                        word.text);
 }
 

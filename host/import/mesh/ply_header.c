@@ -41,7 +41,7 @@ static bool format_read(PlyHeader *header, PlyReading *reading, Scan line)
     for (PlyFormat format = PLY_ASCII; format <= PLY_BIG_ENDIAN; format++)
         if (word_is(word, names[format])) header->format = format;
     return header->format != PLY_NO_FORMAT ||
-           draft_fails(reading->draft, word.offset, "'%.*s' is no format of PLY", word_shown(word),
+           draft_fails(reading->draft, word.offset, "'%.*s' is not a format of PLY", word_shown(word),
                        word.text);
 }
 
@@ -62,8 +62,8 @@ static bool element_read(PlyHeader *header, PlyReading *reading, Scan line)
     PlyElement element = {.name = ply_word(&line), .first_property = header->properties.count};
     Word count = ply_word(&line);
     if (!count_read(count, &element.count))
-        return draft_fails(reading->draft, count.offset, "'%.*s' is no number of '%.*s'", word_shown(count),
-                           count.text, word_shown(element.name), element.name.text);
+        return draft_fails(reading->draft, count.offset, "'%.*s' is not a number of '%.*s'",
+                           word_shown(count), count.text, word_shown(element.name), element.name.text);
     array_push(header->elements, element);
     return true;
 }
@@ -86,8 +86,8 @@ static const PlyType *type_of(Word word)
 static bool type_read(PlyReading *reading, Word word, const PlyType **type)
 {
     *type = type_of(word);
-    return *type ||
-           draft_fails(reading->draft, word.offset, "'%.*s' is no type of PLY", word_shown(word), word.text);
+    return *type || draft_fails(reading->draft, word.offset, "'%.*s' is not a type of PLY", word_shown(word),
+                                word.text);
 }
 
 static bool property_read(PlyHeader *header, PlyReading *reading, Scan line)

@@ -176,8 +176,8 @@ static bool word_read(PlyReader *reader, const PlyType *type, double *value, boo
         return true;
     }
     const Word word = ply_word(&reader->line);
-    return draft_fails(reader->reading.draft, word.offset, "'%.*s' is no number of type %s", word_shown(word),
-                       word.text, type->name);
+    return draft_fails(reader->reading.draft, word.offset, "'%.*s' is not a number of type %s",
+                       word_shown(word), word.text, type->name);
 }
 
 static size_t bytes_left(const PlyReader *reader)
@@ -243,7 +243,7 @@ static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *n
             return true;
         }
     } else if (!is_count(count)) {
-        return draft_fails(reader->reading.draft, start, "%.15g is no length of a list", count);
+        return draft_fails(reader->reading.draft, start, "%.15g is not the length of a list", count);
     }
     for (size_t i = 0; (double)i < count; i++) {
         double value;

@@ -47,7 +47,7 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     return path;
 }
 
-// The name of a file, or a mapping of one and its layer.
+// Reads the name of a file, or a mapping of a file and its layer.
 static bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     typedef struct {
