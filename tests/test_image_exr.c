@@ -227,6 +227,27 @@ static void test_layers_by_name(void **state)
     check_refused("d", "its layer 'd' has neither colors, luminance");
 }
 
+// value_at is below 1 everywhere, and only a layer's own alpha counts.
+static void test_alpha_is_noticed(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *names, *layer;
+        bool expected;
+    } files[] = {
+        {"A,B,G,R", NULL, true},       {"B,G,R", NULL, false},         {"A,Y", NULL, true},
+        {"A,a.B,a.G,a.R", "a", false}, {"a.A,a.B,a.G,a.R", "a", true}, {"A,depth.Z", "depth", false}};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        exr_write(files[i].names, plain);
+        MessageList messages = {0};
+        Image image;
+        assert_true(layer_read(&image, files[i].layer, &messages));
+        assert_int_equal(messages.count, 0);
+        if (image.has_alpha != files[i].expected) fail_msg("%s", files[i].names);
+        image_free(&image);
+    }
+}
+
 static void test_parts_are_layers(void **state)
 {
     (void)state;
@@ -376,6 +397,7 @@ int main(void)
         cmocka_unit_test(test_compressions),
         cmocka_unit_test(test_choice_of_channels),
         cmocka_unit_test(test_layers_by_name),
+        cmocka_unit_test(test_alpha_is_noticed),
         cmocka_unit_test(test_parts_are_layers),
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_luminance_and_chroma),

@@ -22,6 +22,7 @@ typedef struct {
     int first;             // channel other than alpha, or -1
     int bases[BASE_COUNT]; // channels, or -1
     uint32_t count;        // of channels without alpha
+    int alpha;             // or -1
 } Candidate;
 
 typedef struct {
@@ -54,7 +55,7 @@ static Candidate *candidate_of(CandidateList *list, int part, const char *name, 
         if (known->part == part && known->length == length && memcmp(known->name, name, length) == 0)
             return known;
     }
-    Candidate candidate = {.name = name, .length = length, .part = part, .first = -1};
+    Candidate candidate = {.name = name, .length = length, .part = part, .first = -1, .alpha = -1};
     for (size_t i = 0; i < BASE_COUNT; i++)
         candidate.bases[i] = -1;
     array_push(*list, candidate);
@@ -77,13 +78,23 @@ static exr_result_t candidates_add_part(CandidateList *list, exr_const_context_t
         if (list->count > LAYERS_MAX) return EXR_ERR_FILE_BAD_HEADER;
         Candidate *candidate =
             candidate_of(list, part, dot ? name : part_name, dot ? (size_t)(dot - name) : strlen(part_name));
-        if (is_alpha(base)) continue;
+        const exr_attr_chlist_entry_t *entry = &channels->entries[i];
+        if (is_alpha(base)) {
+            if (entry->pixel_type != EXR_PIXEL_UINT && entry->x_sampling == 1 && entry->y_sampling == 1)
+                candidate->alpha = i;
+            continue;
+        }
         if (candidate->first < 0) candidate->first = i;
         candidate->count++;
         const Base kind = base_of(base);
         if (kind < BASE_COUNT && candidate->bases[kind] < 0) candidate->bases[kind] = i;
     }
     return EXR_ERR_SUCCESS;
+}
+
+static bool has_light(ExrForm form)
+{
+    return form == EXR_COLORS || form == EXR_GRAY || form == EXR_CHROMA;
 }
 
 static ExrLayer layer_of(const Candidate *candidate)
@@ -102,12 +113,11 @@ static ExrLayer layer_of(const Candidate *candidate)
     LAYER(bases[BASE_Y] >= 0 && bases[BASE_RY] < 0 && bases[BASE_BY] < 0, EXR_GRAY, 1, bases[BASE_Y]);
     LAYER(candidate->count == 1, EXR_NUMBERS, 1, candidate->first);
 #undef LAYER
+    if (candidate->alpha >= 0 && has_light(layer.form)) {
+        layer.has_alpha = true;
+        layer.channels[layer.channel_count] = candidate->alpha;
+    }
     return layer;
-}
-
-static bool has_light(ExrForm form)
-{
-    return form == EXR_COLORS || form == EXR_GRAY || form == EXR_CHROMA;
 }
 
 static const char *shown_name(const Candidate *candidate, int *length)

@@ -17,8 +17,9 @@ typedef enum {
 typedef struct {
     int part;
     ExrForm form;
-    int channels[3]; // indices in the part's channel list
+    int channels[4]; // indices in the part's channel list
     uint32_t channel_count;
+    bool has_alpha; // in the channel after them
 } ExrLayer;
 
 // Finds the layer that `file->layer` names. Without a name it is the default layer, whose channels have no

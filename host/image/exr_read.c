@@ -24,7 +24,7 @@ typedef struct {
     exr_context_t context;
     ExrLayer layer;
     exr_attr_box2i_t window, display; // pixels with data; pixels of the image
-    Plane planes[3];
+    Plane planes[4];
     char problem[256];
 } ExrReader;
 
@@ -68,6 +68,11 @@ static uint32_t sample_count(uint32_t pixels, int sampling)
     return sampling > 0 ? (pixels + (uint32_t)sampling - 1) / (uint32_t)sampling : 0;
 }
 
+static uint32_t plane_count(const ExrLayer *layer)
+{
+    return layer->channel_count + layer->has_alpha;
+}
+
 // Sets up a plane per channel of the layer; `store` holds their values.
 static bool planes_allocate(ExrReader *reader, Image *store)
 {
@@ -84,9 +89,9 @@ static bool planes_allocate(ExrReader *reader, Image *store)
     const int64_t width = (int64_t)reader->window.max.x - reader->window.min.x + 1;
     const int64_t height = (int64_t)reader->window.max.y - reader->window.min.y + 1;
     if (!image_allocate(store, reader->file, width < 0 ? 0 : (uint64_t)width,
-                        height < 0 ? 0 : (uint64_t)height, layer->channel_count, 65536))
+                        height < 0 ? 0 : (uint64_t)height, plane_count(layer), 65536))
         return false;
-    for (uint32_t i = 0; i < layer->channel_count; i++) {
+    for (uint32_t i = 0; i < plane_count(layer); i++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[layer->channels[i]];
         const bool is_full = entry->x_sampling == 1 && entry->y_sampling == 1;
         const bool is_integer = entry->pixel_type == EXR_PIXEL_UINT;
@@ -119,7 +124,7 @@ static bool channels_place(const ExrReader *reader, exr_decode_pipeline_t *pipel
 {
     for (int i = 0; i < pipeline->channel_count; i++)
         channel_place(&pipeline->channels[i], scratch, (uint32_t)pipeline->chunk.width);
-    for (uint32_t i = 0; i < reader->layer.channel_count; i++) {
+    for (uint32_t i = 0; i < plane_count(&reader->layer); i++) {
         const Plane *plane = &reader->planes[i];
         exr_coding_channel_info_t *channel = &pipeline->channels[plane->channel];
         const uint32_t column = x / plane->across, row = y / plane->down;
@@ -241,6 +246,15 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
     }
 }
 
+static bool is_transparent(const ExrReader *reader)
+{
+    const Plane *alpha = &reader->planes[reader->layer.channel_count];
+    const size_t count = reader->layer.has_alpha ? (size_t)alpha->width * alpha->height : 0;
+    for (size_t i = 0; i < count; i++)
+        if (alpha->values[i] < 1) return true;
+    return false;
+}
+
 static void primaries_check(const ExrReader *reader)
 {
     static const float rec_709[] = {0.64F, 0.33F, 0.3F, 0.6F, 0.15F, 0.06F, 0.3127F, 0.329F};
@@ -287,6 +301,7 @@ static bool exr_pixels(ExrReader *reader, Image *image)
     if (done) {
         image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
         image_fill(reader, image, store.width, store.height);
+        image->has_alpha = is_transparent(reader);
         if (reader->planes[0].is_integer) integers_widen(image);
         if (!image->data) primaries_check(reader);
     }

@@ -75,7 +75,7 @@ typedef struct {
     float *values;
     Transfer transfer;
     bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
-    bool has_alpha;  // PNG: a pixel is transparent, which its values do not show
+    bool has_alpha;  // PNG, EXR: a pixel is transparent, which its values do not show
     bool data;       // no light: NPY of other than 3 channels, EXR without colors or luminance
     bool integers;   // NPY of <u4 or |u1, such as numbers of objects
     double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL
