@@ -235,6 +235,25 @@ static void test_tiny_numbers_are_zero(void **state)
     scene_free(&scene);
 }
 
+static void test_layers_of_images(void **state)
+{
+    (void)state;
+    Scene scene =
+        scene_of_text("scenes/s.yaml", CAMERA "materials:\n"
+                                              "  a: {image: {file: a.exr, layer: diffuse}}\n"
+                                              "  b: {image: a.exr}\n"
+                                              "  c: {image: {file: a.exr}}\n"
+                                              "  d: {image: {layer: diffuse, file: a.exr}, diffuse: 0.5}\n");
+    assert_int_equal(scene.textures.count, 2);
+    assert_string_equal(scene.textures.items[0].path, "scenes/a.exr");
+    assert_string_equal(scene.textures.items[0].layer, "diffuse");
+    assert_null(scene.textures.items[1].layer);
+    static const uint32_t textures[] = {1, 2, 2, 1};
+    for (size_t i = 0; i < 4; i++)
+        assert_int_equal(scene.materials.items[i].texture, textures[i]);
+    scene_free(&scene);
+}
+
 static void test_materials_may_follow_objects(void **state)
 {
     (void)state;
@@ -300,6 +319,7 @@ int main(void)
         cmocka_unit_test(test_block_style_and_number_forms),
         cmocka_unit_test(test_names_in_every_style),
         cmocka_unit_test(test_tiny_numbers_are_zero),
+        cmocka_unit_test(test_layers_of_images),
         cmocka_unit_test(test_materials_may_follow_objects),
         cmocka_unit_test(test_warnings),
         cmocka_unit_test(test_a_failed_scene_is_empty),
