@@ -141,8 +141,8 @@ typedef struct {
 enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 };
 
 // A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
-// high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. The
-// box of an empty slot is inverted, low above high.
+// high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. With
+// several lanes a leaf of triangles is a block. The box of an empty slot is inverted, low above high.
 //
 // The host makes nodes as wide as the kernel's packets, and at least 4 wide.
 enum { BVH_WIDTH_MIN = 4, BVH_WIDTH_MAX = 16 };
@@ -152,12 +152,27 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #define BVH_QUARTER (BVH_WIDTH >> 2)
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
-    uint4 child_index[BVH_QUARTER]; // the child's node or first primitive
+    uint4 child_index[BVH_QUARTER]; // the child's node, first primitive or block of triangles
     uint4 child_kind[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits, count <= 255
 } BvhNode;
 #endif
 
 enum { BVH_NODE = 0xff };
+
+// The vertices of a leaf's triangles, for kernels with several lanes, which test a lane per triangle
+// (kernels/traversal/triangle_block.h): rows of a.x, a.y, a.z, b.x ... c.z, as wide as a node. Triangles that
+// a leaf lacks repeat its first one.
+enum { BLOCK_ROWS = 9 };
+#ifdef __OPENCL_VERSION__
+typedef struct {
+    scalar4 rows[BLOCK_ROWS * BVH_QUARTER];
+} TriangleBlock;
+#endif
+
+// The first triangles of four blocks.
+typedef struct {
+    uint4 triangles;
+} BlockPlaces;
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
 // a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
@@ -299,6 +314,8 @@ typedef struct {
     ARRAY(TRIANGLE_NORMALS, TriangleNormals, , triangle_normals)       \
     ARRAY(TRIANGLE_UVS, TriangleUvs, , triangle_uvs)                   \
     ARRAY(TRIANGLE_NEIGHBORS, TriangleNeighbors, , triangle_neighbors) \
+    ARRAY(TRIANGLE_BLOCKS, TriangleBlock, , triangle_blocks)           \
+    ARRAY(BLOCK_PLACES, BlockPlaces, , block_places)                   \
     ARRAY(CULL_SPHERES, CullSphere, , cull_spheres)                    \
     ARRAY(OBJECTS, ObjectEntry, , objects)                             \
     ARRAY(MATERIALS, Material, , materials)                            \

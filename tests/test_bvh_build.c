@@ -35,7 +35,7 @@ static void assert_contains(const Bounds *outer, const Bounds *inner)
 
 static void leaf_check(TreeCheck *check, const BvhChild *leaf)
 {
-    assert_true(leaf->count <= BVH_LEAF_MAX);
+    assert_true(leaf->count <= check->bvh->leaves.size_max);
     assert_true(leaf->first + leaf->count <= check->bvh->primitive_count);
     const uint32_t *order = check->bvh->order + leaf->first;
     for (uint32_t i = 0; i < leaf->count; i++) {
@@ -52,7 +52,7 @@ static void node_check(TreeCheck *check, uint32_t index, unsigned depth)
     for (int side = 0; side < 2; side++) {
         const BvhChild *child = &check->bvh->nodes[index].children[side];
         if (bounds_is_empty(&child->box)) {
-            assert_int_equal(check->bvh->primitive_count > BVH_LEAF_MAX, 0);
+            assert_true(check->bvh->primitive_count <= check->bvh->leaves.size_max);
         } else if (child->count > 0) {
             leaf_check(check, child);
         } else {
@@ -104,13 +104,13 @@ static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds
 
 // Every primitive in exactly one leaf, all of them counted, leaves of one kind, boxes that hold what is below
 // them, bounded depth.
-static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
+static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves)
 {
     Bvh bvh;
     Stage *stage = stage_open();
     stage_begin(stage, "building", NULL, count + 1);
     stage_set(stage, 1);
-    bvh_build(&bvh, boxes, kinds, count, stage);
+    bvh_build(&bvh, boxes, kinds, count, leaves, stage);
     Text text = {0};
     double seconds;
     stage_write(stage, &text, &seconds);
@@ -127,6 +127,13 @@ static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
         wide_check(&bvh, boxes, kinds, width);
     free(check.seen);
     bvh_free(&bvh);
+}
+
+static void trees_check(const Bounds *boxes, const uint8_t *kinds, size_t count, bool has_one_kind)
+{
+    static const BvhLeaves leaves[] = {{8, false}, {4, false}, {4, true}, {16, true}};
+    for (size_t i = 0; i < sizeof leaves / sizeof *leaves; i++)
+        if (has_one_kind || !leaves[i].are_blocks) tree_check(boxes, kinds, count, leaves[i]);
 }
 
 static Bounds cube_around(Vector3 center, double half)
@@ -175,10 +182,10 @@ static void any_boxes_make_a_tree(void **state)
         uint8_t *kinds = memory_allocate_zeroed(count, 1);
         for (size_t i = 0; i < count; i++)
             boxes[i] = box_of_set(set, i, count);
-        tree_check(boxes, kinds, count);
+        trees_check(boxes, kinds, count, true);
         for (size_t i = 0; i < count; i++)
             kinds[i] = (uint8_t)(random_bits(&random_state) % KIND_COUNT);
-        tree_check(boxes, kinds, count);
+        trees_check(boxes, kinds, count, false);
         free(boxes);
         free(kinds);
     }
@@ -194,7 +201,7 @@ static void few_boxes_make_a_tree(void **state)
             boxes[i] = cube_around(random_cube_point(&random_state, 1), 0.1);
             kinds[i] = (uint8_t)(i % 3);
         }
-        tree_check(boxes, kinds, count);
+        trees_check(boxes, kinds, count, false);
     }
 }
 

@@ -11,11 +11,15 @@
 
 #include <cmocka.h>
 
-// A node's width is its kernel's: this is that of one lane.
+// The widths of nodes and blocks are their kernel's: these are those of one lane.
 typedef struct {
     scalar4 planes[BVH_PLANES];
     uint4 child_index[1], child_kind[1];
 } HostBvhNode;
+
+typedef struct {
+    scalar4 rows[BLOCK_ROWS];
+} HostTriangleBlock;
 
 // Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
 // member. REALS are scalar4, INTEGERS uint4. Of a shape the last, its id, is enough.
@@ -54,6 +58,9 @@ typedef struct {
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_index[0])                   \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_kind[0])                    \
+    REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[0])       \
+    REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[BLOCK_ROWS - 1]) \
+    INTEGERS(FLAT_BLOCK_PLACES, BlockPlaces, BlockPlaces, triangles)             \
     REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
@@ -114,7 +121,7 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
                                       .sample_count = 1,
                                       .precision = is_double ? PRECISION_DOUBLE : PRECISION_SINGLE,
                                       .certifies = true,
-                                      .lanes = 1,
+                                      .lanes = BVH_WIDTH_MIN, // with blocks of triangles
                                       .bvh = BVH_ON,
                                       .shift_to_eye = true};
     MessageList messages = {0};
@@ -284,7 +291,9 @@ static void list_is_complete(void **state)
     (void)state;
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
-    size_t filled[FLAT_COUNT] = {[FLAT_HEADER] = 2 * (KIND_QUARTETS - 2) * sizeof(uint4)}; // between the ends
+    // between the ends
+    size_t filled[FLAT_COUNT] = {[FLAT_HEADER] = 2 * (KIND_QUARTETS - 2) * sizeof(uint4),
+                                 [FLAT_TRIANGLE_BLOCKS] = (BLOCK_ROWS - 2) * sizeof(scalar4)};
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
         size_t *bytes = &filled[members[i].kind];
         bool is_shape = members[i].kind - FLAT_FIRST_SHAPE < KIND_COUNT;

@@ -12,7 +12,7 @@
 
 enum {
     // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
-    // 2^28 primitives, and at most 7 cuts by kind follow.
+    // 2^28 primitives, and at most 7 cuts by kind follow; or 26 leave 4, and 3 follow.
     HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
     THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };
@@ -22,6 +22,7 @@ typedef struct {
     const uint8_t *kinds;
     double scale; // of the references' coordinates
     size_t count;
+    BvhLeaves leaves;
     PrimitiveReference *references;
     BvhBinaryNode *nodes;
     atomic_size_t node_count;
@@ -71,11 +72,12 @@ static bool range_divide(const Builder *builder, const Range *range, unsigned de
     size_t left = count;
     RangeBounds bounds[2];
     if (depth < HALVING_DEPTH && count > 1)
-        left =
-            range_split(references, count, &range->bounds, depth == 0 && count >= THREAD_RANGE_MIN, bounds);
+        left = range_split(references, count, &range->bounds, builder->leaves,
+                           depth == 0 && count >= THREAD_RANGE_MIN, bounds);
     if (left == count) {
-        if (count <= BVH_LEAF_MAX) range_sort_by_kind(builder, range);
-        left = count > BVH_LEAF_MAX ? count / 2 : range_kind_boundary(builder, range) - range->begin;
+        const bool fits = count <= builder->leaves.size_max;
+        if (fits) range_sort_by_kind(builder, range);
+        left = fits ? range_kind_boundary(builder, range) - range->begin : count / 2;
         if (left == count) return false;
         bounds[0] = range_bounds_of(references, left);
         bounds[1] = range_bounds_of(references + left, count - left);
@@ -137,7 +139,7 @@ static BvhChild leaf_make(const Builder *builder, const Range *range)
 // Of a range whose leaves come soon: they may be anywhere.
 static void boxes_prefetch(const Builder *builder, const Range *range)
 {
-    if (range->end - range->begin > BVH_LEAF_MAX) return;
+    if (range->end - range->begin > builder->leaves.size_max) return;
     for (size_t i = range->begin; i < range->end; i++)
         __builtin_prefetch(&builder->boxes[reference_index(&builder->references[i])]);
 }
@@ -188,7 +190,8 @@ static void root_build(Builder *builder)
     builder->depth = builder->count > 0;
 }
 
-void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, Stage *stage)
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves,
+               Stage *stage)
 {
     const double largest = largest_coordinate(boxes, count);
     Builder builder = {
@@ -196,6 +199,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
         .kinds = kinds,
         .scale = largest > 0 ? 1 / largest : 1,
         .count = count,
+        .leaves = leaves,
         .references = aligned_alloc(64, (count * sizeof(PrimitiveReference) + 127) / 64 * 64),
         .nodes = memory_allocate(count + 1, sizeof *builder.nodes),
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
@@ -213,6 +217,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
         .kinds = memory_allocate(count + 1, 1),
         .primitive_count = count,
         .depth = builder.depth,
+        .leaves = leaves,
     };
     for (size_t i = 0; i < count; i++) {
         bvh->order[i] = reference_index(&builder.references[i]);

@@ -18,6 +18,13 @@ typedef struct {
     BvhChild children[2];
 } BvhBinaryNode;
 
+typedef struct {
+    unsigned size_max; // primitives per leaf
+    // Whether a leaf is tested as one, at one cost whatever its size. Then all primitives are of one kind,
+    // and what fits a leaf is not split.
+    bool are_blocks;
+} BvhLeaves;
+
 // An empty child adds nothing.
 static inline Bounds bvh_node_bounds(const BvhBinaryNode *node)
 {
@@ -31,12 +38,14 @@ typedef struct {
     uint8_t *kinds;  // theirs, in this order
     size_t primitive_count;
     unsigned depth; // inner nodes on the longest path
+    BvhLeaves leaves;
 } Bvh;
 
-enum { BVH_LEAF_MAX = 8 /* primitives per leaf */, BVH_DEPTH_MAX = 80 };
+enum { BVH_DEPTH_MAX = 80 };
 
 // `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
 // of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep.
 // The stage, which may be NULL, is set to the primitives whose leaves are built.
-void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, Stage *stage);
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves,
+               Stage *stage);
 void bvh_free(Bvh *bvh);

@@ -207,6 +207,12 @@ static void child_box_write(const FlatNode *node, unsigned child, const Bounds *
     }
 }
 
+// The first triangle of a block.
+static uint32_t *block_place(const CompiledScene *compiled, size_t block)
+{
+    return (uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items + block;
+}
+
 static void node_write(const BvhWideNode *wide, const Bvh *bvh, const uint32_t *order, const Bounds *empty,
                        const FlatNode *node)
 {
@@ -228,7 +234,7 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
-    flat_nodes_renew(compiled, wide.node_count, width);
+    flat_wide_array_renew(compiled, FLAT_NODES, wide.node_count, width);
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     // a visit replaces a node by at most `width` children: a ray from far away meets the empty places, too
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
@@ -242,9 +248,84 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
     bvh_wide_free(&wide);
 }
 
+static bool is_triangle_leaf(uint32_t child_kind)
+{
+    return child_kind >> 8 > 0 && (child_kind & 0xff) == KIND_TRIANGLES;
+}
+
+// Makes a block of each leaf of triangles, still without vertices.
+static void blocks_place(CompiledScene *compiled, unsigned width)
+{
+    const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
+    size_t count = 0;
+    for (size_t i = 0; i < nodes->count; i++)
+        for (unsigned k = 0; k < width; k++)
+            count += is_triangle_leaf(flat_node_at(nodes, i).child_kind[k]);
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, count, width);
+    flat_array_renew(compiled, FLAT_BLOCK_PLACES, (count + 3) / 4);
+    uint32_t block = 0;
+    for (size_t i = 0; i < nodes->count; i++) {
+        const FlatNode node = flat_node_at(nodes, i);
+        for (unsigned k = 0; k < width; k++) {
+            if (!is_triangle_leaf(node.child_kind[k])) continue;
+            *block_place(compiled, block) = node.child_index[k];
+            node.child_index[k] = block++;
+        }
+    }
+}
+
+static void block_fill(const CompiledScene *compiled, size_t block, unsigned count)
+{
+    const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS],
+                    *triangles = &compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
+    const size_t width = 4 * blocks->layout.scalar4_count / BLOCK_ROWS;
+    double *rows = flat_array_at(blocks, block);
+    for (size_t lane = 0; lane < width; lane++) {
+        const Triangle *triangle =
+            flat_array_at(triangles, *block_place(compiled, block) + (lane < count ? lane : 0));
+        const double vertices[BLOCK_ROWS] = {triangle->a.x, triangle->a.y, triangle->a.z,
+                                             triangle->b.x, triangle->b.y, triangle->b.z,
+                                             triangle->c.x, triangle->c.y, triangle->c.z};
+        for (size_t row = 0; row < BLOCK_ROWS; row++)
+            rows[row * width + lane] = vertices[row];
+    }
+}
+
+static void nodes_fill_blocks(void *context, size_t begin, size_t end)
+{
+    const CompiledScene *compiled = context;
+    for (size_t i = begin; i < end; i++) {
+        const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
+        for (unsigned k = 0; k < node.width; k++)
+            if (is_triangle_leaf(node.child_kind[k]))
+                block_fill(compiled, node.child_index[k], node.child_kind[k] >> 8);
+    }
+}
+
+// Copies the triangles' vertices into the blocks.
+static void blocks_fill(CompiledScene *compiled)
+{
+    if (compiled->arrays[FLAT_TRIANGLE_BLOCKS].count == 0) return;
+    compiled->changed[FLAT_TRIANGLE_BLOCKS] = true;
+    parallel_run(compiled->arrays[FLAT_NODES].count, FLAT_RANGE_MIN / 16, nodes_fill_blocks, compiled);
+}
+
+// Leaves as large as measurement found best. With several lanes a leaf of triangles is a block, which costs
+// the same whatever its size; where all primitives are triangles the tree is built for that.
+static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
+{
+    enum { LEAF_SIZE_MAX = 8 };
+    const size_t triangle_count = bounded->kind_counts[KIND_TRIANGLES];
+    const bool has_blocks = lanes > 1 && triangle_count > 0;
+    if (has_blocks && triangle_count == bounded->count) return (BvhLeaves){lanes, true};
+    return (BvhLeaves){has_blocks && lanes < LEAF_SIZE_MAX ? lanes : LEAF_SIZE_MAX, false};
+}
+
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
 {
     flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN);
+    flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
     if (settings->bvh == BVH_OFF) return;
     Bounded bounded;
     bounded_collect(&bounded, compiled);
@@ -256,16 +337,19 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     compiled->features |= FEATURE_BVH;
     Bvh bvh;
     stage_begin(settings->stage, "building the BVH", NULL, bounded.count);
-    bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count, settings->stage);
+    bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count, leaves_for(&bounded, settings->lanes),
+              settings->stage);
     free(bounded.boxes);
     bounded.boxes = NULL;
     stage_begin(settings->stage, "widening the BVH", NULL, 0);
     nodes_write(compiled, &bvh, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
+    if (settings->lanes > 1) blocks_place(compiled, settings->lanes);
     compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
     free(bvh.nodes);
     bvh.nodes = NULL;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         array_reorder(compiled, kind, &bvh, &bounded);
+    blocks_fill(compiled);
     memcpy(compiled->bvh_counts, bounded.kind_counts, sizeof compiled->bvh_counts);
     bvh_free(&bvh);
     bounded_free(&bounded);
@@ -282,7 +366,9 @@ static void leaves_fit(void *context, size_t begin, size_t end)
             if (count == 0) continue;
             const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
             Bounds all = bounds_empty(), box;
-            for (size_t p = node.child_index[k]; p < node.child_index[k] + count; p++)
+            const bool is_block = kind == KIND_TRIANGLES && compiled->arrays[FLAT_TRIANGLE_BLOCKS].count > 0;
+            const size_t first = is_block ? *block_place(compiled, node.child_index[k]) : node.child_index[k];
+            for (size_t p = first; p < first + count; p++)
                 if (primitive_bounds(kind, flat_array_at(array, p), &box)) all = bounds_join(all, box);
             child_box_write(&node, k, &all);
         }
@@ -307,6 +393,7 @@ void bvh_refit(CompiledScene *compiled)
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     compiled->changed[FLAT_NODES] = true;
     parallel_run(nodes->count, FLAT_RANGE_MIN / 16, leaves_fit, compiled);
+    blocks_fill(compiled);
     // children come after their parent
     for (size_t i = nodes->count; i-- > 0;) {
         const FlatNode node = flat_node_at(nodes, i);

@@ -1,7 +1,6 @@
 #include "host/compile/bvh_split.h"
 
 #include "host/base/parallel.h"
-#include "host/compile/bvh.h"
 #include <float.h>
 #include <pthread.h>
 #ifdef __SSE__
@@ -110,14 +109,22 @@ RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count)
 typedef struct {
     Float4 low, scale; // of the centers
     int bin_count;
+    BvhLeaves leaves;
 } BinMap;
+
+// What testing `count` primitives costs, relative to one primitive or to one block.
+static inline float test_cost(BvhLeaves leaves, uint32_t count)
+{
+    const uint32_t blocks = (count + leaves.size_max - 1) / leaves.size_max;
+    return (float)(leaves.are_blocks ? blocks : count);
+}
 
 static inline Int4 bins_of(const BinMap *map, const PrimitiveReference *reference)
 {
     return __builtin_convertvector((reference_center(reference) - map->low) * map->scale, Int4);
 }
 
-static BinMap bins_make(BuildBox centers, size_t count)
+static BinMap bins_make(BuildBox centers, size_t count, BvhLeaves leaves)
 {
     const int bin_count = count < SMALL_RANGE ? SMALL_BIN_COUNT : BIN_COUNT;
     const Float4 extent = centers.high - centers.low;
@@ -127,7 +134,8 @@ static BinMap bins_make(BuildBox centers, size_t count)
     const Float4 least_extent = {least, least, least, FLT_MAX};
     const Int4 is_splittable = extent > least_extent;
     const Float4 scale = (Float4){bins, bins, bins, bins} / float4_max(extent, least_extent);
-    return (BinMap){centers.low, float4_select(is_splittable, scale, (Float4){0, 0, 0, 0}), bin_count};
+    return (BinMap){centers.low, float4_select(is_splittable, scale, (Float4){0, 0, 0, 0}), bin_count,
+                    leaves};
 }
 
 typedef struct {
@@ -187,8 +195,9 @@ static void range_bin(void *context, size_t begin, size_t end)
     pthread_mutex_unlock(&binning->lock);
 }
 
-static void axis_sweep(const Bins *bins, int axis, int bin_count, Split *best)
+static void axis_sweep(const Bins *bins, int axis, const BinMap *map, Split *best)
 {
+    const int bin_count = map->bin_count;
     float right_areas[BIN_COUNT];
     uint32_t right_counts[BIN_COUNT] = {0};
     BuildBox box = empty_box;
@@ -205,8 +214,8 @@ static void axis_sweep(const Bins *bins, int axis, int bin_count, Split *best)
         box = box_join(box, bins->boxes[axis][bin]);
         count += bins->counts[axis][bin];
         if (count == 0 || right_counts[bin + 1] == 0) continue;
-        const float cost =
-            box_half_area(box) * (float)count + right_areas[bin + 1] * (float)right_counts[bin + 1];
+        const float cost = box_half_area(box) * test_cost(map->leaves, count) +
+                           right_areas[bin + 1] * test_cost(map->leaves, right_counts[bin + 1]);
         if (cost < best->cost) *best = (Split){true, axis, bin, cost};
     }
 }
@@ -225,7 +234,7 @@ static Split split_find(const PrimitiveReference *references, size_t count, cons
     }
     Split best = {.cost = FLT_MAX};
     for (int axis = 0; axis < 3; axis++)
-        if (map->scale[axis] > 0) axis_sweep(&bins, axis, map->bin_count, &best);
+        if (map->scale[axis] > 0) axis_sweep(&bins, axis, map, &best);
     return best;
 }
 
@@ -256,7 +265,8 @@ static Split split_find_of_few(const PrimitiveReference *references, int count, 
             box = box_join(box, references[order[i - 1]].box);
             const int bin = bins[order[i - 1]][axis];
             if (bin == bins[order[i]][axis]) continue;
-            const float cost = box_half_area(box) * (float)i + right_areas[i] * (float)(count - i);
+            const float cost = box_half_area(box) * test_cost(map->leaves, (uint32_t)i) +
+                               right_areas[i] * test_cost(map->leaves, (uint32_t)(count - i));
             if (cost < best.cost) best = (Split){true, axis, bin, cost};
         }
     }
@@ -284,16 +294,18 @@ static size_t range_partition(PrimitiveReference *references, size_t count, cons
     return left;
 }
 
-size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, bool is_parallel,
-                   RangeBounds sides[2])
+size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, BvhLeaves leaves,
+                   bool is_parallel, RangeBounds sides[2])
 {
-    const BinMap map = bins_make(bounds->centers, count);
+    const bool fits = count <= leaves.size_max;
+    if (fits && leaves.are_blocks) return count;
+    const BinMap map = bins_make(bounds->centers, count, leaves);
     const Split split = count <= FEW_MAX ? split_find_of_few(references, (int)count, &map)
                                          : split_find(references, count, &map, is_parallel);
     const float area = box_half_area(bounds->boxes);
     const bool pays = split.found && split.cost * intersection_cost + traversal_cost * area <
                                          (float)count * intersection_cost * area;
-    if (!pays && !(split.found && count > BVH_LEAF_MAX)) return count;
+    if (!split.found || (fits && !pays)) return count;
     const size_t left = range_partition(references, count, &map, &split, sides);
     return left > 0 ? left : count;
 }

@@ -2,6 +2,7 @@
 // (Wald, On fast construction of SAH-based bounding volume hierarchies, RT 2007).
 #pragma once
 
+#include "host/compile/bvh.h"
 #include "host/scene/bounds.h"
 #include <stdbool.h>
 #include <stddef.h>
@@ -47,5 +48,5 @@ RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count);
 // Partitions the range where that pays or it is too large for a leaf, and sets the bounds of both sides.
 // `is_parallel`: by several threads, which are idle. Returns how many are on the left side; `count` where the
 // range stays whole.
-size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, bool is_parallel,
-                   RangeBounds sides[2]);
+size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, BvhLeaves leaves,
+                   bool is_parallel, RangeBounds sides[2]);

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// SAH costs: testing a node's boxes, visiting a child, testing a primitive. Tuned by measurement: a
-// primitive's test is cheap because its arithmetic overlaps memory latency.
-static const double node_cost = 1, visit_cost = 1, intersection_cost = 0.4;
+// SAH costs: testing a node's boxes, visiting a child, testing a primitive, or a block. Tuned by measurement:
+// a primitive's test is cheap because its arithmetic overlaps memory latency.
+static const double node_cost = 1, visit_cost = 1, intersection_cost = 0.4, block_cost = 2;
 
 // What takes one slot where it might take several costs something even where its area is nothing: this
 // decides ties, and vanishes beside other costs, which are of the order of 1.
@@ -48,7 +48,8 @@ static bool child_is_node(const BvhChild *child)
 
 static float leaf_cost(const Widening *widening, double half_area, uint32_t count)
 {
-    return (float)(half_area * widening->scale * (visit_cost + intersection_cost * count));
+    const double test_cost = widening->bvh->leaves.are_blocks ? block_cost : intersection_cost * count;
+    return (float)(half_area * widening->scale * (visit_cost + test_cost));
 }
 
 // `leaf`: where that of a leaf has room.
@@ -77,7 +78,8 @@ static void subtree_count(const Widening *widening, const Subtree *first, const 
                           Subtree *subtree)
 {
     const uint8_t *kinds = widening->bvh->kinds;
-    bool joins = first->count > 0 && second->count > 0 && first->count + second->count <= BVH_LEAF_MAX &&
+    bool joins = first->count > 0 && second->count > 0 &&
+                 first->count + second->count <= widening->bvh->leaves.size_max &&
                  kinds[first->first] == kinds[second->first];
     subtree->first = first->first < second->first ? first->first : second->first;
     subtree->count = joins ? first->count + second->count : 0;

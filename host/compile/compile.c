@@ -1,6 +1,7 @@
 #include "host/compile/compile.h"
 
 #include "host/base/clock.h"
+#include "host/base/hash.h"
 #include "host/compile/stages.h"
 #include "host/compile/transform.h"
 
@@ -35,6 +36,13 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     if (!numbers_fit(compiled, scene, settings, messages)) return false;
     neighbors_find(compiled, scene, settings);
     compiled->features |= features_of(scene) | settings->extra_features;
+    if (settings->hashes_primitives) {
+        compiled->primitives_hash = HASH_START;
+        for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+            if (is_ordered_by_bvh(kind))
+                compiled->primitives_hash =
+                    flat_array_hash(compiled->primitives_hash, &compiled->arrays[kind]);
+    }
     double start = clock_seconds();
     bvh_flatten(compiled, settings);
     compiled->bvh_seconds = clock_seconds() - start;

@@ -1,5 +1,6 @@
 #include "host/compile/compiled_scene.h"
 
+#include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include <stdlib.h>
@@ -19,7 +20,9 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
     [FLAT_TRIANGLE_NEIGHBORS] = LAYOUT(TriangleNeighbors, ids_sides, ids_sides),
-    // the widest; flat_nodes_renew makes them as wide as the kernel's
+    // the widest; flat_wide_array_renew makes them as wide as the kernel's
+    [FLAT_TRIANGLE_BLOCKS] = {BVH_WIDTH_MAX / 4 * BLOCK_ROWS * sizeof(scalar4), BVH_WIDTH_MAX / 4 * BLOCK_ROWS, 0},
+    [FLAT_BLOCK_PLACES] = LAYOUT(BlockPlaces, triangles, triangles),
     [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
@@ -51,17 +54,32 @@ void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count)
     array_renew(compiled, kind, layouts[kind], count);
 }
 
-void flat_nodes_renew(CompiledScene *compiled, size_t count, unsigned width)
+void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width)
 {
-    const FlatLayout widest = layouts[FLAT_NODES];
+    const FlatLayout widest = layouts[kind];
     const unsigned parts = BVH_WIDTH_MAX / width;
     const FlatLayout layout = {widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts};
-    array_renew(compiled, FLAT_NODES, layout, count);
+    array_renew(compiled, kind, layout, count);
 }
 
 void *flat_array_at(const FlatArray *array, size_t index)
 {
     return (char *)array->items + index * array->layout.size;
+}
+
+bool is_ordered_by_bvh(size_t kind)
+{
+    return (kind >= FLAT_FIRST_SHAPE && kind < FLAT_FIRST_SHAPE + KIND_COUNT) || kind == FLAT_OBJECTS ||
+           kind == FLAT_NODES || kind == FLAT_TRIANGLE_BLOCKS || kind == FLAT_BLOCK_PLACES;
+}
+
+uint64_t flat_array_hash(uint64_t hash, const FlatArray *array)
+{
+    const size_t size =
+        array->layout.scalar4_count * sizeof(scalar4) + array->layout.uint4_count * sizeof(uint4);
+    for (size_t i = 0; i < array->count; i++)
+        hash = hash_bytes(hash, flat_array_at(array, i), size);
+    return hash;
 }
 
 // A shape's struct has its id in its first uint4, right behind its scalar4 members.

@@ -40,8 +40,9 @@ typedef struct {
     FeatureSet features;           // that the kernels need
     double unit;                   // scene units per unit of length in the arrays, a power of two
     uint32_t pending_children_max; // of the BVH, while a ray visits it; 0 without one
-    double bvh_seconds;            // building or refitting the BVH
-    double flatten_seconds;        // everything else in scene_compile or scene_move
+    uint64_t primitives_hash; // of the shapes and objects before the BVH orders them, if settings ask for it
+    double bvh_seconds;       // building or refitting the BVH
+    double flatten_seconds;   // everything else in scene_compile or scene_move
     // What the stages leave for later ones and for the header.
     CompiledTexture *textures;       // of each of the scene's textures
     uint32_t bvh_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
@@ -64,10 +65,15 @@ static inline scalar4 scalar4_of(Vector3 v, double w)
     return (scalar4){v.x, v.y, v.z, w};
 }
 
-// Replaces an array by one of `count` zeroed structs; nodes have `width` children: a power of two, 4 to 16.
+// Replaces an array by one of `count` zeroed structs; nodes and blocks of triangles have `width` children or
+// triangles: a power of two, 4 to 16.
 void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count);
-void flat_nodes_renew(CompiledScene *compiled, size_t count, unsigned width);
+void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width);
 void *flat_array_at(const FlatArray *array, size_t index);
+// Whether the order of an array, or all of it, follows from the BVH, and so from the kernel's lanes.
+bool is_ordered_by_bvh(size_t kind);
+// Extends the hash by the members of an array's structs.
+uint64_t flat_array_hash(uint64_t hash, const FlatArray *array);
 // The object's id in a shape's struct of this array.
 uint32_t *flat_id(const FlatArray *array, void *primitive);
 

@@ -30,6 +30,7 @@ typedef struct {
     BvhChoice bvh;
     FeatureSet extra_features; // built in although the scene does not need them
     bool shift_to_eye;         // positions are relative to the eye; else as they are
+    bool hashes_primitives;    // sets CompiledScene.primitives_hash
     bool is_preview;           // scene_move leaves the arrays as the last eye saw them, and takes no time
     // From an earlier compilation of the same textures, whose arrays are then left empty; NULL: read the
     // images.

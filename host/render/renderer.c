@@ -133,7 +133,7 @@ static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array
         staged ? staged + begin : buffer_map(renderer->compute, renderer->buffers[buffer], begin, size);
     if (!bytes) return;
     flat_array_write(array, renderer->report.is_double, bytes);
-    if (renderer->settings.hashes_scene && kind != FLAT_NODES)
+    if (renderer->settings.hashes_scene && !is_ordered_by_bvh(kind))
         renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
     if (!staged) buffer_write_mapped(renderer->compute, renderer->buffers[buffer], bytes);
 }
@@ -198,6 +198,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, SceneVar
         .bvh = settings->bvh,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
+        .hashes_primitives = settings->hashes_scene,
         .is_preview = settings->is_preview,
         .stage = settings->stage,
     };
@@ -274,9 +275,11 @@ static void scene_changed(Renderer *renderer)
     renderer->report.features = compiled->features;
     renderer->report.flatten_seconds = compiled->flatten_seconds;
     renderer->report.bvh_seconds = compiled->bvh_seconds;
-    if (renderer->settings.hashes_scene) // lengths are restored with it
-        renderer->report.scene_hash =
-            hash_bytes(renderer->report.scene_hash, &compiled->unit, sizeof compiled->unit);
+    if (renderer->settings.hashes_scene) { // lengths are restored with the unit
+        uint64_t hash = renderer->report.scene_hash;
+        hash = hash_bytes(hash, &compiled->primitives_hash, sizeof compiled->primitives_hash);
+        renderer->report.scene_hash = hash_bytes(hash, &compiled->unit, sizeof compiled->unit);
+    }
     sample_offsets_upload(renderer);
     renderer_kernels_choose(renderer);
 }

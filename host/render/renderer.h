@@ -199,7 +199,7 @@ typedef struct {
 const RenderReport *renderer_report(const Renderer *renderer);
 
 // Where settings.hashes_scene: of the arrays of all passes, their unit and the samples' offsets, but not of
-// the BVH, which does not change the image.
+// the BVH and the order that it gives the primitives, which do not change the image.
 uint64_t renderer_scene_hash(const Renderer *renderer);
 
 // The composed text of the kernel that renders, for other compilers. Caller frees.

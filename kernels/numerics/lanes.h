@@ -61,6 +61,9 @@ typedef int scalar_integer;
 #define OUT_OF_LINE __attribute__((noinline))
 #endif
 
+// For a function of which constant arguments leave a part.
+#define ALWAYS_INLINE __attribute__((always_inline))
+
 #define JOIN_TOKENS(a, b) a##b
 #define JOIN(a, b)        JOIN_TOKENS(a, b)
 
@@ -306,6 +309,20 @@ typedef union {
 static inline real real_min_of_pairs(real a, real b)
 {
     return real_min((real)(a.even, b.even), (real)(a.odd, b.odd));
+}
+#endif
+
+#if LANES > 1
+// The smallest lane of each of LANES vectors, a lane per vector.
+static inline real lanes_smallest_of_each(const real *vectors)
+{
+    real smallest[LANES];
+    for (uint i = 0; i < LANES; i++)
+        smallest[i] = vectors[i];
+    for (uint count = LANES >> 1; count > 0; count >>= 1)
+        for (uint i = 0; i < count; i++)
+            smallest[i] = real_min_of_pairs(smallest[2 * i], smallest[2 * i + 1]);
+    return smallest[0];
 }
 #endif
 

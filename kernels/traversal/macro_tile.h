@@ -1,39 +1,40 @@
-// Macro-tile traversal of the BVH: several packets at once, whose rays pass through a common origin.
+// A macro-tile: several packets at once, whose rays pass through a common origin.
 //
 // In the frame of the common origin, one coordinate axis is w and the other two are u and v. A ray there is a
 // point (u / w, v / w), a packet a rectangle of such points, and a box seen from the origin is a rectangle as
-// well. The children of a node are culled all at once, a lane per child, against the macro-tile's rectangle,
-// and where its packets are few, against each one's; else the packets of each child that is left all at once,
-// a lane per packet. The rays of each packet that is left are culled all at once, a lane per ray. Packets are
-// frusta on a plane across the main axis in Wald, Ize, Kensler, Knoll, Parker, Ray tracing animated scenes
-// using coherent grid traversal, SIGGRAPH 2006, and culled in groups in Reshetov, Soupikov, Hurley,
-// Multi-level ray tracing algorithm, SIGGRAPH 2005; neither tests lanes of three kinds.
+// well. Packets are frusta on a plane across the main axis in Wald, Ize, Kensler, Knoll, Parker, Ray tracing
+// animated scenes using coherent grid traversal, SIGGRAPH 2006.
 #ifndef MACRO_TILE_H
 #define MACRO_TILE_H
 
 #include "traversal/boxes.h"
-#include "traversal/primitives.h"
-#include "traversal/stack.h"
+#include "traversal/query.h"
 
 #if LANES > 1
 
 // Packets with a larger slope in the frame take packet traversal.
 #define SLOPE_MAX ((real)(4))
-// Slopes below this count as it.
-#define SLOPE_MIN (UNIT_ROUNDOFF * UNIT_ROUNDOFF)
 
 // Bounds of rounding, in u, derived in docs/numerics.md. Of slopes: a box's, relative to itself, and a ray's,
 // relative to 1. Of positions: what boxes are enlarged by beyond their slack, in the coordinates.
 enum { BOX_SLOPE_SLACK = 32, RAY_SLOPE_SLACK = 64, TILE_POSITION_SLACK = 64 };
+// Of a triangle's vertex across a ray: in the full test, of its distance from the ray's start, and in a
+// block, of its distance from the common origin.
+enum { VERTEX_TEST_ERROR = 24, VERTEX_BLOCK_ERROR = 16 };
 
 // The frame of a common origin. Rays are seen as leaving it, whichever way they run; they leave along
 // positive w.
 typedef struct {
     uint u_axis, v_axis, w_axis;
     bool leaving;   // rays start at the origin; else they end there
-    bool reversed;  // w runs against its axis
-    scalar u, v, w; // of the origin, on the scene's axes
+    scalar side;    // -1: w runs against its axis; else 1
+    scalar u, v, w; // of the origin
 } OriginFrame;
+
+// A rectangle as seen from the common origin, from w on.
+typedef struct {
+    scalar u_min, u_max, v_min, v_max, w;
+} SeenRectangle;
 
 typedef struct {
     Traversal *traversals; // of each packet, as the rays
@@ -41,20 +42,24 @@ typedef struct {
     OriginFrame frame;
     uint active;     // packets that still traverse, as bits
     uint unprepared; // packets whose rays ray_prepare has yet to see, as bits
-    real slack;      // by which boxes are enlarged: for each lane's rays, from macro_tile_bound on for all
-    // of each packet's rays: w per u and per v, w per t, and the w up to which they are traversed, -LARGEST
-    // in lanes that are done
-    real w_per_u[LANES], w_per_v[LANES], w_per_t[LANES], reach[LANES];
-    // bounds of these over each packet, a lane per packet
+    scalar slack;    // by which boxes are enlarged
+    // of each packet's rays: slopes, w per t, and the w up to which they are traversed, -LARGEST in lanes
+    // that are done
+    real u[LANES], v[LANES], w_per_t[LANES], reach[LANES];
+    // bounds of these over each packet, a lane per packet; inside out for packets that are not in the tile
     RealLanes u_min, u_max, v_min, v_max, reach_max;
     // bounds over all packets
     scalar tile_u_min, tile_u_max, tile_v_min, tile_v_max, tile_reach_max;
-    bool has_shrunk; // by a hit since tile_reach_max was set
+    bool has_shrunk;  // by a hit since tile_reach_max was set
+    scalar ray_per_w; // an upper bound of the rays' length per w
+    // Upper bounds of the errors across a ray of a vertex that counts as hit: vertex_error0 + vertex_error1
+    // times the distance from the common origin.
+    scalar vertex_error0, vertex_error1;
 } MacroTile;
 
-static inline real vector_along(Vector vector, uint axis)
+static inline const real *vector_component(const Vector *vector, uint axis)
 {
-    return axis == 0 ? vector.x : axis == 1 ? vector.y : vector.z;
+    return axis == 0 ? &vector->x : axis == 1 ? &vector->y : &vector->z;
 }
 
 static inline scalar scalar4_along(scalar4 vector, uint axis)
@@ -73,270 +78,150 @@ static inline OriginFrame origin_frame(const Scene *scene, const Ray *ray, mask 
     frame.w_axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     frame.u_axis = frame.w_axis == 0 ? 1 : 0;
     frame.v_axis = frame.w_axis == 2 ? 1 : 2;
-    frame.reversed = scalar4_along(direction, frame.w_axis) < 0 ? frame.leaving : !frame.leaving;
+    frame.side = scalar4_along(direction, frame.w_axis) < 0 == frame.leaving ? -1 : 1;
     scalar4 origin = scene->header->eye;
     if (!frame.leaving) origin = scene->lights[ray->common_origin - COMMON_ORIGIN_FIRST_LIGHT].position;
     frame.u = scalar4_along(origin, frame.u_axis);
     frame.v = scalar4_along(origin, frame.v_axis);
-    frame.w = scalar4_along(origin, frame.w_axis);
+    frame.w = scalar4_along(origin, frame.w_axis) * frame.side;
     return frame;
 }
 
-static inline void macro_tile_set_reach(MacroTile *tile, uint packet)
+static inline real tile_reach(const MacroTile *tile, uint packet)
 {
     const Traversal *traversal = &tile->traversals[packet];
     real t = (real)(1 + 16 * UNIT_ROUNDOFF);
     real limit = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;
     if (tile->frame.leaving) t = t * real_min(limit, (real)(LARGEST / 2));
-    real reach = lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
-    tile->reach[packet] = reach;
-    tile->reach_max.each[packet] = lanes_largest(traversal->active, reach);
+    return lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
 }
 
-// Huge for 0, so that its product with a distance keeps the sign.
-static inline real slope_inverse(real slope)
-{
-    const real least = (real)(SLOPE_MIN);
-    return reciprocal_estimate(lanes_select(fabs(slope) >= least, slope, least));
-}
+// Bounds of the packets: of each the least lane counts, of a negative where a largest is meant.
+typedef struct {
+    real u_min[LANES], u_max[LANES], v_min[LANES], v_max[LANES], reach_max[LANES];
+    // At `certified`, over all packets: how far the exact rays are from these within the bounds of the BVH,
+    // beyond what tmin allows; and the error of a vertex across them, vertex_error0 + vertex_error1 times the
+    // distance from the eye.
+    real place_error, vertex_error0, vertex_error1;
+} PacketBounds;
 
 // Adds a packet with active rays, unless one of its slopes is too large.
-static inline void macro_tile_add(MacroTile *tile, const Scene *scene, uint packet)
+static inline void tile_add(MacroTile *tile, PacketBounds *bounds, const Scene *scene, uint packet)
 {
     const OriginFrame *frame = &tile->frame;
     const Ray *ray = &tile->rays[packet];
     const real zero = (real)(0), none = (real)(LARGEST), away = (real)(frame->leaving ? 1 : -1);
     mask active = tile->traversals[packet].active;
-    real w = vector_along(ray->direction, frame->w_axis) * (frame->reversed ? -away : away);
-    real u = vector_along(ray->direction, frame->u_axis) * away;
-    real v = vector_along(ray->direction, frame->v_axis) * away;
+    real w = *vector_component(&ray->direction, frame->w_axis) * ((real)(frame->side) * away);
+    real u = *vector_component(&ray->direction, frame->u_axis) * away;
+    real v = *vector_component(&ray->direction, frame->v_axis) * away;
     mask steep = (w <= zero) | (fabs(u) > SLOPE_MAX * w) | (fabs(v) > SLOPE_MAX * w);
     if (lanes_any(active & steep)) return;
     real inverse = reciprocal_estimate(lanes_select(active, w, (real)(1)));
     u = u * inverse;
     v = v * inverse;
-    tile->w_per_u[packet] = slope_inverse(u);
-    tile->w_per_v[packet] = slope_inverse(v);
+    tile->u[packet] = u;
+    tile->v[packet] = v;
     tile->w_per_t[packet] = w;
-    LaneMinima minima;
-    minima.all[0] = lanes_select(active, u, none);
-    minima.all[1] = lanes_select(active, -u, none);
-    minima.all[2] = lanes_select(active, v, none);
-    minima.all[3] = lanes_select(active, -v, none);
-    for (uint i = 4; i < MINIMA_COUNT; i++)
-        minima.all[i] = none;
-    lane_minima_reduce(&minima);
-    tile->u_min.each[packet] = minima.each[0];
-    tile->u_max.each[packet] = -minima.each[1];
-    tile->v_min.each[packet] = minima.each[2];
-    tile->v_max.each[packet] = -minima.each[3];
-    // the origin counts, too: a shadow ray's line misses the light by u of all of the ray
-    real max_norm1 = bounds_max_norm1(ray->origin, scene->header->bounds);
-    real slack = real_fma((real)(TILE_POSITION_SLACK * UNIT_ROUNDOFF), max_norm1,
-                          box_slack(ray, scene->header->bounds));
-    tile->slack = real_max(tile->slack, lanes_select(active, slack, zero));
+    real reach = tile_reach(tile, packet);
+    tile->reach[packet] = reach;
+    bounds->u_min[packet] = lanes_select(active, u, none);
+    bounds->u_max[packet] = lanes_select(active, -u, none);
+    bounds->v_min[packet] = lanes_select(active, v, none);
+    bounds->v_max[packet] = lanes_select(active, -v, none);
+    bounds->reach_max[packet] = lanes_select(active, -reach, none);
+    if (IS_CERTIFIED) {
+        real place_error = bounds_place_error(ray, scene->header->bounds) - ray->length * ray->tmin;
+        real vertex_error1 = ray->direction_error + (real)((TRIANGLE_ERROR + 1) * UNIT_ROUNDOFF);
+        real vertex_error0 = real_fma(vertex_error1, vector_norm1(ray->origin), ray->origin_error);
+        bounds->place_error = real_max(bounds->place_error, lanes_select(active, place_error, zero));
+        bounds->vertex_error0 = real_max(bounds->vertex_error0, lanes_select(active, vertex_error0, zero));
+        bounds->vertex_error1 = real_max(bounds->vertex_error1, lanes_select(active, vertex_error1, zero));
+    }
     tile->active |= 1u << packet;
-    macro_tile_set_reach(tile, packet);
 }
 
-static inline void macro_tile_bound_reach(MacroTile *tile)
+static inline void tile_bound_reach(MacroTile *tile)
 {
     tile->tile_reach_max = lanes_largest(mask_of_bits(tile->active), tile->reach_max.all);
     tile->has_shrunk = false;
 }
 
-static inline void macro_tile_bound(MacroTile *tile)
+// By which boxes are enlarged, from upper bounds of 1-norms: of a hit's distance from the ray's start, and of
+// its coordinates. `norm1_per_w`: of the rays.
+static inline scalar tile_slack(const MacroTile *tile, scalar4 bounds, scalar norm1_per_w)
 {
     const OriginFrame *frame = &tile->frame;
-    scalar origin_slack =
-        TILE_POSITION_SLACK * UNIT_ROUNDOFF * (fabs(frame->u) + fabs(frame->v) + fabs(frame->w));
-    tile->slack = (real)(lanes_largest(mask_all(), tile->slack) + origin_slack);
+    const scalar center = fabs(bounds.x) + fabs(bounds.y) + fabs(bounds.z);
+    const scalar origin = fabs(frame->u) + fabs(frame->v) + fabs(frame->w);
+    const scalar start = frame->leaving ? 0 : tile->tile_reach_max * norm1_per_w;
+    const scalar farthest = origin + start + center + bounds.w, largest = 2 * center + farthest;
+    const scalar units = BOX_HIT_SLACK * farthest + (BOX_ROUNDING_SLACK + TILE_POSITION_SLACK) * largest +
+                         TILE_POSITION_SLACK * origin;
+    return units * UNIT_ROUNDOFF;
+}
+
+// Sets the bounds over all packets, once all have been added.
+static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const Scene *scene)
+{
+    tile->reach_max.all = -lanes_smallest_of_each(bounds->reach_max);
+    tile_bound_reach(tile);
+    real u_min = lanes_smallest_of_each(bounds->u_min), u_max = -lanes_smallest_of_each(bounds->u_max);
+    real v_min = lanes_smallest_of_each(bounds->v_min), v_max = -lanes_smallest_of_each(bounds->v_max);
     mask members = mask_of_bits(tile->active);
+    scalar steepest_u = lanes_largest(members, real_max(-u_min, u_max)),
+           steepest_v = lanes_largest(members, real_max(-v_min, v_max));
+    const scalar norm1_per_w = 1 + steepest_u + steepest_v;
+    // above sqrt(1 + u^2 + v^2), by less than 1 % below a slope of 1/2
+    const scalar squared_slope = steepest_u * steepest_u + steepest_v * steepest_v;
+    tile->ray_per_w = (scalar)(1.0001f) * fmin(1 + (scalar)(0.5f) * squared_slope, norm1_per_w);
+    tile->slack = tile_slack(tile, scene->header->bounds, norm1_per_w);
+    tile->vertex_error0 = 0;
+    tile->vertex_error1 = (VERTEX_TEST_ERROR + VERTEX_BLOCK_ERROR) * UNIT_ROUNDOFF;
+    if (IS_CERTIFIED) {
+        const OriginFrame *frame = &tile->frame;
+        tile->slack += lanes_largest(mask_all(), bounds->place_error);
+        // six times the test's error, of sizes that may be 1.4 times the distance: docs/numerics.md
+        const scalar error1 = (scalar)(6 * 1.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
+        tile->vertex_error0 = 6 * lanes_largest(mask_all(), bounds->vertex_error0) +
+                              error1 * (fabs(frame->u) + fabs(frame->v) + fabs(frame->w));
+        tile->vertex_error1 = error1 + VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF;
+    }
+    // at an eighth of the distance (triangle_block.h) a vertex' error moves its slopes by as much
+    const real wider = (real)(8 * (tile->vertex_error1 + 8 * UNIT_ROUNDOFF) * tile->ray_per_w * norm1_per_w);
+    tile->u_min.all = u_min - wider;
+    tile->u_max.all = u_max + wider;
+    tile->v_min.all = v_min - wider;
+    tile->v_max.all = v_max + wider;
     tile->tile_u_min = -lanes_largest(members, -tile->u_min.all);
     tile->tile_u_max = lanes_largest(members, tile->u_max.all);
     tile->tile_v_min = -lanes_largest(members, -tile->v_min.all);
     tile->tile_v_max = lanes_largest(members, tile->v_max.all);
-    macro_tile_bound_reach(tile);
 }
 
-// A node's boxes in the frame, a lane per child, and as seen from the origin: rectangles of slopes.
-typedef struct {
-    RealLanes u_low, u_high, v_low, v_high, w_low, w_high;
-    RealLanes u_min, u_max, v_min, v_max;
-} ProjectedBoxes;
-
-static inline real box_slope_min(real a, real b)
+// The rays of a packet, as bits, within a rectangle that they reach.
+static inline uint rays_within(const MacroTile *tile, uint packet, const SeenRectangle *seen)
 {
-    real least = real_min(a, b);
-    return real_fma(fabs(least), (real)(-BOX_SLOPE_SLACK * UNIT_ROUNDOFF), least) -
-           (real)(RAY_SLOPE_SLACK * UNIT_ROUNDOFF);
+    real u = tile->u[packet], v = tile->v[packet];
+    return lanes_bits(((real)(seen->u_min) <= u) & (u <= (real)(seen->u_max)) & ((real)(seen->v_min) <= v) &
+                      (v <= (real)(seen->v_max)) & ((real)(seen->w) <= tile->reach[packet]));
 }
 
-static inline ProjectedBoxes project_boxes(const MacroTile *tile, global const scalar *boxes)
+static inline void tile_prepare(MacroTile *tile, uint packet)
 {
-    const OriginFrame *frame = &tile->frame;
-    global const scalar *low = boxes + BVH_LOW * BVH_WIDTH, *high = boxes + BVH_HIGH * BVH_WIDTH;
-    const real slack = tile->slack;
-    real w_low = real_load(low + frame->w_axis * BVH_WIDTH) - (real)(frame->w);
-    real w_high = real_load(high + frame->w_axis * BVH_WIDTH) - (real)(frame->w);
-    real w_min = (frame->reversed ? -w_high : w_low) - slack,
-         w_max = (frame->reversed ? -w_low : w_high) + slack;
-    real u_low = real_load(low + frame->u_axis * BVH_WIDTH) - (real)(frame->u) - slack;
-    real u_high = real_load(high + frame->u_axis * BVH_WIDTH) - (real)(frame->u) + slack;
-    real v_low = real_load(low + frame->v_axis * BVH_WIDTH) - (real)(frame->v) - slack;
-    real v_high = real_load(high + frame->v_axis * BVH_WIDTH) - (real)(frame->v) + slack;
-    // a box that reaches back to the origin may be seen anywhere
-    mask around = w_min <= slack;
-    real near_inverse = reciprocal_estimate(lanes_select(around, slack, w_min));
-    real far_inverse = reciprocal_estimate(lanes_select(w_max > slack, w_max, slack));
-    const real anywhere = (real)(LARGEST);
-    ProjectedBoxes projected;
-    projected.u_min.all =
-        lanes_select(around, -anywhere, box_slope_min(u_low * near_inverse, u_low * far_inverse));
-    projected.u_max.all =
-        lanes_select(around, anywhere, -box_slope_min(-u_high * near_inverse, -u_high * far_inverse));
-    projected.v_min.all =
-        lanes_select(around, -anywhere, box_slope_min(v_low * near_inverse, v_low * far_inverse));
-    projected.v_max.all =
-        lanes_select(around, anywhere, -box_slope_min(-v_high * near_inverse, -v_high * far_inverse));
-    projected.u_low.all = u_low;
-    projected.u_high.all = u_high;
-    projected.v_low.all = v_low;
-    projected.v_high.all = v_high;
-    projected.w_low.all = w_min;
-    projected.w_high.all = w_max;
-    return projected;
+    if (tile->unprepared >> packet & 1) ray_prepare(&tile->rays[packet]);
+    tile->unprepared &= ~(1u << packet);
 }
 
-// Whether any ray of a packet meets a child's box.
-static inline bool rays_meet_child(const MacroTile *tile, uint packet, const ProjectedBoxes *boxes,
-                                   uint child)
+// Call after a packet's hits.
+static inline void tile_update(MacroTile *tile, uint packet)
 {
-    real w_per_u = tile->w_per_u[packet], w_per_v = tile->w_per_v[packet];
-    real u_low = (real)(boxes->u_low.each[child]) * w_per_u,
-         u_high = (real)(boxes->u_high.each[child]) * w_per_u;
-    real v_low = (real)(boxes->v_low.each[child]) * w_per_v,
-         v_high = (real)(boxes->v_high.each[child]) * w_per_v;
-    real entry = real_max(real_max(real_min(u_low, u_high), real_min(v_low, v_high)),
-                          (real)(boxes->w_low.each[child]));
-    real exit = real_min(real_min(real_max(u_low, u_high), real_max(v_low, v_high)),
-                         real_min((real)(boxes->w_high.each[child]), tile->reach[packet]));
-    return lanes_any(entry <= exit);
-}
-
-// The packets, of those given, whose rectangle overlaps that of a child's box, a lane per packet.
-static inline uint packets_overlap_child(const MacroTile *tile, const ProjectedBoxes *boxes, uint child,
-                                         uint packets)
-{
-    return packets & lanes_bits(((real)(boxes->u_min.each[child]) <= tile->u_max.all) &
-                                (tile->u_min.all <= (real)(boxes->u_max.each[child])) &
-                                ((real)(boxes->v_min.each[child]) <= tile->v_max.all) &
-                                (tile->v_min.all <= (real)(boxes->v_max.each[child])) &
-                                ((real)(boxes->w_low.each[child]) <= tile->reach_max.all));
-}
-
-// The same of all children, a lane per child: for each the packets, as bits.
-static inline integer packets_overlap_children(const MacroTile *tile, const ProjectedBoxes *boxes,
-                                               uint packets)
-{
-    integer overlapping = (integer)(0);
-    for (; packets != 0; packets &= packets - 1) {
-        uint packet = lowest_bit(packets);
-        mask overlaps = (boxes->u_min.all <= (real)(tile->u_max.each[packet])) &
-                        ((real)(tile->u_min.each[packet]) <= boxes->u_max.all) &
-                        (boxes->v_min.all <= (real)(tile->v_max.each[packet])) &
-                        ((real)(tile->v_min.each[packet]) <= boxes->v_max.all) &
-                        (boxes->w_low.all <= (real)(tile->reach_max.each[packet]));
-        integer with_packet = overlapping | (integer)((scalar_integer)1 << packet);
-        overlapping = lanes_select(overlaps, with_packet, overlapping);
-    }
-    return overlapping;
-}
-
-// Intersects the primitives of a leaf with the rays of packets.
-static inline void tile_intersect_leaf(MacroTile *tile, const Scene *scene, uint kind, uint first,
-                                       uint packets)
-{
-    for (; packets != 0; packets &= packets - 1) {
-        uint packet = lowest_bit(packets), bit = 1u << packet;
-        if (tile->unprepared & bit) ray_prepare(&tile->rays[packet]);
-        tile->unprepared &= ~bit;
-        Traversal *traversal = &tile->traversals[packet];
-        if (!intersect_leaf(traversal, scene, &tile->rays[packet], kind, first)) continue;
-        const scalar before = tile->reach_max.each[packet];
-        macro_tile_set_reach(tile, packet);
-        tile->has_shrunk = tile->has_shrunk || tile->reach_max.each[packet] < before;
-        if (!lanes_any(traversal->active)) tile->active &= ~bit;
-    }
-}
-
-// Intersects what is in the leaves among a node's children that any of the packets may meet, and pushes the
-// other children. Bounds of the reach may be too large after a leaf's hits, which costs tests alone.
-static inline void tile_visit_node(MacroTile *tile, TraversalStack *stack, const Scene *scene,
-                                   global const BvhNode *node, uint packets)
-{
-    const uint bottom = stack->count;
-    if (tile->has_shrunk) macro_tile_bound_reach(tile);
-    ProjectedBoxes projected = project_boxes(tile, (global const scalar *)node->planes);
-    uint children = lanes_bits((projected.u_min.all <= (real)(tile->tile_u_max)) &
-                               ((real)(tile->tile_u_min) <= projected.u_max.all) &
-                               (projected.v_min.all <= (real)(tile->tile_v_max)) &
-                               ((real)(tile->tile_v_min) <= projected.v_max.all) &
-                               (projected.w_low.all <= (real)(tile->tile_reach_max)) &
-                               (projected.w_high.all >= (real)(0)));
-    const bool by_packet = popcount(packets) < popcount(children); // the shorter loop runs
-    IntegerLanes overlapping;
-    if (by_packet) {
-        overlapping.all = packets_overlap_children(tile, &projected, packets);
-        children &= lanes_bits(overlapping.all != (integer)(0));
-    }
-    for (; children != 0; children &= children - 1) {
-        uint child = lowest_bit(children);
-        uint kind = ((global const uint *)node->child_kind)[child];
-        uint met = by_packet ? (uint)overlapping.each[child] & tile->active
-                             : packets_overlap_child(tile, &projected, child, packets);
-        // a sphere's first test costs no more than that of its box
-        const bool has_spheres = HAS_SPHERES && kind >> 8 > 0 && (kind & 0xff) == KIND_SPHERES;
-        for (uint left = has_spheres ? 0 : met; left != 0; left &= left - 1) {
-            uint packet = lowest_bit(left);
-            if (!rays_meet_child(tile, packet, &projected, child)) met &= ~(1u << packet);
-        }
-        if (met == 0) continue;
-        uint index = ((global const uint *)node->child_index)[child];
-        if (kind == BVH_NODE) {
-            stack_push_node(stack, bottom, scene, (StackEntry){index, met, projected.w_low.each[child]});
-            continue;
-        }
-        tile_intersect_leaf(tile, scene, kind, index, met);
-        if (tile->active == 0) return;
-    }
-}
-
-// Traverses the BVH with those of the packets, given as bits, that the common origin's frame suits. All have
-// active rays. Returns the others.
-static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scene, Ray *rays, uint packets)
-{
-    MacroTile tile;
-    tile.traversals = traversals;
-    tile.rays = rays;
-    tile.active = 0;
-    tile.frame = origin_frame(scene, &rays[lowest_bit(packets)], traversals[lowest_bit(packets)].active);
-    tile.slack = (real)(SMALLEST_RATIO);
-    tile.u_min.all = tile.u_max.all = tile.v_min.all = tile.v_max.all = tile.reach_max.all = (real)(0);
-    for (uint left = packets; left != 0; left &= left - 1)
-        macro_tile_add(&tile, scene, lowest_bit(left));
-    const uint others = packets & ~tile.active;
-    if (tile.active == 0) return others;
-    tile.unprepared = tile.active;
-    macro_tile_bound(&tile);
-    StackEntry entries[STACK_CAPACITY], next = {0, tile.active, -LARGEST};
-    // entry distances are from the common origin: nearest the light is farthest from the surface
-    TraversalStack stack = {entries, 0, false};
-    for (;; next = entries[--stack.count]) {
-        uint met = next.lanes & tile.active & lanes_bits((real)(next.entry) <= tile.reach_max.all);
-        if (met != 0) tile_visit_node(&tile, &stack, scene, &scene->nodes[next.child_index], met);
-        if (stack.count == 0 || tile.active == 0) return others;
-    }
+    const Traversal *traversal = &tile->traversals[packet];
+    tile->reach[packet] = tile_reach(tile, packet);
+    if (!lanes_any(traversal->active)) tile->active &= ~(1u << packet);
+    if (!tile->frame.leaving) return; // a light's rays end with a hit: the reach of the others stays
+    tile->reach_max.each[packet] = lanes_largest(traversal->active, tile->reach[packet]);
+    tile->has_shrunk = true;
 }
 
 #endif

@@ -78,11 +78,19 @@ SHAPE_LIST(INTERSECT_SHAPE)
     }
 SHAPE_LIST(INTERSECT_SHAPES)
 
-// A leaf is count << 8 | kind (BvhNode.child_kind) and its first primitive.
-static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
-                                  uint first)
+// The first triangle of a block.
+static inline uint block_first(const Scene *scene, uint block)
 {
-    uint kind = leaf & 0xff, last = first + (leaf >> 8);
+    return ((global const uint *)scene->block_places)[block];
+}
+
+// A leaf is count << 8 | kind (BvhNode.child_kind) and its index there.
+static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
+                                  uint index)
+{
+    const uint kind = leaf & 0xff;
+    const uint first = LANES > 1 && kind == KIND_TRIANGLES ? block_first(scene, index) : index;
+    const uint last = first + (leaf >> 8);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
     if (HAS_##feature && kind == KIND_##feature)                                                             \
         return intersect_##names(traversal, scene, ray, first, last, 0);

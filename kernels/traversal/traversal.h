@@ -3,9 +3,9 @@
 #ifndef TRAVERSAL_H
 #define TRAVERSAL_H
 
-#include "traversal/macro_tile.h"
 #include "traversal/packet.h"
 #include "traversal/single.h"
+#include "traversal/tile_traversal.h"
 
 // Starts a packet's traversal with what is outside the BVH. Whether the BVH is left to traverse.
 static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)

@@ -1,0 +1,232 @@
+// Traversal of the BVH by macro-tiles.
+//
+// The children of a node are culled all at once, a lane per child, against the macro-tile's rectangle; the
+// packets of each child that is left all at once, a lane per packet; and the rays of each packet that is not
+// wholly inside the child's rectangle all at once, a lane per ray. Groups of rays are culled by bounds at
+// several levels in Reshetov, Soupikov, Hurley, Multi-level ray tracing algorithm, SIGGRAPH 2005, without
+// lanes of three kinds.
+#ifndef TILE_TRAVERSAL_H
+#define TILE_TRAVERSAL_H
+
+#include "traversal/macro_tile.h"
+#include "traversal/triangle_block.h"
+
+#if LANES > 1
+
+// The boxes of a node's children, a lane per child, as rectangles seen from w on.
+typedef struct {
+    RealLanes u_min, u_max, v_min, v_max, w;
+} SeenBoxes;
+
+static inline real box_slope_min(real a, real b)
+{
+    real least = real_min(a, b);
+    return real_fma(fabs(least), (real)(-BOX_SLOPE_SLACK * UNIT_ROUNDOFF), least) -
+           (real)(RAY_SLOPE_SLACK * UNIT_ROUNDOFF);
+}
+
+// Returns the children, as bits, whose boxes the macro-tile may hit.
+static inline uint boxes_view(SeenBoxes *seen, const MacroTile *tile, global const scalar *boxes)
+{
+    const OriginFrame *frame = &tile->frame;
+    global const scalar *low = boxes + BVH_LOW * BVH_WIDTH, *high = boxes + BVH_HIGH * BVH_WIDTH;
+    const real slack = (real)(tile->slack);
+    real w_low = real_load(low + frame->w_axis * BVH_WIDTH),
+         w_high = real_load(high + frame->w_axis * BVH_WIDTH);
+    const bool is_reversed = frame->side < 0;
+    real w_min = (is_reversed ? -w_high : w_low) - (real)(frame->w) - slack,
+         w_max = (is_reversed ? -w_low : w_high) - (real)(frame->w) + slack;
+    real u_low = real_load(low + frame->u_axis * BVH_WIDTH) - (real)(frame->u) - slack,
+         u_high = real_load(high + frame->u_axis * BVH_WIDTH) - (real)(frame->u) + slack;
+    real v_low = real_load(low + frame->v_axis * BVH_WIDTH) - (real)(frame->v) - slack,
+         v_high = real_load(high + frame->v_axis * BVH_WIDTH) - (real)(frame->v) + slack;
+    // of a box that reaches back to the origin the near side has any slope
+    const real steep = (real)(1 / SMALLEST_RATIO);
+    real near_inverse = lanes_select(w_min <= slack, steep, reciprocal_estimate(real_max(w_min, slack))),
+         far_inverse = reciprocal_estimate(real_max(w_max, slack));
+    real u_min = box_slope_min(u_low * near_inverse, u_low * far_inverse),
+         u_max = -box_slope_min(-u_high * near_inverse, -u_high * far_inverse);
+    real v_min = box_slope_min(v_low * near_inverse, v_low * far_inverse),
+         v_max = -box_slope_min(-v_high * near_inverse, -v_high * far_inverse);
+    seen->u_min.all = u_min;
+    seen->u_max.all = u_max;
+    seen->v_min.all = v_min;
+    seen->v_max.all = v_max;
+    seen->w.all = w_min;
+    return lanes_bits((u_min <= (real)(tile->tile_u_max)) & ((real)(tile->tile_u_min) <= u_max) &
+                      (v_min <= (real)(tile->tile_v_max)) & ((real)(tile->tile_v_min) <= v_max) &
+                      (w_min <= (real)(tile->tile_reach_max)) & (w_max >= (real)(0)));
+}
+
+// The packets, of those given as bits, whose rectangle overlaps that of a box, a lane per packet.
+static inline uint packets_overlap(const MacroTile *tile, uint packets, const SeenRectangle *seen)
+{
+    return packets &
+           lanes_bits(((real)(seen->u_min) <= tile->u_max.all) & (tile->u_min.all <= (real)(seen->u_max)) &
+                      ((real)(seen->v_min) <= tile->v_max.all) & (tile->v_min.all <= (real)(seen->v_max)) &
+                      ((real)(seen->w) <= tile->reach_max.all));
+}
+
+// The same of all children, a lane per child: for each the packets, as bits.
+static inline integer packets_overlap_each(const MacroTile *tile, uint packets, const SeenBoxes *seen)
+{
+    integer overlapping = (integer)(0);
+    for (; packets != 0; packets &= packets - 1) {
+        const uint packet = lowest_bit(packets);
+        mask overlaps = (seen->u_min.all <= (real)(tile->u_max.each[packet])) &
+                        ((real)(tile->u_min.each[packet]) <= seen->u_max.all) &
+                        (seen->v_min.all <= (real)(tile->v_max.each[packet])) &
+                        ((real)(tile->v_min.each[packet]) <= seen->v_max.all) &
+                        (seen->w.all <= (real)(tile->reach_max.each[packet]));
+        overlapping =
+            lanes_select(overlaps, overlapping | (integer)((scalar_integer)1 << packet), overlapping);
+    }
+    return overlapping;
+}
+
+// Those of the packets of which a ray is within the rectangle. The rays of one that is all inside are not
+// tested.
+static inline uint packets_within(const MacroTile *tile, uint packets, const SeenRectangle *seen)
+{
+    const uint inside =
+        lanes_bits(((real)(seen->u_min) <= tile->u_min.all) & (tile->u_max.all <= (real)(seen->u_max)) &
+                   ((real)(seen->v_min) <= tile->v_min.all) & (tile->v_max.all <= (real)(seen->v_max)));
+    for (uint left = packets & ~inside; left != 0; left &= left - 1)
+        if (rays_within(tile, lowest_bit(left), seen) == 0) packets &= ~(left & -left);
+    return packets;
+}
+
+// A pending child of a node.
+typedef struct {
+    SeenRectangle seen;
+    uint index, kind; // of BvhNode
+    uint packets;     // that may hit it, as bits
+} TileEntry;
+
+// Prefetches what a visit will read first.
+static inline void entry_prefetch(const Scene *scene, uint kind, uint index)
+{
+    if (kind == BVH_NODE)
+        memory_prefetch((global const char *)&scene->nodes[index], sizeof(BvhNode));
+    else if (HAS_TRIANGLES && (kind & 0xff) == KIND_TRIANGLES)
+        memory_prefetch((global const char *)&scene->triangle_blocks[index], sizeof(TriangleBlock));
+}
+
+// Intersects the primitives of a leaf with the rays of packets.
+static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const TileEntry *leaf, uint packets)
+{
+    for (; packets != 0; packets &= packets - 1) {
+        const uint packet = lowest_bit(packets);
+        tile_prepare(tile, packet);
+        if (intersect_leaf(&tile->traversals[packet], scene, &tile->rays[packet], leaf->kind, leaf->index))
+            tile_update(tile, packet);
+    }
+}
+
+// Pushes the children of a node that the packets may hit, the nearest to the common origin last. Returns the
+// number of entries.
+static inline uint tile_visit_node(MacroTile *tile, const Scene *scene, global const BvhNode *node,
+                                   uint packets, TileEntry *entries, uint count)
+{
+    const uint bottom = count;
+    if (tile->has_shrunk) tile_bound_reach(tile);
+    SeenBoxes boxes;
+    uint children = boxes_view(&boxes, tile, (global const scalar *)node->planes);
+    const bool by_packet = popcount(packets) < popcount(children); // the shorter loop runs
+    IntegerLanes overlapping;
+    if (by_packet) {
+        overlapping.all = packets_overlap_each(tile, packets, &boxes);
+        children &= lanes_bits(overlapping.all != (integer)(0));
+    }
+    for (; children != 0; children &= children - 1) {
+        const uint child = lowest_bit(children);
+        TileEntry entry;
+        entry.seen = (SeenRectangle){boxes.u_min.each[child], boxes.u_max.each[child],
+                                     boxes.v_min.each[child], boxes.v_max.each[child], boxes.w.each[child]};
+        entry.kind = ((global const uint *)node->child_kind)[child];
+        entry.packets = tile->active & (by_packet ? (uint)overlapping.each[child]
+                                                  : packets_overlap(tile, packets, &entry.seen));
+        // a sphere's first test costs no more than that of its box
+        const bool has_spheres = HAS_SPHERES && entry.kind >> 8 > 0 && (entry.kind & 0xff) == KIND_SPHERES;
+        if (!has_spheres) entry.packets = packets_within(tile, entry.packets, &entry.seen);
+        if (entry.packets == 0) continue;
+        entry.index = ((global const uint *)node->child_index)[child];
+        if (entry.kind != BVH_NODE && (entry.kind & 0xff) != KIND_TRIANGLES) {
+            tile_visit_leaf(tile, scene, &entry, entry.packets);
+            continue;
+        }
+        entry_prefetch(scene, entry.kind, entry.index);
+        uint slot = count++;
+        for (; slot > bottom && entries[slot - 1].seen.w < entry.seen.w; slot--)
+            entries[slot] = entries[slot - 1];
+        entries[slot] = entry;
+    }
+    return count;
+}
+
+static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *scene, bool is_shadow)
+{
+    TileEntry entries[STACK_CAPACITY];
+    entries[0] = (TileEntry){.seen = {-LARGEST, LARGEST, -LARGEST, LARGEST, -LARGEST},
+                             .index = 0,
+                             .kind = BVH_NODE,
+                             .packets = tile->active};
+    uint count = 1;
+    while (count > 0 && tile->active != 0) {
+        const TileEntry entry = entries[--count];
+        const uint packets =
+            entry.packets & tile->active & lanes_bits((real)(entry.seen.w) <= tile->reach_max.all);
+        if (packets == 0) continue;
+        if (entry.kind == BVH_NODE)
+            count = tile_visit_node(tile, scene, &scene->nodes[entry.index], packets, entries, count);
+#if HAS_TRIANGLES
+        else if ((entry.kind & 0xff) == KIND_TRIANGLES)
+            tile_visit_block(tile, scene, entry.index, entry.kind >> 8, &entry.seen, packets, is_shadow);
+#endif
+        else
+            tile_visit_leaf(tile, scene, &entry, packets);
+    }
+}
+
+// Two functions, so that the blocks of camera rays keep nothing for shadows in registers.
+static OUT_OF_LINE void tile_traverse_camera(MacroTile *tile, const Scene *scene)
+{
+    tile_traverse(tile, scene, false);
+}
+
+static OUT_OF_LINE void tile_traverse_shadows(MacroTile *tile, const Scene *scene)
+{
+    tile_traverse(tile, scene, true);
+}
+
+// Traverses the BVH with those of the packets, given as bits, that the common origin's frame suits. All have
+// active rays. Returns the others.
+static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scene, Ray *rays, uint packets)
+{
+    MacroTile tile;
+    PacketBounds bounds;
+    tile.traversals = traversals;
+    tile.rays = rays;
+    tile.active = 0;
+    const uint lowest = lowest_bit(packets);
+    tile.frame = origin_frame(scene, &rays[lowest], traversals[lowest].active);
+    if (IS_CERTIFIED) bounds.place_error = bounds.vertex_error0 = bounds.vertex_error1 = (real)(0);
+    for (uint i = 0; i < LANES; i++) {
+        bounds.u_min[i] = bounds.u_max[i] = bounds.v_min[i] = bounds.v_max[i] = bounds.reach_max[i] =
+            (real)(LARGEST);
+        if (packets >> i & 1) tile_add(&tile, &bounds, scene, i);
+    }
+    const uint others = packets & ~tile.active;
+    if (tile.active == 0) return others;
+    tile.unprepared = tile.active;
+    tile_bound(&tile, &bounds, scene);
+    if (traversals[lowest].query == OCCLUSION)
+        tile_traverse_shadows(&tile, scene);
+    else
+        tile_traverse_camera(&tile, scene);
+    return others;
+}
+
+#endif
+
+#endif

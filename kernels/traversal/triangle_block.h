@@ -1,0 +1,329 @@
+// Blocks of triangles against the packets of a macro-tile, before the full test (shapes/triangle.h).
+//
+// In the frame of the common origin an edge from a to b and the origin make a plane of normal a x b. A ray of
+// slopes u and v has the edge value (u, v, 1) . (a x b): its distance from the edge times the lengths of the
+// edge and of (u, v, 1). A block's triangles are set up a lane each. Then each packet takes the shorter of
+// two loops: over its rays, a lane per triangle, or over the triangles, a lane per ray. A ray misses a
+// triangle where an edge value is below minus its error, which docs/numerics.md derives; only what is left
+// takes the full test. A shadow ray is occluded without it where all three values exceed the error.
+#ifndef TRIANGLE_BLOCK_H
+#define TRIANGLE_BLOCK_H
+
+#include "traversal/macro_tile.h"
+#include "traversal/primitives.h"
+
+#if LANES > 1 && HAS_TRIANGLES
+
+// The triangles of a block as seen from the common origin, a lane each, in its frame.
+typedef struct {
+    Vector edges[3];  // a x b, b x c and c x a, of the sign with which values inside are positive
+    RealLanes error;  // of the edge values
+    RealLanes w_near; // the w from which it may be hit
+    real u_min, u_max, v_min, v_max;
+    // Of shadow rays: the w before which all of it lies, LARGEST where it may reach the light. `vertex` is
+    // seen from the eye of the scene; the normal leads away from the light.
+    RealLanes w_far;
+    Vector vertex, normal;
+    real normal_squared, longest;
+} BlockView;
+
+// Whether a shadow ray needs no full test where the block's answer is certain.
+#define BLOCKS_OCCLUDE (!HAS_TRANSMISSION && !IS_CERTIFIED)
+
+// A vertex of all triangles: 0, 1 or 2.
+static inline Vector block_vertices(const OriginFrame *frame, global const TriangleBlock *block, uint vertex)
+{
+    global const scalar *rows = (global const scalar *)block->rows + vertex * (3 * LANES);
+    return (Vector){real_load(rows + frame->u_axis * LANES), real_load(rows + frame->v_axis * LANES),
+                    real_load(rows + frame->w_axis * LANES) * (real)(frame->side)};
+}
+
+// Each component within 2 u of the product of the lengths.
+static inline Vector block_cross(Vector a, Vector b)
+{
+    return (Vector){real_fma(a.y, b.z, -(a.z * b.y)), real_fma(a.z, b.x, -(a.x * b.z)),
+                    real_fma(a.x, b.y, -(a.y * b.x))};
+}
+
+static inline real real_flip(real a, integer sign)
+{
+    return real_from_bits(bits_from_real(a) ^ sign);
+}
+
+static inline Vector vector_flip(Vector a, integer sign)
+{
+    return (Vector){real_flip(a.x, sign), real_flip(a.y, sign), real_flip(a.z, sign)};
+}
+
+static inline real real_min_of_3(real a, real b, real c)
+{
+    return real_min(real_min(a, b), c);
+}
+
+static inline real real_max_of_3(real a, real b, real c)
+{
+    return real_max(real_max(a, b), c);
+}
+
+// A block's vertices and edges in the frame, and bounds of each triangle.
+typedef struct {
+    Vector vertex; // a, on the frame's axes but not from its origin
+    Vector a, b, c, ab, bc, ca;
+    real low, high, longest; // w of the vertices; the longest edge
+    real to_vertices;        // from the common origin to those of a triangle that is hit
+    real distance;           // the same, or to the rays' starts, where they are farther
+    mask is_near;            // it reaches so near to the common origin that it may be seen anywhere
+} BlockVertices;
+
+static inline BlockVertices block_load(const MacroTile *tile, global const TriangleBlock *block)
+{
+    const OriginFrame *frame = &tile->frame;
+    const Vector origin = {(real)(frame->u), (real)(frame->v), (real)(frame->w)};
+    BlockVertices at;
+    at.vertex = block_vertices(frame, block, 0);
+    at.a = vector_subtract(at.vertex, origin);
+    at.b = vector_subtract(block_vertices(frame, block, 1), origin);
+    at.c = vector_subtract(block_vertices(frame, block, 2), origin);
+    at.ab = vector_subtract(at.b, at.a);
+    at.bc = vector_subtract(at.c, at.b);
+    at.ca = vector_subtract(at.a, at.c);
+    at.low = real_min_of_3(at.a.z, at.b.z, at.c.z);
+    at.high = real_max_of_3(at.a.z, at.b.z, at.c.z);
+    real longest_squared =
+        real_max_of_3(vector_dot(at.ab, at.ab), vector_dot(at.bc, at.bc), vector_dot(at.ca, at.ca));
+    at.longest = (real)(1.0001f) * device_sqrt(longest_squared);
+    const real per_w = (real)(tile->ray_per_w);
+    at.to_vertices = at.distance = real_fma(per_w, at.high, at.longest);
+    if (!frame->leaving)
+        at.distance = real_max(at.distance, real_fma(per_w, (real)(tile->tile_reach_max), at.longest));
+    const real near_error = (real)(8 * tile->vertex_error1) * at.low;
+    at.is_near =
+        !(near_error >= real_fma(at.distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0)));
+    return at;
+}
+
+// Sets the rectangles. Returns the triangles, as bits of the first `count`, that the macro-tile may hit.
+static inline uint block_see(BlockView *view, const MacroTile *tile, const BlockVertices *at, uint count)
+{
+    Vector a = at->a, b = at->b, c = at->c;
+    real a_inverse = reciprocal_estimate(a.z), b_inverse = reciprocal_estimate(b.z),
+         c_inverse = reciprocal_estimate(c.z);
+    real a_u = a.x * a_inverse, b_u = b.x * b_inverse, c_u = c.x * c_inverse;
+    real a_v = a.y * a_inverse, b_v = b.y * b_inverse, c_v = c.y * c_inverse;
+    const real anywhere = (real)(LARGEST), slack = (real)(tile->slack);
+    view->u_min = lanes_select(at->is_near, -anywhere, real_min_of_3(a_u, b_u, c_u));
+    view->u_max = lanes_select(at->is_near, anywhere, real_max_of_3(a_u, b_u, c_u));
+    view->v_min = lanes_select(at->is_near, -anywhere, real_min_of_3(a_v, b_v, c_v));
+    view->v_max = lanes_select(at->is_near, anywhere, real_max_of_3(a_v, b_v, c_v));
+    view->w_near.all = at->low - slack;
+    mask seen = (view->u_min <= (real)(tile->tile_u_max)) & ((real)(tile->tile_u_min) <= view->u_max) &
+                (view->v_min <= (real)(tile->tile_v_max)) & ((real)(tile->tile_v_min) <= view->v_max) &
+                (view->w_near.all <= (real)(tile->tile_reach_max)) & (at->high >= -slack);
+    return lanes_bits(seen) & ((1u << count) - 1);
+}
+
+// The error of a vertex across a ray.
+static inline real block_vertex_error(const MacroTile *tile, const BlockVertices *at)
+{
+    real distance = at->distance;
+    if (IS_CERTIFIED) return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
+    // the full test's error counts from the ray's start
+    real from_start = tile->frame.leaving ? distance : real_fma(at->low, (real)(-tile->ray_per_w), distance);
+    return real_fma(from_start, (real)(VERTEX_TEST_ERROR * UNIT_ROUNDOFF),
+                    distance * (real)(VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF));
+}
+
+// Sets the edges and their error, and with `occludes` what occlusion without a full test needs.
+static inline void block_set_edges(BlockView *view, const MacroTile *tile, const BlockVertices *at,
+                                   bool occludes)
+{
+    Vector edge = block_cross(at->a, at->ab);
+    real volume = vector_dot(edge, at->c);
+    integer sign = bits_from_real(volume) & bits_from_real((real)(-0.0f));
+    view->edges[0] = vector_flip(edge, sign);
+    view->edges[1] = vector_flip(block_cross(at->b, at->bc), sign);
+    view->edges[2] = vector_flip(block_cross(at->c, at->ca), sign);
+    real vertex_error = block_vertex_error(tile, at), width = at->longest;
+    if (IS_CERTIFIED) width = real_fma((real)(4), vertex_error, width);
+    real error = real_fma(vertex_error * (real)(tile->ray_per_w), width, (real)(SMALLEST_RATIO));
+    // edge-on the sign is that of rounding, and values inside are small: docs/numerics.md
+    mask has_sign =
+        fabs(volume) > (real)(8 * UNIT_ROUNDOFF) * at->longest * at->to_vertices * at->to_vertices;
+    real signless_error = lanes_select(at->is_near, (real)(LARGEST), (real)(20) * error);
+    view->error.all = lanes_select(has_sign, error, signless_error);
+    if (!occludes) return;
+    const real slack = (real)(tile->slack);
+    view->w_far.all = lanes_select(at->low > slack + slack, at->high + slack, (real)(LARGEST));
+    view->vertex = at->vertex;
+    view->normal = vector_flip(block_cross(at->ab, at->bc), sign);
+    view->normal_squared = vector_dot(view->normal, view->normal);
+    view->longest = at->longest;
+}
+
+static inline Vector vector_of_lane(const Vector *lanes, uint lane)
+{
+    return (Vector){real_of_lane(&lanes->x, lane), real_of_lane(&lanes->y, lane),
+                    real_of_lane(&lanes->z, lane)};
+}
+
+static inline real edge_value(Vector edge, real u, real v)
+{
+    return real_fma(u, edge.x, real_fma(v, edge.y, edge.z));
+}
+
+// The lanes whose shadow rays certainly start on the light's side of a triangle's plane: they miss it.
+// `to_plane`: from the start to a vertex.
+static inline mask starts_before(Vector normal, real normal_squared, real longest, real u, real v,
+                                 Vector to_plane)
+{
+    real along = edge_value(normal, u, v), height = vector_dot(normal, to_plane);
+    real squared =
+        real_max(normal_squared, (real)(SMALLEST_RATIO)) * real_fma(u, u, real_fma(v, v, (real)(1)));
+    // the full test's own condition is 1/16
+    mask is_faced = along * fabs(along) > (real)(0.07f) * squared;
+    // in this order the product underflows only where the square on the left does
+    real error = (real)(24 * UNIT_ROUNDOFF) * longest * longest;
+    return is_faced & (height > (real)(0)) &
+           (height * height > vector_dot(to_plane, to_plane) * error * error);
+}
+
+// Ends shadow rays that are certainly occluded.
+static inline void tile_occlude(MacroTile *tile, uint packet, uint lanes)
+{
+    Traversal *traversal = &tile->traversals[packet];
+    mask occluded = mask_of_bits(lanes);
+    traversal->active = traversal->active & !occluded;
+    tile->reach[packet] = lanes_select(occluded, (real)(-LARGEST), tile->reach[packet]);
+    if (!lanes_any(traversal->active)) tile->active &= ~(1u << packet);
+}
+
+// From a packet's rays' starts, on the frame's axes.
+static inline Vector packet_starts(const MacroTile *tile, uint packet)
+{
+    const OriginFrame *frame = &tile->frame;
+    const Vector *origin = &tile->rays[packet].origin;
+    return (Vector){*vector_component(origin, frame->u_axis), *vector_component(origin, frame->v_axis),
+                    *vector_component(origin, frame->w_axis) * (real)(frame->side)};
+}
+
+// The triangles, of those given as bits, whose full test a packet needs: ray by ray, a lane per triangle.
+static inline ALWAYS_INLINE uint block_test_rays(MacroTile *tile, const BlockView *view, uint packet,
+                                                 uint rays, uint triangles, bool occludes)
+{
+    uint remaining = 0, occluded = 0;
+    Vector starts;
+    if (occludes) starts = packet_starts(tile, packet);
+    for (; rays != 0; rays &= rays - 1) {
+        const uint lane = lowest_bit(rays);
+        real u = real_of_lane(&tile->u[packet], lane), v = real_of_lane(&tile->v[packet], lane),
+             reach = real_of_lane(&tile->reach[packet], lane);
+        real least = real_min_of_3(edge_value(view->edges[0], u, v), edge_value(view->edges[1], u, v),
+                                   edge_value(view->edges[2], u, v));
+        uint perhaps = triangles & lanes_bits(!(least < -view->error.all) & (view->w_near.all <= reach));
+        if (perhaps == 0) continue;
+        if (occludes) {
+            if (perhaps & lanes_bits((least > view->error.all) & (view->w_far.all < reach))) {
+                occluded |= 1u << lane;
+                continue;
+            }
+            Vector to_plane = vector_subtract(view->vertex, vector_of_lane(&starts, lane));
+            perhaps &=
+                ~lanes_bits(starts_before(view->normal, view->normal_squared, view->longest, u, v, to_plane));
+        }
+        remaining |= perhaps;
+    }
+    if (occluded != 0) tile_occlude(tile, packet, occluded);
+    return tile->active >> packet & 1 ? remaining : 0;
+}
+
+// The same triangle by triangle, a lane per ray.
+static inline ALWAYS_INLINE uint block_test_triangles(MacroTile *tile, const BlockView *view, uint packet,
+                                                      uint triangles, bool occludes)
+{
+    uint remaining = 0;
+    const real u = tile->u[packet], v = tile->v[packet];
+    for (; triangles != 0; triangles &= triangles - 1) {
+        const uint lane = lowest_bit(triangles);
+        const real error = (real)(view->error.each[lane]), reach = tile->reach[packet];
+        real least = real_min_of_3(edge_value(vector_of_lane(&view->edges[0], lane), u, v),
+                                   edge_value(vector_of_lane(&view->edges[1], lane), u, v),
+                                   edge_value(vector_of_lane(&view->edges[2], lane), u, v));
+        uint perhaps = lanes_bits(!(least < -error) & ((real)(view->w_near.each[lane]) <= reach));
+        if (perhaps == 0) continue;
+        if (occludes) {
+            const uint occluded = lanes_bits((least > error) & ((real)(view->w_far.each[lane]) < reach));
+            if (occluded != 0) tile_occlude(tile, packet, occluded);
+            if (!(tile->active >> packet & 1)) return 0;
+            perhaps &= ~occluded;
+            if (perhaps == 0) continue;
+            Vector to_plane =
+                vector_subtract(vector_of_lane(&view->vertex, lane), packet_starts(tile, packet));
+            perhaps &= ~lanes_bits(starts_before(vector_of_lane(&view->normal, lane),
+                                                 real_of_lane(&view->normal_squared, lane),
+                                                 real_of_lane(&view->longest, lane), u, v, to_plane));
+            if (perhaps == 0) continue;
+        }
+        remaining |= 1u << lane;
+    }
+    return remaining;
+}
+
+static inline void triangles_prefetch(const Scene *scene, uint first, uint triangles)
+{
+    for (; triangles != 0; triangles &= triangles - 1)
+        memory_prefetch((global const char *)&scene->triangles[first + lowest_bit(triangles)],
+                        sizeof(Triangle));
+}
+
+// Intersects the triangles of a block with the packets, given as bits, that see its box as `seen`. The full
+// tests come last, when what they read has been prefetched.
+static inline ALWAYS_INLINE void tile_visit_block(MacroTile *tile, const Scene *scene, uint block, uint count,
+                                                  const SeenRectangle *seen, uint packets, bool is_shadow)
+{
+    const bool occludes = is_shadow && BLOCKS_OCCLUDE;
+    if (tile->has_shrunk) tile_bound_reach(tile);
+    BlockView view;
+    const BlockVertices vertices = block_load(tile, &scene->triangle_blocks[block]);
+    const uint triangles = block_see(&view, tile, &vertices, count);
+    if (triangles == 0) return;
+    block_set_edges(&view, tile, &vertices, occludes);
+    const uint first = block_first(scene, block);
+    uint prefetched = is_shadow ? 0 : triangles; // many of a shadow ray's are missed
+    triangles_prefetch(scene, first, prefetched);
+    ushort remaining[LANES];
+    uint tested = 0;
+    for (; packets != 0; packets &= packets - 1) {
+        const uint packet = lowest_bit(packets), rays = rays_within(tile, packet, seen);
+        if (rays == 0) continue;
+        const uint near = triangles & lanes_bits((view.u_min <= (real)(tile->u_max.each[packet])) &
+                                                 ((real)(tile->u_min.each[packet]) <= view.u_max) &
+                                                 (view.v_min <= (real)(tile->v_max.each[packet])) &
+                                                 ((real)(tile->v_min.each[packet]) <= view.v_max) &
+                                                 (view.w_near.all <= (real)(tile->reach_max.each[packet])));
+        if (near == 0) continue;
+        const uint left = popcount(rays) <= popcount(near)
+                              ? block_test_rays(tile, &view, packet, rays, near, occludes)
+                              : block_test_triangles(tile, &view, packet, near, occludes);
+        if (left == 0) continue;
+        remaining[packet] = (ushort)left;
+        tested |= 1u << packet;
+        triangles_prefetch(scene, first, left & ~prefetched);
+        prefetched |= left;
+    }
+    for (; tested != 0; tested &= tested - 1) {
+        const uint packet = lowest_bit(tested);
+        Traversal *traversal = &tile->traversals[packet];
+        tile_prepare(tile, packet);
+        bool is_hit = false;
+        for (uint left = remaining[packet]; left != 0; left &= left - 1) {
+            const uint triangle = first + lowest_bit(left);
+            is_hit |= intersect_triangle(traversal, scene, &tile->rays[packet], scene->triangles[triangle]);
+            if (is_shadow && !lanes_any(traversal->active)) break;
+        }
+        if (is_hit) tile_update(tile, packet);
+    }
+}
+
+#endif
+
+#endif
