@@ -554,6 +554,9 @@ class Test(TestCase):
         cell([(0.5 * r, 0.25 * g, b) for r, g, b in quadrants], WHOLE, **{"pbrMetallicRoughness": texture()["pbrMetallicRoughness"] | {"baseColorFactor": [0.5, 0.25, 1, 1]}})
         cell([GREEN, RED, WHITE, BLUE], WHOLE, **texture(transform={"offset": [0.5, 0]}))
         cell([BLUE, RED, WHITE, GREEN], WHOLE, **texture(transform={"rotation": math.pi / 2}))
+        # As in Khronos' TextureTransformTest. The extension's GLSL listing, which turns the other way
+        # (KhronosGroup/glTF issue 1563), gives blue; scaling last gives green, no rotation white.
+        cell(RED, [(0.48, 0.42)] * 4, **texture(transform={"offset": [0.2, 0.5], "rotation": 1.2, "scale": [0.75, 0.25]}))
         cell([RED] * 4, WHOLE, **texture(transform={"scale": [0.25, 0.25], "offset": [0.125, 0.125]}))
         cell([GREEN, GREEN, WHITE, WHITE], WHOLE, **texture(1, {"offset": [1, 0]}))
         cell([GREEN, RED, WHITE, BLUE], WHOLE, **texture(2, {"offset": [1, 0]}))

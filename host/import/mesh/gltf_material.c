@@ -115,7 +115,9 @@ static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfMaterial *mate
     if (json_integer_value(filter.json) == NEAREST) gltf_lose(gltf, GLTF_NEAREST, &filter);
 }
 
-// KHR_texture_transform: scales, turns counterclockwise as the image is seen, with v downward, and moves.
+// KHR_texture_transform: scales, turns counterclockwise as the image is seen, with v downward, and moves. The
+// GLSL listing of its specification turns the other way (KhronosGroup/glTF, issue 1563); its text, its sample
+// model and other programs turn this way.
 static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfMaterial *material)
 {
     const GltfItem transform = gltf_extension(info, "KHR_texture_transform");
