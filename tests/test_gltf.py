@@ -227,6 +227,11 @@ class Test(TestCase):
         with open("a b%.bin", "wb") as file:
             file.write(gltf.bytes)
         self.assert_square(gltf.write("file.gltf", uri="a%20b%25.bin"))
+        with open("Unicode\u2764\u267b.bin", "wb") as file:
+            file.write(gltf.bytes)
+        for uri in ("Unicode\u2764\u267b.bin", "Unicode%E2%9D%A4%E2%99%BB.bin"):
+            del gltf.json["buffers"]
+            self.assert_square(gltf.write("Unicode\u2764\u267b.gltf", uri=uri))
         write("marked.gltf", "\ufeff" + json.dumps(gltf.json))
         self.assert_square("marked.gltf")
 
@@ -325,6 +330,14 @@ class Test(TestCase):
             (("buffers", 0, "uri"), "https://example.org/a", r"buffers\[0\].uri: must be a relative path"),
             (("buffers", 0, "uri"), "none.bin", r"buffers\[0\].uri: cannot read 'none.bin': No such file"),
             (("bufferViews",), [], r"bufferView: the file has no 'bufferViews'"),
+            (("nodes",), {}, "nodes: must be an array"),
+            (("scenes", 0, "nodes"), {}, r"scenes\[0\].nodes: must be an array"),
+            ((*node, "children"), 1, r"nodes\[0\].children: must be an array"),
+            (("meshes", 0, "primitives"), {}, r"meshes\[0\].primitives: must be an array"),
+            (primitive, [], r"meshes\[0\].primitives\[0\]: must be an object"),
+            ((*primitive, "attributes"), [], r"meshes\[0\].primitives\[0\].attributes: must be an object"),
+            ((*accessor, "normalized"), 1, r"accessors\[0\].normalized: must be true or false"),
+            (("extensionsRequired",), "KHR_draco_mesh_compression", "extensionsRequired: must be an array"),
         )
         for path, value, message in faults:
             gltf = Gltf()
@@ -405,6 +418,34 @@ class Test(TestCase):
         text = DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()})
         write("a.dae", text.replace("<texture texture='s2' texcoord='UV'/>", "<color>-1 0 0 1</color>"))
         self.checked("a.dae", "a color of material 'm' is out of range: the default is used")
+
+    def test_members_of_another_type_are_named(self):
+        """The square is there without them; null is as good as missing."""
+        pbr = "materials[0].pbrMetallicRoughness"
+        for members, warnings in (
+            ({"materials": [{"pbrMetallicRoughness": []}]}, [f"{pbr}: must be an object: not used"]),
+            ({"materials": [{"pbrMetallicRoughness": {"baseColorTexture": 0}}]}, [f"{pbr}.baseColorTexture: must be an object: not used"]),
+            (
+                {
+                    "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": 1}}}}],
+                    "textures": [{"source": 0}],
+                    "images": [{"uri": 1}],
+                },
+                [f"{pbr}.baseColorTexture.extensions.KHR_texture_transform: must be an object: not used", "images[0].uri: must be a string", "images[0]: has no 'uri' or 'bufferView': the color is used"],
+            ),
+            ({"materials": [{"alphaMode": 1, "extensions": []}]}, ["materials[0].alphaMode: must be a string", "materials[0].extensions: must be an object"]),
+            ({"materials": [7]}, ["materials[0]: must be an object"]),
+            ({"extensions": {"KHR_lights_punctual": {"lights": [[]]}}}, ["extensions.KHR_lights_punctual.lights[0]: must be an object"]),
+            ({"materials": [{"pbrMetallicRoughness": None, "extensions": None}], "extensions": None}, []),
+        ):
+            gltf = Gltf(**members)
+            gltf.square(material=0) if "materials" in members else gltf.square()
+            self.assertEqual(self.checked(gltf.write("a.gltf"), *warnings)["mesh_triangles"], 2)
+        gltf = Gltf()
+        gltf.square(attributes={"POSITION": gltf.accessor(SQUARE)})
+        gltf.add("meshes", primitives=[{"attributes": {}}])
+        gltf.place(mesh=1)
+        self.checked(gltf.write("a.gltf"), "meshes[1].primitives[0]: has no 'POSITION' and is not shown")
 
     def test_missing_image_is_named(self):
         gltf = Gltf(textures=[{"source": 0}], images=[{"uri": "a%20b.png"}])

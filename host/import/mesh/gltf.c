@@ -15,6 +15,7 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
     [GLTF_MORPH] = "morph targets are not applied: the mesh keeps its own shape",
     [GLTF_VERTEX_COLOR] = "vertex colors are not used: the material's color is",
     [GLTF_POINTS] = "points and lines are not shown",
+    [GLTF_NO_POSITIONS] = "has no 'POSITION' and is not shown",
     [GLTF_SCENES] = "only this scene is shown",
     [GLTF_ANIMATION] = "animations are not played: nodes stand as the file has them",
     [GLTF_VIEW] = "cameras and lights of a mesh are not used: those of the scene are",
@@ -294,7 +295,8 @@ bool gltf_read(MeshDraft *draft)
         gltf_open(&gltf);
         const GltfItem animations = gltf_root_member(&gltf, "animations");
         if (animations.json) gltf_lose(&gltf, GLTF_ANIMATION, &animations);
-        read = asset_check(&gltf) && extensions_check(&gltf) && gltf_scene_read(&gltf);
+        read = asset_check(&gltf) && extensions_check(&gltf) && gltf_structure_check(&gltf) &&
+               gltf_scene_read(&gltf);
     }
     draft->places = DRAFT_NO_PLACES;
     gltf_close(&gltf);

@@ -40,6 +40,7 @@ typedef enum {
     GLTF_MORPH,
     GLTF_VERTEX_COLOR,
     GLTF_POINTS,
+    GLTF_NO_POSITIONS,
     GLTF_SCENES,
     GLTF_ANIMATION,
     GLTF_VIEW,
@@ -99,6 +100,12 @@ bool gltf_index(Gltf *gltf, const GltfItem *item, const char *key, const char *a
 bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const char *array, size_t *index);
 // Reads one number where `count` is 1, else an array of `count` numbers, each of at most NUMBER_MAX.
 bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t count, double *values);
+
+// gltf_structure.c
+
+// Checks that the members that glint reads have the JSON types of the format. Warns about those that it can
+// do without, which read as missing. Returns false with an error about another.
+bool gltf_structure_check(Gltf *gltf);
 
 // gltf_accessor.c
 

@@ -82,6 +82,10 @@ static uint32_t image_add(Gltf *gltf, const GltfItem *image)
         free(path);
         return texture;
     }
+    if (!text && !json_object_get(image->json, "bufferView")) {
+        gltf_warn(gltf, image, "has no 'uri' or 'bufferView': the color is used");
+        return 0;
+    }
     Source bytes = {.bytes = ""};
     Text decoded = {0};
     size_t stride;

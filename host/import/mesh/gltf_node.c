@@ -147,8 +147,10 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     if (!gltf_integer(gltf, primitive, "mode", 0, MODE_FAN, &mode)) return false;
     const GltfItem attributes = gltf_member(primitive, "attributes"),
                    colors = gltf_member(&attributes, "COLOR_0"), targets = gltf_member(primitive, "targets");
-    if (mode < MODE_TRIANGLES) gltf_lose(gltf, GLTF_POINTS, primitive);
-    if (mode < MODE_TRIANGLES || !json_object_get(attributes.json, "POSITION")) return true;
+    if (mode < MODE_TRIANGLES || !json_object_get(attributes.json, "POSITION")) {
+        gltf_lose(gltf, mode < MODE_TRIANGLES ? GLTF_POINTS : GLTF_NO_POSITIONS, primitive);
+        return true;
+    }
     if (colors.json) gltf_lose(gltf, GLTF_VERTEX_COLOR, &colors);
     if (targets.json) gltf_lose(gltf, GLTF_MORPH, &targets);
     GltfMaterial *material = draft->import->own_materials ? gltf_material(gltf, primitive) : NULL;
