@@ -404,6 +404,22 @@ class Test(TestCase):
         gltf.write("b.gltf")
         self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[0]: only glint render FILE shows emission", "no lights")
 
+    def test_losses_of_materials_are_named(self):
+        """One loss for each material; the first is that of Khronos' MultiUVTest."""
+        image = {"baseColorTexture": {"index": 0}}
+        glass = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2}}
+        for material, path, loss in (
+            ({"pbrMetallicRoughness": image, "emissiveTexture": {"index": 1, "texCoord": 1}, "emissiveFactor": [1, 1, 1]}, "materials[0]", "emission next to a different texture is not shown"),
+            ({"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}, "samplers[0].magFilter", "filtering by the nearest texel is not used"),
+            ({"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1], "roughnessFactor": 0}}, "materials[0]", "reflections of metals are not colored"),
+            ({"extensions": glass}, "materials[0].extensions.KHR_materials_volume.attenuationDistance", "absorption is not used"),
+            ({"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": image | {"baseColorFactor": [1, 0, 0, 1]}}, "materials[0]", "the factors of an emitted texture become their mean"),
+        ):
+            gltf = Gltf(materials=[material], samplers=[{"magFilter": 9728}], textures=[{"source": 0}, {"source": 0, "sampler": 0}])
+            gltf.add("images", bufferView=gltf.view(QUADRANTS), mimeType="image/png")
+            gltf.square(WHOLE, attributes={"TEXCOORD_1": gltf.accessor(WHOLE)}, material=0)
+            self.checked(gltf.write("a.gltf"), f"{path}: {loss}")
+
     def test_invalid_numbers_become_defaults(self):
         for member, expected in (
             ({"pbrMetallicRoughness": {"baseColorFactor": [1, -1, 0, 1]}}, "pbrMetallicRoughness.baseColorFactor: must be from 0 to 1, not -1: the default"),
@@ -562,12 +578,13 @@ class Test(TestCase):
             gltf.add("textures", source=image, sampler=gltf.add("samplers", wrapS=clamp, wrapT=clamp))
         cells = []
 
-        def cell(colors, uvs=None, normals=None, attributes=(), **material):
+        def cell(colors, uvs=None, normals=None, attributes=(), scale=1, **material):
             """Colors: one for the whole square, or four by quadrants, upper left, right, lower left, right."""
             x = len(cells)
             cells.append(colors if isinstance(colors, list) else [colors] * 4)
             material = gltf.add("materials", **material) if material else None
-            gltf.square(uvs, normals, {"translation": [x, 0, 0]}, attributes=dict(attributes), **({} if material is None else {"material": material}))
+            node = {"translation": [x + (scale < 0), 0, 0], "scale": [scale, 1, 1]}
+            gltf.square(uvs, normals, node, attributes=dict(attributes), **({} if material is None else {"material": material}))
 
         def factor(*color, **more):
             return {"pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": 0} | more}
@@ -592,6 +609,7 @@ class Test(TestCase):
         cell((0.24, 0.24, 0.24), normals=[(0.8, 0, 0.6)] * 4, extensions={"KHR_materials_transmission": {"transmissionFactor": 0.5}}, **factor(0.5, 0.5, 0.5, 1))
         cell(gray, **factor(1, 1, 1, 1, metallicFactor=1, roughnessFactor=0))
         cell(quadrants, WHOLE, **texture())
+        cell([[0.8 * value for value in color] for color in (GREEN, RED, WHITE, BLUE)], WHOLE, [(0, 0.6, 0.8)] * 4, scale=-1, **texture())
         cell([(0.5 * r, 0.25 * g, b) for r, g, b in quadrants], WHOLE, **{"pbrMetallicRoughness": texture()["pbrMetallicRoughness"] | {"baseColorFactor": [0.5, 0.25, 1, 1]}})
         cell([GREEN, RED, WHITE, BLUE], WHOLE, **texture(transform={"offset": [0.5, 0]}))
         cell([BLUE, RED, WHITE, GREEN], WHOLE, **texture(transform={"rotation": math.pi / 2}))
