@@ -434,7 +434,7 @@ static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what,
     if (errors.wrong_decided > 0)
         fail_msg("%s, %g: of the pixels not undecided %zu are wrong, at most %zu of them in color", what,
                  number, errors.wrong_decided, errors.color);
-    const size_t undecided = film.repeats.undecided;
+    const size_t undecided = (size_t)film.repeats.undecided;
     film_free(&film);
     renderer_close(renderer);
     certify_sample_close(&reference);

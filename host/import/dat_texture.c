@@ -152,7 +152,7 @@ bool dat_texture_body(DatReader *reader, Material *material)
 
 static size_t slot_of(const DatReader *reader, Word name, uint64_t hash)
 {
-    size_t slot = hash & (reader->slot_count - 1);
+    size_t slot = (size_t)hash & (reader->slot_count - 1);
     for (; reader->slots[slot]; slot = (slot + 1) & (reader->slot_count - 1)) {
         const DatTexture *texture = &reader->textures.items[reader->slots[slot] - 1];
         if (texture->hash == hash && words_equal(texture->name, name)) break;

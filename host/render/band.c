@@ -161,7 +161,7 @@ bool place_next(Place *part, const Place *whole, uint64_t pixels_max)
 
 uint64_t place_pixels(const Place *place)
 {
-    const uint64_t left = place->first[0] * place->item.width, top = place->first[1] * place->item.height;
+    const size_t left = place->first[0] * place->item.width, top = place->first[1] * place->item.height;
     const uint64_t width = least(place->items[0] * place->item.width, place->band.s[2] - left);
     return width * least(place->items[1] * place->item.height, place->band.s[3] - top);
 }
